@@ -1,0 +1,65 @@
+# One command for everything a user or developer does. Each target sets up first: seconds, once that has been done.
+#   make map                     grasp map of the bottle, on 2 ranks
+#   make map SCENE=jobs/x.toml RANKS=8
+#   make PYTHON=python3 setup    another interpreter than /usr/bin/python3 (see setup.sh)
+
+RANKS   = 2
+SCENE   = jobs/bottle-rigid.toml
+RESULT  = results/$(basename $(notdir $(SCENE))).hdf
+PAGE    = $(RESULT:.hdf=.html)
+PICTURE = $(RESULT:.hdf=.png)
+BIN     = .venv/bin
+LIMIT   = timeout -k 30
+
+# One thread per rank: the ranks share the cores, and sums must not depend on how many threads there are.
+export OMP_NUM_THREADS := 1
+# Open MPI refuses to run as root (the usual user in a container) unless told twice.
+ifeq ($(shell id -u),0)
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+endif
+# It also refuses to start more ranks than there are cores; asked for when the recipe runs, after the set-up.
+AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
+
+.DEFAULT_GOAL := help
+.PHONY: help setup map test test-long bench lint doctor
+
+help:
+	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
+	@echo 'make test       the tests, first on one process and then on $(RANKS) ranks'
+	@echo 'make test-long  the checks that take minutes'
+	@echo 'make bench      what accuracy and speed cost'
+	@echo 'make lint       ruff'
+	@echo 'make doctor     does this machine have what it needs, with the cure'
+	@echo 'make setup      only what each of the above does first: packages and .venv'
+
+setup:
+	@$(if $(filter-out undefined default,$(origin PYTHON)),PYTHON='$(PYTHON)') ./setup.sh
+
+map: setup
+	@mkdir -p $(dir $(RESULT))
+	$(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
+	@$(BIN)/softjaw report $(RESULT) -o $(PAGE)
+	@$(BIN)/softjaw view $(RESULT) --screenshot $(PICTURE)
+	@$(BIN)/softjaw show $(RESULT) --top 5
+	@echo
+	@echo 'result   $(RESULT)    every number, with units and definitions'
+	@echo 'report   $(PAGE)   open it in a browser'
+	@echo 'picture  $(PICTURE)'
+
+test: setup
+	$(LIMIT) 12m $(BIN)/python -m pytest -q
+	$(LIMIT) 12m ./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no -m "not long and not launches"
+
+test-long: setup
+	$(BIN)/python -m pytest -q -m long --durations 10
+
+bench: setup
+	$(BIN)/python tests/benchmark/run.py
+
+lint: setup
+	$(BIN)/ruff check .
+
+doctor: setup
+	@$(BIN)/softjaw doctor

@@ -1,0 +1,132 @@
+"""The doctor names each trouble with its cure, survives what it examines, and is well where the tests run."""
+
+from __future__ import annotations
+
+import os
+from types import SimpleNamespace
+
+import pytest
+
+from study import doctor, environment
+from study.environment import Answer, ask, launch_environment, outside_mpi
+
+
+def answering(code, output="", errors=""):
+    return lambda *_, **__: Answer(code, output, errors)
+
+
+@pytest.mark.launches
+def test_all_is_well_on_a_machine_that_was_set_up(capsys):
+    assert doctor.doctor() == 0, capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[1] for line in lines] == list(doctor.CHECKS)
+    assert all(line.startswith("fine") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("check", "answer", "found", "cure"),
+    [
+        ("numpy", (1, "2.4.6", "ValueError: numpy.dtype size changed"), "2.4.6 does not fit", "numpy>=1.26,<2"),
+        ("numpy", (1, "1.26.4", "ValueError: numpy.dtype size changed"), "1.26.4 does not fit", "numpy>=2"),
+        ("packages", (1, "", "ModuleNotFoundError: No module named 'skfem'"), "'skfem'", "pip install -e ."),
+        ("petsc", (1, "", "ImportError: petsc4py is missing"), "petsc4py is missing", "python3-petsc4py"),
+        ("petsc", (1, "", "AssertionError: PETSc was built with complex scalars"), "complex", "python3-petsc4py-real"),
+        ("petsc", (1, "", "[0] Could not locate solver type mumps"), "mumps", "configured with MUMPS"),
+        ("petsc", (-11, "", ""), "exit code -11", "make setup"),
+        ("h5py", (0, "0 1 3.14.0 on HDF5 1.14.6", ""), "3.14.0 on HDF5 1.14.6 without MPI", "pip uninstall h5py"),
+        ("h5py", (0, "0 0 3.7.0 on HDF5 1.10.8", ""), "without MPI", "python3-h5py python3-h5py-mpi"),
+        ("mpi", (1, "", "every rank is alone"), "different MPI libraries", "mpirun first in PATH"),
+        ("mpi", (None, "", ""), "no answer in time", "mpirun -n 2 true"),
+        ("mpi", (0, "1 Open MPI v4.1.4", ""), "lost data", "MPI-IO"),
+        ("pictures", (-6, "", "bad X server connection"), "no 3-D pictures: bad X server", "libosmesa6"),
+    ],
+)
+def test_a_trouble_comes_with_its_cure(monkeypatch, check, answer, found, cure):
+    monkeypatch.setattr(doctor, "ask", answering(*answer))
+    monkeypatch.setattr(doctor, "mpirun", lambda ranks: ["mpirun", "-n", str(ranks)])
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: f"/usr/bin/{name}")
+    finding = doctor.CHECKS[check]()
+    assert found in finding.text
+    assert cure in finding.cure
+    assert "\n" not in finding.line
+
+
+def test_a_missing_mpirun_is_said_before_anything_is_started(monkeypatch):
+    monkeypatch.setattr(doctor.shutil, "which", lambda _: None)
+    finding = doctor.check_mpi()
+    assert "mpirun" in finding.text
+    assert "openmpi-bin" in finding.cure
+
+
+def test_several_threads_per_rank_are_a_trouble(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    assert doctor.check_threads().cure == "export OMP_NUM_THREADS=1"
+
+
+def test_a_cache_folder_that_cannot_be_written_is_a_trouble(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    finding = doctor.check_cache()
+    assert "NUMBA_CACHE_DIR" in finding.cure
+    assert finding.code == 5
+
+
+def test_a_full_disk_is_a_trouble(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(doctor.shutil, "disk_usage", lambda _: SimpleNamespace(free=3e8))
+    finding = doctor.check_disk()
+    assert "0.3 GB free" in finding.text
+    assert finding.code == 5
+
+
+@pytest.mark.parametrize(("codes", "expected"), [((), 0), ((5,), 5), ((5, 2), 2), ((2,), 2)])
+def test_what_is_missing_outweighs_what_cannot_be_written(monkeypatch, capsys, codes, expected):
+    checks = {f"check {i}": lambda code=code: doctor.Finding("bad", "do this", code) for i, code in enumerate(codes)}
+    monkeypatch.setattr(doctor, "CHECKS", {"good": lambda: doctor.Finding("good"), **checks})
+    assert doctor.doctor() == expected
+    assert capsys.readouterr().out.count("cure: do this") == len(codes)
+
+
+def test_a_check_that_fails_itself_does_not_hide_the_others(monkeypatch, capsys):
+    monkeypatch.setattr(doctor, "CHECKS", {"broken": lambda: 1 / 0, "good": lambda: doctor.Finding("good")})
+    assert doctor.doctor() == 2
+    broken, good = capsys.readouterr().out.splitlines()
+    assert "ZeroDivisionError" in broken
+    assert good.startswith("fine")
+
+
+@pytest.mark.launches
+def test_a_crash_and_a_hang_are_answers():
+    assert ask("import os; os.abort()").trouble == "ended with exit code -6"
+    assert ask("import time; time.sleep(60)", limit=0.5).trouble == "no answer in time"
+
+
+@pytest.mark.launches
+def test_two_ranks_see_each_other_whatever_started_this_process():
+    answer = ask("from mpi4py import MPI; print(MPI.COMM_WORLD.size)", prefix=tuple(environment.mpirun(2)))
+    assert answer.output.split() == ["2", "2"], answer.errors
+
+
+def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    monkeypatch.setenv("PMIX_RANK", "1")
+    monkeypatch.setenv("PATH_TO_KEEP", "yes")
+    kept = launch_environment()
+    assert kept["PATH_TO_KEEP"] == "yes"
+    assert kept["OMP_NUM_THREADS"] == "1"
+    assert not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK"} & set(kept)
+    assert outside_mpi({"PMI_RANK": "0", "HOME": "/"}) == {"HOME": "/"}
+
+
+def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    environment.pin_threads()
+    assert os.environ["OMP_NUM_THREADS"] == "1"
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
+
+
+@pytest.mark.launches
+def test_the_doctor_loads_no_mpi_itself():
+    foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
+    assert ask(f"import sys, study.doctor; print({foreign} & set(sys.modules))").output == "set()"
