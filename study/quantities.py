@@ -1,0 +1,177 @@
+"""Every number a result file holds: name, unit, meaning and shape, in literal tables.
+
+A new quantity is one more line here; layout, store, ``show`` and the report follow from these tables.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MODELS = ("curved", "flat", "projected")
+FINGERS = 2
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number, or one small array, of a case.
+
+    Parameters
+    ----------
+    name, units, long_name : str
+        Dataset name, SI unit ("" for a pure number), label of a colour bar.
+    definition : str
+        One sentence; the reader of the file sees it beside the data.
+    per : "case" or "finger"
+        A finger's quantity has a leading axis of length two.
+    by_model : bool
+        Whether there is one value for each of `MODELS` (axis after the finger).
+    group : str
+        ``maps``, ``fingers``, ``checks``, ``work`` or ``limit_surface``.
+    shape : tuple of int
+        Trailing shape, ``()`` for a scalar.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    definition: str
+    per: str = "case"
+    by_model: bool = False
+    group: str = "maps"
+    shape: tuple[int, ...] = ()
+    only_with_two_meshes: bool = False
+
+    @property
+    def key(self) -> str:
+        """Key of the value in ``CaseResult.values``."""
+        return f"{self.group}/{self.name}"
+
+    @property
+    def row_shape(self) -> tuple[int, ...]:
+        """Shape of one case's value."""
+        finger = (FINGERS,) if self.per == "finger" else ()
+        return finger + ((len(MODELS),) if self.by_model else ()) + self.shape
+
+
+MAPS = (
+    Quantity("quality", "", "grasp quality", "Volume of the grasp wrench space spanned by both contacts with unit"
+             " normal forces; torque components are divided by the scales given in the scene.", by_model=True),
+    Quantity("e_n", "m", "eccentricity parameter e_n", "max tau_z / (mu S), with S the sum of pressure times area over"
+             " the patch; mean of both fingers.", by_model=True),
+    Quantity("e_n_projected", "m", "eccentricity parameter, physical normal force", "max tau_z / (mu F_N), with F_N the"
+             " sum of pressure times area times the cosine between face normal and contact normal; mean of both"
+             " fingers.", by_model=True),
+    Quantity("epsilon", "", "largest-minimum resisted wrench", "Radius of the largest ball around the origin inside the"
+             " grasp wrench space.", by_model=True),
+    Quantity("f_x_max", "N", "largest friction along x", "Total friction force along the contact frame's x axis when"
+             " the pad slides along x, Eqs. (6)-(8); mean of both fingers.", by_model=True),
+    Quantity("f_y_max", "N", "largest friction along y", "Total friction force along the contact frame's y axis when"
+             " the pad slides along y; mean of both fingers.", by_model=True),
+    Quantity("tau_z_max", "N m", "largest friction torque about z", "Total friction torque about the contact normal"
+             " when the pad turns about it; mean of both fingers.", by_model=True),
+    Quantity("S", "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
+    Quantity("F_N", "N", "normal force", "Sum of pressure times area times (n . N), the force along the contact normal;"
+             " mean of both fingers."),
+    Quantity("travel", "m", "travel of the pad", "How far the pad's back moved towards the object after first touch;"
+             " mean of both fingers."),
+    Quantity("contact_area", "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
+    Quantity("p_max", "Pa", "largest pressure", "Largest contact pressure on either finger."),
+    Quantity("contact_distance", "m", "distance of the contacts", "Distance between the fingers' centres of pressure."),
+    Quantity("tilt", "", "tilt of the loaded normals", "1 - F_N / S: zero for a flat contact, what curvature takes off"
+             " the normal force otherwise; mean of both fingers."),
+    Quantity("e_n_error", "", "relative error of e_n", "Difference of e_n (curved) between the mesh and one with half"
+             " as many elements per direction, over its value.", only_with_two_meshes=True),
+    Quantity("f_x_max_error", "", "relative error of f_x_max", "As e_n_error.", only_with_two_meshes=True),
+    Quantity("f_y_max_error", "", "relative error of f_y_max", "As e_n_error.", only_with_two_meshes=True),
+    Quantity("tau_z_max_error", "", "relative error of tau_z_max", "As e_n_error.", only_with_two_meshes=True),
+)
+
+
+def _finger(group: str, name: str, units: str, long_name: str, definition: str, **extra) -> Quantity:
+    return Quantity(name, units, long_name, definition, per="finger", group=group, **extra)
+
+
+FINGER = (
+    _finger("fingers", "f_x_max", "N", "largest friction along x", "As the map, for each finger.", by_model=True),
+    _finger("fingers", "f_y_max", "N", "largest friction along y", "As the map, for each finger.", by_model=True),
+    _finger("fingers", "tau_z_max", "N m", "largest friction torque about z", "As the map, for each finger.",
+            by_model=True),
+    _finger("fingers", "S", "N", "pressure times area", "As the map, for each finger."),
+    _finger("fingers", "F_N", "N", "normal force", "As the map, for each finger."),
+    _finger("fingers", "travel", "m", "travel of the pad", "As the map, for each finger."),
+    _finger("fingers", "frame_origin", "m", "origin of the contact frame", "In the pad's frame.", shape=(3,)),
+    _finger("fingers", "frame_axes", "", "axes of the contact frame", "Rows x, y, z in the pad's frame.", shape=(3, 3)),
+    _finger("fingers", "frame_flag", "", "flag of the contact frame", "0: regular; otherwise a rule for a degenerate"
+            " patch chose the frame."),
+    _finger("fingers", "pose_rotation", "", "rotation of the pad", "x_object = rotation x_pad + origin.", shape=(3, 3)),
+    _finger("fingers", "pose_origin", "m", "origin of the pad", "Centre of the undeformed front face after the press,"
+            " in the object's frame.", shape=(3,)),
+)
+
+CHECKS = (
+    _finger("checks", "force_balance", "", "force balance", "Difference of contact force and load over the load."),
+    _finger("checks", "tension", "Pa", "largest tension", "Largest negative contact pressure; a contact has none."),
+    _finger("checks", "penetration", "m", "largest penetration", "Deepest overlap of pad and object."),
+    _finger("checks", "min_det_f", "", "smallest det F", "Smallest ratio of deformed to undeformed volume."),
+    _finger("checks", "max_strain", "", "largest strain", "Largest principal Green-Lagrange strain in the pad."),
+    _finger("checks", "complementarity", "N m", "complementarity", "Largest product of contact force and gap."),
+    _finger("checks", "acoustic", "Pa", "smallest acoustic eigenvalue", "Negative where the material lost stability."),
+)
+
+WORK = (
+    _finger("work", "newton_iterations", "", "Newton iterations", "Of the load steps up to this force."),
+    _finger("work", "load_steps", "", "load steps", "Since the force below."),
+    _finger("work", "cuts", "", "step cuts", "Load steps that were halved and tried again."),
+    *(Quantity(f"seconds_{part}", "s", f"seconds in {part}", f"Wall time of the case spent in {part}.", group="work")
+      for part in ("assembly", "factorisation", "rest", "friction", "total")),
+)
+
+LIMIT_SURFACE: tuple[Quantity, ...] = ()
+
+PATCH = (
+    _finger("patch", "pressure", "Pa", "contact pressure", "Pressure of each face of the pad's front."),
+    _finger("patch", "area", "m^2", "face area", "Deformed area of each face."),
+    _finger("patch", "centroid", "m", "face centroid", "Deformed position in the pad's frame.", shape=(3,)),
+    _finger("patch", "normal", "", "face normal", "Unit normal of the deformed face, in the pad's frame.", shape=(3,)),
+)
+
+# Levels of each effect, cheapest first; effects/<name>_level holds the position in this list.
+EFFECTS = {
+    "object": ("rigid", "linear shell", "nonlinear shell"),
+    "pad": ("linear", "hyperelastic"),
+    "sheet": ("rigid", "elastic plate"),
+    "model_size": ("quarter", "half", "full"),
+    "friction": ("flat", "curved"),
+    "wrench": ("3-D", "6-D"),
+    "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
+    "friction_pressure_coupling": ("none", "tangential traction"),
+}
+REASONS = (
+    "the only level of this version",
+    "forced by the scene",
+    "indicator below the target",
+    "indicator above the target",
+    "exact by symmetry",
+)
+
+
+def quantities(meshes: int = 1) -> tuple[Quantity, ...]:
+    """All per-case quantities but the patch; the error maps exist when every case is solved on two meshes."""
+    everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE
+    return tuple(q for q in everything if meshes > 1 or not q.only_with_two_meshes)
+
+
+def definitions(meshes: int = 1) -> str:
+    """One text that says what every quantity is; stored in each result file."""
+    lines = [
+        "Friction models: 'curved' lets every face resist in its own plane (curved contact model, Xu, Alt, Zhang,",
+        "Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a",
+        "Curved Contact Area Friction Model); 'flat' lays all faces into one plane and keeps the pressure sum S, the",
+        "paper's planar model; 'projected' is the planar model with the physical normal force F_N.",
+        "NaN: not there; status/code and status/message say why. All values are SI.",
+        "",
+    ]
+    for q in quantities(meshes) + PATCH:
+        models = " [curved, flat, projected]" if q.by_model else ""
+        lines.append(f"{q.key} [{q.units or '-'}]{models}: {q.long_name}. {q.definition}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,158 @@
+"""Read access to a result file: maps, fingers, checks, patches, texts. Needs neither MPI nor PETSc."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from study.layout import LABEL, PROGRAM, ROOT, SESSION, SESSIONS, VERSION, layout_from_options
+
+
+class StoredAxis(NamedTuple):
+    """One axis of the maps, as read from a file."""
+
+    name: str
+    values: np.ndarray
+    units: str
+    long_name: str
+
+
+class Result:
+    """A result file, opened by ``study.store.open_result``; every dataset is checked before it is read.
+
+    ``axes`` lists the axes of all maps: sweeps first, then station, angle and normal force; ``layout`` is the
+    layout that follows from them. Rows are flat indices over the axes.
+    """
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self.path, self.file = path, file
+        root, study = file.attributes(), file.attributes(ROOT)
+        if root.get("program") != PROGRAM:
+            raise ValueError("it does not name its program")
+        if root.get("layout_version") != str(VERSION):
+            raise ValueError(f"its layout has version {root.get('layout_version')}, this program reads {VERSION}")
+        self.axes = tuple(self._axis(text_of(name)) for name in study["axes"])
+        self.layout = layout_from_options(self.axes, study["options"])
+        if len(self.axes) < 3 or min(self.layout.shape) < 1:
+            raise ValueError("its axes are not those of a study")
+        self.title = study.get("title", "")
+        self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
+        self._known = {d.path: d for d in self.layout.datasets}
+
+    def __enter__(self) -> Result:
+        """Nothing to do: the file is open."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+
+    def read(self, path: str) -> np.ndarray:
+        """A dataset of the layout below ``/study``, for example ``checks/tension`` or ``e_n/flat``."""
+        return self._checked(path)[()]
+
+    def map(self, name: str, model: str | None = None) -> np.ndarray:
+        """One map over all axes; ``model`` where there is one value for each friction model."""
+        return self.read(f"{name}/{model or name}")
+
+    def fingers(self, name: str) -> np.ndarray:
+        """A quantity of each finger: axes, finger, then models or components."""
+        return self.read(f"fingers/{name}")
+
+    def checks(self, name: str) -> np.ndarray:
+        """A check of each finger's contact solution: axes, finger."""
+        return self.read(f"checks/{name}")
+
+    def work(self, name: str) -> np.ndarray:
+        """Iterations (axes, finger) or seconds (axes)."""
+        return self.read(f"work/{name}")
+
+    def effects(self, name: str) -> dict[str, np.ndarray]:
+        """Level, indicator and reason of an effect, each over all axes."""
+        return {part: self.read(f"effects/{name}_{part}") for part in ("level", "indicator", "reason")}
+
+    def patch(self, row: int) -> dict[str, np.ndarray]:
+        """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
+        names = [path.rpartition("/")[2] for path in self._known if path.startswith(f"{ROOT}/patch/")]
+        return {name: self._checked(f"patch/{name}")[row] for name in names}
+
+    def derived(self, name: str) -> np.ndarray:
+        """A dataset that was filled after all rows."""
+        return self.read(f"derived/{name}")
+
+    def row(self, *index: int) -> int:
+        """Flat row of a case from its index along each axis."""
+        return int(np.ravel_multi_index(index, self.layout.shape))
+
+    @property
+    def status(self) -> np.ndarray:
+        """State of every case: 0 missing, 1 done, 2 failed."""
+        return self.read("status/code")
+
+    @property
+    def messages(self) -> np.ndarray:
+        """Message of every case, as text."""
+        return np.char.decode(self.read("status/message"), "utf-8", "replace")
+
+    @property
+    def scene(self) -> str:
+        """The effective scene as TOML text."""
+        return self._string("scene")
+
+    @property
+    def scene_attributes(self) -> dict[str, Any]:
+        """Digest, file name, overrides and PETSc options of the scene."""
+        return self.file.attributes(f"{ROOT}/scene")
+
+    @property
+    def definitions(self) -> str:
+        """What every quantity means."""
+        return self._string("definitions")
+
+    @property
+    def labels(self) -> np.ndarray:
+        """Names of the candidates, ``(stations, angles)``."""
+        found = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL}"))
+        return np.char.decode(found[()], "utf-8", "replace")
+
+    @property
+    def sessions(self) -> list[dict[str, Any]]:
+        """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
+        rows = self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION)[()]
+        fields = [(name, kind[:2]) for name, kind in (SESSION.fields or {}).items()]
+        return [
+            {name: text_of(row[name]) if kind.kind == "S" else int(row[name]) for name, (kind, _) in fields}
+            for row in rows
+            if row["start"]
+        ]
+
+    def _checked(self, path: str) -> Any:
+        expected = self._known.get(f"{ROOT}/{path}")
+        if expected is None:
+            raise KeyError(f"{path} is no dataset of this file; it has {', '.join(sorted(self._known))}")
+        return self.file.checked(expected.path, expected.shape, expected.dtype)
+
+    def _axis(self, name: str) -> StoredAxis:
+        path = f"{ROOT}/axes/{name}"
+        found, attributes = self.file.plain(path), self.file.attributes(path)
+        if found.ndim != 1 or found.dtype != np.dtype("<f8"):
+            raise ValueError(f"axis '{name}' is no list of numbers")
+        units = attributes.get("units", "")
+        return StoredAxis(name, found[()], units, attributes.get("long_name", name).removesuffix(f" [{units}]"))
+
+    def _string(self, name: str) -> str:
+        found = self.file.plain(f"{ROOT}/{name}")
+        if found.shape != () or found.dtype.kind != "S":
+            raise ValueError(f"{self.path}: {ROOT}/{name} is no text; restore the file from a copy")
+        return text_of(found[()]).strip("\0 ")
+
+
+def text_of(value: Any) -> str:
+    """Text of an attribute or a fixed-length string."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -1,0 +1,361 @@
+"""The only door to HDF5: creates a result file, fills it in parallel, reads it without trusting it.
+
+Crash safety: one process writes the whole skeleton, closes it, and renames it into place; after that all ranks do
+nothing but independent writes to allocated space, in the order values, checksum, state. A killed process can
+therefore lose the row it was writing, and nothing else: a row that is marked done but does not match its checksum is
+solved again.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
+from study.layout import (
+    DONE,
+    FAILED,
+    LABEL,
+    MISSING,
+    PROGRAM,
+    ROOT,
+    SESSION,
+    SESSIONS,
+    VERSION,
+    Dataset,
+    Layout,
+    definitions_text,
+    groups,
+)
+from study.reading import Result, text_of
+from study.record import blank, crc32, text_bytes
+
+LIBVER = ("earliest", "v110")
+TEXT = h5py.string_dtype("utf-8")
+CODES = np.dtype("u1")
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a file says about the scene it was made from; ``labels`` name the candidates in row order."""
+
+    digest: str
+    scene: str
+    title: str = ""
+    scene_file: str = ""
+    overrides: tuple[str, ...] = ()
+    petsc_options: str = ""
+    labels: tuple[str, ...] = ()
+
+
+# --- creation: one process, before any solve ---------------------------------------------------------------------
+
+
+def create(path: Path, layout: Layout, header: Header) -> None:
+    """Write the skeleton beside ``path`` and rename it into place; raise `StudyError` if there is no room for it."""
+    _reserve(path, layout.nbytes)
+    part = path.with_name(path.name + ".part")
+    try:
+        with h5py.File(part, "w", libver=LIBVER) as file:
+            _write_skeleton(file, layout, header)
+        with part.open("r+b") as handle:
+            os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
+            os.fsync(handle.fileno())
+    except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
+        part.unlink(missing_ok=True)
+        if not isinstance(error, OSError) and "write" not in str(error):
+            raise
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {_reason(error)}") from error
+    part.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    os.fsync(folder)
+    os.close(folder)
+
+
+def _reserve(path: Path, need: int) -> None:
+    free = shutil.disk_usage(path.parent).free
+    if free < need:
+        sizes = f"needs {need / 1e6:.1f} MB, only {free / 1e6:.1f} MB are free there"
+        raise StudyError(CANNOT_WRITE, f"{path}: {sizes}; choose another place with -o")
+    trial = path.with_name(path.name + ".part")
+    try:
+        with trial.open("wb") as handle:  # quotas and file size limits show up here, not in the free space
+            os.posix_fallocate(handle.fileno(), 0, need)
+    except OSError as error:
+        raise StudyError(CANNOT_WRITE, f"{path}: {need / 1e6:.1f} MB cannot be reserved: {error.strerror}") from error
+    finally:
+        trial.unlink(missing_ok=True)
+
+
+def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
+    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
+    study = file.create_group(ROOT)
+    study.attrs.update(NX_class="NXentry", default="quality", options=layout.options(), title=header.title)
+    _write_attribute(study, "axes", list(layout.names))
+    for name, attributes in groups(layout).items():
+        group = study.create_group(name)
+        for key, value in attributes.items():
+            _write_attribute(group, key, value)
+    for name, axis in zip(layout.names, layout.axes, strict=True):
+        scale = study["axes"].create_dataset(name, data=np.asarray(axis.values, "<f8"))
+        long_name = f"{axis.long_name} [{axis.units}]" if axis.units else axis.long_name
+        scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
+        scale.make_scale(name)
+    for name, length in layout.counters.items():
+        study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4")).make_scale(name)
+    for dataset in layout.datasets:
+        _create_dataset(file, dataset)
+    _write_texts(study, layout, header)
+
+
+def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
+    for name, text in (("scene", header.scene), ("definitions", definitions_text(layout))):
+        data = text.encode() or b" "
+        study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
+    study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
+    study["scene"].attrs["overrides"] = "\n".join(header.overrides)
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
+    _attach_scales(sessions, ["session"])
+    labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))
+    labels[: len(header.labels)] = [text_bytes(label, LABEL) for label in header.labels]
+    named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
+    _attach_scales(named, layout.names[-3:-1])
+
+
+def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_layout(h5py.h5d.CONTIGUOUS)
+    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
+    strings = dataset.dtype.kind == "S"
+    if not strings:  # text is filled with zero bytes anyway
+        plist.set_fill_value(np.array(dataset.fill, dataset.dtype))
+    dtype = h5py.string_dtype("utf-8", dataset.dtype.itemsize) if strings else dataset.dtype
+    space = h5py.h5s.create_simple(dataset.shape)
+    h5py.h5d.create(file.id, dataset.path.encode(), h5py.h5t.py_create(dtype, logical=True), space, plist)
+    made = file[dataset.path]
+    for key, value in dataset.attributes.items():
+        _write_attribute(made, key, value)
+    _attach_scales(made, dataset.scales)
+
+
+def _attach_scales(dataset: h5py.Dataset, names: Sequence[str]) -> None:
+    # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
+    for i, name in enumerate(names):
+        scale = dataset.file[f"{ROOT}/axes/{name}"]
+        if name not in dataset.parent:
+            dataset.parent[name] = scale
+        dataset.dims[i].attach_scale(scale)
+        dataset.dims[i].label = name
+
+
+def _write_attribute(node: Any, key: str, value: Any) -> None:
+    if isinstance(value, list):
+        node.attrs.create(key, np.array(value, object), dtype=TEXT)
+    else:
+        node.attrs[key] = value
+
+
+# --- checks of an existing file: one process -----------------------------------------------------------------------
+
+
+def verify(path: Path, layout: Layout, header: Header) -> None:
+    """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
+    os.close(os.open(path, os.O_RDWR))
+    with open_result(path) as result:
+        if result.digest != header.digest:
+            text = (
+                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]});"
+                " choose another file with -o, or move this one away"
+            )
+            raise StudyError(OTHER_FILE, text)
+        if result.layout.shape != layout.shape or result.layout.options() != layout.options():
+            raise StudyError(OTHER_FILE, f"{path}: made by a version that stored other values; choose another file")
+        for dataset in layout.datasets:
+            if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
+                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file"
+                raise StudyError(OTHER_FILE, text)
+
+
+def torn_rows(path: Path, layout: Layout) -> list[int]:
+    """Rows that are marked done but do not match their checksum."""
+    with h5py.File(path, "r") as file:
+        views = [_mapped(path, file[c.path], (layout.rows, *c.shape), c.dtype) for c in layout.columns]
+        done = np.flatnonzero(file[f"{ROOT}/status/code"][()].ravel() == DONE)
+        crc = file[f"{ROOT}/status/crc"][()].ravel()
+    return [int(row) for row in done if crc32(layout, [view[row] for view in views]) != crc[row]]
+
+
+def _mapped(path: Path, dataset: h5py.Dataset, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    if dataset.size == 0:
+        return np.empty(shape, dtype)
+    return np.memmap(path, dtype, "r", dataset.id.get_offset(), shape)
+
+
+# --- parallel writing ----------------------------------------------------------------------------------------------
+
+
+class ResultWriter:
+    """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not."""
+
+    def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
+        if not h5py.get_config().mpi:
+            raise StudyError(CANNOT_WRITE, "this h5py was built without MPI; 'softjaw doctor' says how to cure that")
+        self.layout = layout
+        self._file = h5py.File(path, "r+", driver="mpio", comm=comm, libver=LIBVER)
+        self._columns = [self._file[c.path] for c in layout.columns]
+        self._code, self._crc, self._attempts = (self._file[f"{ROOT}/status/{n}"] for n in ("code", "crc", "attempts"))
+        self._sessions = self._file[f"{ROOT}/provenance/sessions"]
+        self._session = 0
+
+    def codes(self) -> np.ndarray:
+        """State of every row, ``(rows,)``."""
+        return self._code[()].ravel()
+
+    def attempts(self) -> np.ndarray:
+        """How often every row was begun without an end, ``(rows,)``."""
+        return self._attempts[()].ravel()
+
+    def count_attempt(self, row: int, change: int = 1) -> None:
+        """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
+        index = self._index(row)
+        self._attempts[index] = min(max(int(self._attempts[index]) + change, 0), 255)
+
+    def forget(self, row: int) -> None:
+        """Make a failed or torn row a missing one that was never tried."""
+        self._code[self._index(row)] = MISSING
+        self._attempts[self._index(row)] = 0
+
+    def write(self, row: int, values: Sequence[np.ndarray]) -> None:
+        """Store a solved case; ``values`` as from ``study.record.record``."""
+        self._store(row, values, DONE)
+
+    def fail(self, row: int, message: str) -> None:
+        """Store why a case has no result."""
+        self._store(row, blank(self.layout, message), FAILED)
+
+    def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
+        index = self._index(row)
+        if self._code[index] == DONE:
+            raise ValueError(f"row {row} is done already and must not be written again")
+        for column, dataset, value in zip(self.layout.columns, self._columns, values, strict=True):
+            if value.size:
+                dataset[row if column.flat else index] = value.astype(dataset.dtype)  # text: with its encoding
+        self._crc[index] = crc32(self.layout, values)
+        self._code[index] = state
+
+    def _index(self, row: int) -> tuple[int, ...]:
+        return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
+
+    def read(self, path: str) -> np.ndarray:
+        """Any dataset below ``/study``, for example ``e_n/curved``."""
+        return self._file[f"{ROOT}/{path}"][()]
+
+    def write_derived(self, name: str, values: Any) -> None:
+        """Fill a derived dataset; by one rank, after all rows."""
+        dataset = self._file[f"{ROOT}/derived/{name}"]
+        dataset[...] = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
+
+    def begin_session(self, **fields: Any) -> None:
+        """Add a row to the provenance; by one rank."""
+        used = self._sessions[()]["start"] != b""
+        self._session = min(int(used.sum()), len(used) - 1)
+        self._sessions[self._session] = np.zeros((), SESSION)
+        self.update_session(**fields)
+
+    def update_session(self, **fields: Any) -> None:
+        """Change fields of this run's row of the provenance; by one rank."""
+        row = self._sessions[self._session]
+        for name, value in fields.items():
+            kind = SESSION[name]
+            row[name] = text_bytes(value, kind.itemsize) if kind.kind == "S" else value
+        self._sessions[self._session] = row
+
+    def close(self) -> None:
+        """Close on all ranks."""
+        self._file.close()
+
+
+# --- reading, without MPI ------------------------------------------------------------------------------------------
+
+
+class GuardedFile:
+    """Reads known paths of a file of unknown origin: never another file, never more than the file holds."""
+
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        self.path, self._file, self._bytes = path, file, path.stat().st_size
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def attributes(self, path: str = "") -> dict[str, Any]:
+        """Attributes of a group or dataset, text decoded."""
+        return {key: text_of(value) if np.ndim(value) == 0 else value for key, value in self._node(path).attrs.items()}
+
+    def checked(self, path: str, shape: tuple[int, ...], dtype: np.dtype) -> h5py.Dataset:
+        """A dataset that has the expected shape and type."""
+        found = self.plain(path)
+        if found.shape != shape or found.dtype != dtype:
+            text = f"{path} has shape {found.shape} of {found.dtype}, expected {shape} of {dtype}"
+            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
+        return found
+
+    def plain(self, path: str) -> h5py.Dataset:
+        """A dataset whose data stand in this very file."""
+        found = self._node(path)
+        if not isinstance(found, h5py.Dataset):
+            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is no dataset); restore it from a copy")
+        plist = found.id.get_create_plist()
+        virtual = plist.get_layout() == h5py.h5d.VIRTUAL
+        too_large = found.nbytes > (1000 * self._bytes if found.chunks else self._bytes)  # deflate gains 1000 at most
+        if virtual or plist.get_external_count() or too_large:
+            raise StudyError(OTHER_FILE, f"{self.path}: {path} is not stored in this file; do not trust it")
+        return found
+
+    def _node(self, path: str) -> Any:
+        node: Any = self._file
+        for part in filter(None, path.split("/")):
+            link = node.get(part, getlink=True) if isinstance(node, h5py.Group) else None
+            if not isinstance(link, h5py.HardLink):
+                raise StudyError(OTHER_FILE, f"{self.path}: {path} is missing or in another file; do not trust it")
+            node = node[part]
+        return node
+
+
+def open_result(path: str | Path) -> Result:
+    """A result file for reading, also while a run is writing it; raise `StudyError` if it is none."""
+    path = Path(path)
+    try:
+        file = GuardedFile(path, h5py.File(path, "r"))
+    except FileNotFoundError as error:
+        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
+    except OSError as error:
+        if "unable to lock file" in str(error):
+            text = f"{path}: another program holds it open for writing; close it there"
+            raise StudyError(IN_USE, text) from error
+        text = f"{path}: not a readable result file ({_reason(error)}); move it away or restore it"
+        raise StudyError(OTHER_FILE, text) from error
+    try:
+        return Result(path, file)
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        file.close()
+        text = f"{path}: not a result file of {PROGRAM} ({error}); choose another file"
+        raise StudyError(OTHER_FILE, text) from error
+    except StudyError:
+        file.close()
+        raise
+
+
+def _reason(error: Exception) -> str:
+    if getattr(error, "strerror", None):
+        return str(error.strerror)  # type: ignore[attr-defined]
+    inner = str(error).partition("(")[2].rstrip(")")
+    return inner or str(error)
