@@ -1,0 +1,197 @@
+"""Frictionless contact of a pad with a rigid object as a mixed complementarity problem.
+
+Unknowns ``x = [q | delta | l]``: free displacements, travel of the sheet, and one pressure ``p_i = kappa l_i`` per node of
+the front, with ``kappa = E / thickness`` so that all unknowns are lengths.  The residual is::
+
+    R_q     = r_int(u) - int N_a p n dA                       u = u(q, delta), p = sum N_i p_i, n = grad g
+    R_delta = sum of r_int over the bonded back - F           (force)  or  s (delta - travel)   (travel)
+    R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
+              kappa G_i   with   l_i >= 0                     (complementarity)
+
+All rows are forces [N].  ``A_i = int N_i dA`` and all integrals are over the reference area; ``p`` is the nominal pressure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem import kernel
+from fem.pad import Pad
+
+FloatArray = NDArray[np.float64]
+Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+SMALLEST_DET = 0.05  # a Newton step is shortened before an element is squeezed further than this
+
+
+@dataclass
+class Control:
+    """What drives the sheet: the normal force on the whole pad [N], or the travel [m] where ``force`` is None."""
+
+    force: float | None = None
+    travel: float = 0.0
+
+
+class ContactProblem:
+    """Residual and tangent of one pad pressed on one object; ``gap`` takes points of the pad's frame.
+
+    Implements the protocol ``fem.petsc.Problem``.
+    """
+
+    def __init__(self, pad: Pad, gap: Gap) -> None:
+        self.pad, self.gap, self.control, self.complementarity = pad, gap, Control(travel=0.0), False
+        self.size = pad.size
+        self.kappa = pad.modulus_per_thickness
+        self.area = pad.node_area
+        self.travel_stiffness = self.kappa * self.area.sum()
+        self.travel_step = 0.1 * pad.shape.size[2]  # longest change of travel in one iteration
+        self._pressures = slice(pad.travel_dof + 1, pad.size)
+        self._allocate()
+        self._describe_entries()
+
+    def _allocate(self) -> None:
+        """Work arrays, so that nothing is allocated in an iteration."""
+        n, nodes = self.pad.element_nodes.shape
+        m, face = self.pad.face_nodes.shape
+        self._r = np.empty((n, 3, nodes))
+        self._weighted, self._force = np.empty((m, face)), np.empty((m, 3, face))
+        self._K = np.empty((n, 3, nodes, 3, nodes))
+        self._K_uu = np.empty((m, 3, face, 3, face))
+        self._K_ul = np.empty((m, face, 3, face))
+        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
+
+    def _describe_entries(self) -> None:
+        """Row and column of every entry that ``tangent`` returns, in its order."""
+        pad = self.pad
+        element = pad.dofs[pad.element_nodes].transpose(0, 2, 1)  # (n, 3, nodes)
+        face = pad.dofs[pad.face_nodes].transpose(0, 2, 1)
+        pressure = pad.travel_dof + 1 + pad.pressure_index[pad.face_nodes]
+        own = np.arange(pad.travel_dof, pad.size, dtype=np.int32)
+        rows, columns = [], []
+        for first, second in (
+            (element[:, :, :, None, None], element[:, None, None, :, :]),
+            (face[:, :, :, None, None], face[:, None, None, :, :]),
+            (face[:, None, :, :], pressure[:, :, None, None]),
+            (pressure[:, :, None, None], face[:, None, :, :]),
+            (own, own),
+        ):
+            pair = np.broadcast_arrays(first, second)
+            rows.append(pair[0].ravel())
+            columns.append(pair[1].ravel())
+        self.rows, self.columns = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
+        self._ends = np.cumsum([len(r) for r in rows])
+        self._values = np.zeros(self.rows.size)
+        K, K_uu, *_ = self._parts()
+        self._K, self._K_uu = K.reshape(self._K.shape), K_uu.reshape(self._K_uu.shape)
+        self._element_dofs, self._face_dofs = element.ravel(), face.ravel()
+        self._travel_row = np.flatnonzero(self.rows[: self._ends[0]] == pad.travel_dof)
+        self._face_pressures = pad.pressure_index[pad.face_nodes]
+
+    def _parts(self) -> list[FloatArray]:
+        """Views of the entries' values: elements, face stiffness, force by pressure, gap by displacement, own diagonal."""
+        return np.split(self._values, self._ends[:-1])
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Pressures are not negative; nothing else is bounded."""
+        lower = np.full(self.size, -np.inf)
+        lower[self._pressures] = 0.0
+        return lower, np.full(self.size, np.inf)
+
+    def _element_displacements(self, x: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(self.pad.displacement(x)[self.pad.element_nodes].transpose(0, 2, 1))
+
+    def _contact(self, x: FloatArray, tangent: bool) -> FloatArray:
+        """Evaluate the contact face at ``x``; returns the weighted gap of every node of the front [m^3]."""
+        pad = self.pad
+        corners = (pad.nodes + pad.displacement(x))[pad.face_nodes]
+        points = np.einsum("qa,fai->fqi", pad.face_N, corners)
+        gap, normal, hessian = self.gap(points.reshape(-1, 3))
+        shape = points.shape[:2]
+        kernel.contact(
+            pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], gap.reshape(shape),
+            normal.reshape(*shape, 3), hessian.reshape(*shape, 3, 3), self._weighted, self._force,
+            *((self._K_uu, self._K_ul) if tangent else self._none[1:]),
+        )  # fmt: skip
+        return np.bincount(self._face_pressures.ravel(), self._weighted.ravel(), len(self.area))
+
+    def _active(self, x: FloatArray, weighted_gap: FloatArray) -> NDArray[np.bool_]:
+        return self.area * x[self._pressures] - weighted_gap > 0.0
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
+        pad = self.pad
+        u = self._element_displacements(x)
+        smallest = kernel.elements(
+            pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._none[0]
+        )
+        if not smallest > 0.0:
+            return np.full(self.size, np.nan)
+        weighted_gap = self._contact(x, tangent=False)
+        R = _gather(self._element_dofs, self._r, self.size) + _gather(self._face_dofs, self._force, self.size)
+        if self.control.force is None:
+            R[pad.travel_dof] = self.travel_stiffness * (x[pad.travel_dof] - self.control.travel)
+        else:
+            R[pad.travel_dof] -= self.control.force * pad.share
+        if self.complementarity:
+            R[self._pressures] = self.kappa * weighted_gap
+        else:
+            pressed = self.area * x[self._pressures]
+            R[self._pressures] = self.kappa * (pressed - np.maximum(0.0, pressed - weighted_gap))
+        return R
+
+    def tangent(self, x: FloatArray) -> FloatArray:
+        """Entries of the tangent in the order of ``rows`` and ``columns``."""
+        pad = self.pad
+        elements, _, by_pressure, by_displacement, own = self._parts()
+        u = self._element_displacements(x)
+        kernel.elements(pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._K)
+        weighted_gap = self._contact(x, tangent=True)
+        by_pressure[:] = -self.kappa * self._K_ul.ravel()
+        own[:] = 0.0
+        if self.complementarity:
+            by_displacement[:] = self.kappa * self._K_ul.ravel()
+        else:
+            active = self._active(x, weighted_gap)
+            by_displacement[:] = (self.kappa * active[self._face_pressures][:, :, None, None] * self._K_ul).ravel()
+            own[1:] = np.where(active, 0.0, self.kappa * self.area)
+        if self.control.force is None:
+            elements[self._travel_row] = 0.0
+            own[0] = self.travel_stiffness
+        return self._values
+
+    def shorten(self, x: FloatArray, step: FloatArray) -> float:
+        """Factor that keeps the change of travel and the squeezing of every element within reason."""
+        factor = min(1.0, self.travel_step / max(abs(step[self.pad.travel_dof]), 1e-300))
+        for _ in range(12):
+            smallest = kernel.smallest_det(self._element_displacements(x - factor * step), self.pad.dN)
+            if smallest > SMALLEST_DET:
+                break
+            factor *= 0.5
+        return factor
+
+    def sheet_force(self, x: FloatArray) -> float:
+        """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
+        pad = self.pad
+        u = self._element_displacements(x)
+        kernel.elements(pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._none[0])
+        return float(_gather(self._element_dofs, self._r, self.size)[pad.travel_dof]) / pad.share
+
+    def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and each face's force on the object ``(m, 3)`` [N]."""
+        weighted_gap = self._contact(x, tangent=False)
+        return self.kappa * x[self._pressures], weighted_gap / self.area, self._force.sum(axis=2)
+
+    def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
+        """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""
+        pad, u = self.pad, self._element_displacements(x)
+        law = pad.material
+        strain, acoustic = kernel.strain_measures(law.number, law.parameters, law.shear_modulus, u, pad.dN, directions)
+        return kernel.smallest_det(u, pad.dN), strain, acoustic
+
+
+def _gather(dofs: NDArray[np.int32], values: FloatArray, size: int) -> FloatArray:
+    """Sum element values into a vector; fixed unknowns (index -1) fall off the front."""
+    return np.bincount(dofs + 1, values.ravel(), size + 1)[1:]

@@ -1,0 +1,9 @@
+"""What can go wrong in a contact solve, each with a sentence a user can act on."""
+
+
+class ConvergenceError(RuntimeError):
+    """A nonlinear solve stopped without an answer."""
+
+
+class CheckError(RuntimeError):
+    """A solve converged to a state that breaks a law of contact or of the material."""

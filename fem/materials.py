@@ -1,0 +1,232 @@
+"""Pad materials: stress and tangent of each law at one material point.
+
+Every law is one function ``law(F, B, J, par, P, A)``: from the deformation gradient ``F``, its inverse ``B`` and its
+determinant ``J`` it writes the first Piola-Kirchhoff stress ``P = dW/dF`` [Pa] and, where ``A`` has entries, the tangent
+``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa].  A new material is one more such function, a line in ``stress`` and in ``LAWS``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+FAST = {"contract", "reassoc", "nsz", "arcp"}  # keeps NaN and Inf meaningful, so that a failure stays visible
+
+
+@njit(cache=True, fastmath=FAST)
+def blatz_ko(F, B, J, par, P, A):
+    """Foam of Blatz and Ko: ``W = G/2 (tr C^-1 + 2 J - 5)``, ``P = G (J F^-T - F^-T C^-1)``; ``par = [G]``."""
+    G = par[0]
+    M, N, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            M[i, j] = B[i, 0] * B[j, 0] + B[i, 1] * B[j, 1] + B[i, 2] * B[j, 2]  # C^-1
+            N[i, j] = B[0, i] * B[0, j] + B[1, i] * B[1, j] + B[2, i] * B[2, j]  # b^-1
+    for i in range(3):
+        for j in range(3):
+            D[i, j] = B[0, i] * M[0, j] + B[1, i] * M[1, j] + B[2, i] * M[2, j]
+            P[i, j] = G * (J * B[j, i] - D[i, j])
+    if A.size == 0:
+        return
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for m in range(3):
+                    A[i, j, k, m] = G * (
+                        J * (B[m, k] * B[j, i] - B[j, k] * B[m, i])
+                        + B[m, i] * D[k, j] + N[i, k] * M[m, j] + B[j, k] * D[i, m]
+                    )  # fmt: skip
+
+
+@njit(cache=True, fastmath=FAST)
+def neo_hookean(F, B, J, par, P, A):
+    """Compressible neo-Hookean: ``W = G/2 (tr C - 3 - 2 ln J) + lam/2 (ln J)^2``; ``par = [G, lam]``."""
+    G, lam = par[0], par[1]
+    log_j = np.log(J)
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = G * F[i, j] + (lam * log_j - G) * B[j, i]
+    if A.size == 0:
+        return
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for m in range(3):
+                    A[i, j, k, m] = lam * B[j, i] * B[m, k] + (G - lam * log_j) * B[j, k] * B[m, i]
+            A[i, j, i, j] += G
+
+
+@njit(cache=True, fastmath=FAST)
+def linear(F, B, J, par, P, A):
+    """Small-strain isotropic elasticity: ``P = lam tr(e) I + 2 G e``, ``e = sym F - I``; ``par = [G, lam]``."""
+    G, lam = par[0], par[1]
+    trace = F[0, 0] + F[1, 1] + F[2, 2] - 3.0
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = G * (F[i, j] + F[j, i])
+        P[i, i] += lam * trace - 2.0 * G
+    if A.size == 0:
+        return
+    A[:] = 0.0
+    for i in range(3):
+        for j in range(3):
+            A[i, i, j, j] += lam
+            A[i, j, i, j] += G
+            A[i, j, j, i] += G
+
+
+@njit(cache=True)
+def principal(C):
+    """Eigenvalues ``(3,)`` and eigenvectors (columns) of a symmetric 3 x 3 matrix, by cyclic Jacobi rotations."""
+    M, V = C.copy(), np.eye(3)
+    for _ in range(30):
+        off = M[0, 1] ** 2 + M[0, 2] ** 2 + M[1, 2] ** 2
+        if not off > 1e-32 * (M[0, 0] ** 2 + M[1, 1] ** 2 + M[2, 2] ** 2):
+            break
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if M[p, q] == 0.0:
+                    continue
+                theta = 0.5 * (M[q, q] - M[p, p]) / M[p, q]
+                t = (1.0 if theta >= 0 else -1.0) / (abs(theta) + np.sqrt(theta * theta + 1.0))
+                c = 1.0 / np.sqrt(t * t + 1.0)
+                s = t * c
+                for k in range(3):
+                    a, b = M[k, p], M[k, q]
+                    M[k, p], M[k, q] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = M[p, k], M[q, k]
+                    M[p, k], M[q, k] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = V[k, p], V[k, q]
+                    V[k, p], V[k, q] = c * a - s * b, s * a + c * b
+    return np.array([M[0, 0], M[1, 1], M[2, 2]]), V
+
+
+@njit(cache=True)
+def hyperfoam(F, B, J, par, P, A):
+    """Storakers' hyperfoam in principal stretches ``l``; ``par = [nu, mu_1, alpha_1, mu_2, alpha_2, ...]``.
+
+    ``W = sum 2 mu / alpha^2 [l_1^alpha + l_2^alpha + l_3^alpha - 3 + (J^(-alpha beta) - 1) / beta]`` with
+    ``beta = nu / (1 - 2 nu)`` (Storakers, J. Mech. Phys. Solids 34, 1986).
+    """
+    beta = par[0] / (1.0 - 2.0 * par[0])
+    c, V = principal(F.T @ F)
+    stretch = np.sqrt(c)
+    s, ds = np.zeros(3), np.zeros((3, 3))  # second Piola-Kirchhoff S_a and dS_a / dl_b
+    for term in range((par.size - 1) // 2):
+        mu, alpha = par[1 + 2 * term], par[2 + 2 * term]
+        volume = J ** (-alpha * beta)
+        for a in range(3):
+            power = stretch[a] ** alpha
+            s[a] += 2.0 * mu / alpha * (power - volume) / c[a]
+            ds[a, a] += 2.0 * mu / alpha * ((alpha - 2.0) * power + 2.0 * volume) / (c[a] * stretch[a])
+            for b in range(3):
+                ds[a, b] += 2.0 * mu * beta * volume / (c[a] * stretch[b])
+    FV = F @ V
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = FV[i, 0] * s[0] * V[j, 0] + FV[i, 1] * s[1] * V[j, 1] + FV[i, 2] * s[2] * V[j, 2]
+    if A.size == 0:
+        return
+    A[:] = 0.0
+    S = V @ np.diag(s) @ V.T
+    shear = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            if a != b:
+                if abs(c[b] - c[a]) > 1e-6 * (c[a] + c[b]):
+                    shear[a, b] = (s[b] - s[a]) / (c[b] - c[a])
+                else:  # the limit of the quotient for equal stretches
+                    shear[a, b] = 0.5 * (ds[b, b] - ds[a, b]) / stretch[b]
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for m in range(3):
+                    value = 0.0
+                    for a in range(3):
+                        for b in range(3):
+                            value += ds[a, b] / stretch[b] * FV[i, a] * V[j, a] * FV[k, b] * V[m, b]
+                            value += shear[a, b] * FV[i, a] * V[j, b] * (FV[k, a] * V[m, b] + FV[k, b] * V[m, a])
+                    A[i, j, k, m] = value
+                    if i == k:
+                        A[i, j, k, m] += S[j, m]
+
+
+@njit(cache=True, fastmath=FAST)
+def stress(law, F, B, J, par, P, A):
+    """Write stress and tangent of the law with this number; numbers instead of functions, so that compiled code is cached."""
+    if law == 0:
+        blatz_ko(F, B, J, par, P, A)
+    elif law == 1:
+        hyperfoam(F, B, J, par, P, A)
+    elif law == 2:
+        neo_hookean(F, B, J, par, P, A)
+    else:
+        linear(F, B, J, par, P, A)
+
+
+LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}
+
+
+@dataclass(frozen=True)
+class Material:
+    """A law with its parameters and its small-strain constants.
+
+    Parameters
+    ----------
+    law : str
+        A key of ``LAWS``.
+    parameters : (k,) array
+        As the law's function documents them [Pa, -].
+    shear_modulus, poisson_ratio : float
+        Of the undeformed state [Pa], [-].
+    """
+
+    law: str
+    parameters: FloatArray
+    shear_modulus: float
+    poisson_ratio: float
+
+    @property
+    def young_modulus(self) -> float:
+        """``E = 2 G (1 + nu)`` of the undeformed state [Pa]."""
+        return 2.0 * self.shear_modulus * (1.0 + self.poisson_ratio)
+
+    @property
+    def number(self) -> int:
+        """The law's number in compiled code."""
+        return LAWS[self.law]
+
+
+def material(
+    law: str, shear_modulus: float = 0.0, poisson_ratio: float = 0.25, shear_moduli=(), exponents=()
+) -> Material:
+    """Material by name; hyperfoam takes ``shear_moduli`` (mu_i [Pa]) and ``exponents`` (alpha_i), the others ``shear_modulus``.
+
+    Raises
+    ------
+    ValueError
+        For an unknown law, a modulus that is not positive, or a Poisson's ratio outside ``(-1, 0.5)``.
+    """
+    if law not in LAWS:
+        raise ValueError(f"material '{law}' is unknown; choose one of {', '.join(LAWS)}")
+    if law == "hyperfoam":
+        shear_modulus = float(np.sum(shear_moduli))
+    if not shear_modulus > 0:
+        raise ValueError(f"material '{law}' needs a positive shear modulus, found {shear_modulus} Pa")
+    if law == "blatz_ko" and poisson_ratio != 0.25:
+        raise ValueError(f"Blatz-Ko foam has Poisson's ratio 0.25, found {poisson_ratio}; use hyperfoam for other values")
+    if not -1.0 < poisson_ratio < 0.5:
+        raise ValueError(f"material '{law}' needs a Poisson's ratio below 0.5, found {poisson_ratio}")
+    if law == "blatz_ko":
+        par = [shear_modulus]
+    elif law == "hyperfoam":
+        par = [poisson_ratio, *np.column_stack([shear_moduli, exponents]).ravel()]
+    else:
+        par = [shear_modulus, 2.0 * shear_modulus * poisson_ratio / (1.0 - 2.0 * poisson_ratio)]
+    return Material(law, np.array(par, dtype=float), shear_modulus, poisson_ratio)

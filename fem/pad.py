@@ -1,0 +1,201 @@
+"""The pad: a foam block bonded to a rigid sheet, meshed with hexahedra through scikit-fem.
+
+The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
+``[free displacements | travel of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
+travel, so that the force on the sheet is the residual of that unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from skfem import Basis, ElementHex1, ElementHex2, MeshHex
+
+from fem.materials import Material
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+ELEMENTS = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
+
+
+@dataclass(frozen=True)
+class PadShape:
+    """Dimensions and mesh of a pad.
+
+    Parameters
+    ----------
+    size : tuple of 3 floats
+        Length (x), width (y), thickness (z) [m].
+    elements : tuple of 3 ints
+        Of the whole pad along x, y, z.
+    grading : tuple of 3 floats
+        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the front [-].
+    element : str
+        ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
+    """
+
+    size: tuple[float, float, float]
+    elements: tuple[int, int, int]
+    grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    element: str = "hex8"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meshed."""
+        if min(self.size) <= 0 or not np.all(np.isfinite(self.size)):
+            raise ValueError(f"pad size must be positive, found {self.size} m")
+        if min(self.elements) < 1:
+            raise ValueError(f"a pad needs at least one element in every direction, found {self.elements}")
+        if self.element not in ELEMENTS:
+            raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(ELEMENTS)}")
+
+    def halved(self) -> PadShape:
+        """The same pad with half as many elements in every direction (at least one; kept even where it was even)."""
+        fewer = tuple(max(2, 2 * round(n / 4)) if n % 2 == 0 and n > 1 else max(1, n // 2) for n in self.elements)
+        return PadShape(self.size, fewer, self.grading, self.element)
+
+    def lines(self, axis: int, half: bool) -> FloatArray:
+        """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
+        n, length, ratio = self.elements[axis], self.size[axis], self.grading[axis]
+        if axis == 2:
+            return -length * _graded(n, ratio)[::-1]
+        if n % 2:
+            return np.linspace(-length / 2, length / 2, n + 1)
+        positive = length / 2 * _graded(n // 2, ratio)
+        return positive if half else np.concatenate([-positive[:0:-1], positive])
+
+
+def _graded(n: int, ratio: float) -> FloatArray:
+    """Lines ``0..1`` whose intervals grow geometrically so that the last is ``ratio`` times the first."""
+    steps = ratio ** np.linspace(0.0, 1.0, n) if n > 1 else np.ones(1)
+    return np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+
+
+class Pad:
+    """Discrete pad in its own frame: front face at ``z = 0``, back at ``z = -thickness``.
+
+    Parameters
+    ----------
+    shape : PadShape
+    material : Material
+    symmetry : (bool, bool)
+        Whether ``x = 0`` and ``y = 0`` are planes of symmetry; only the positive side is then meshed.
+    contact : str
+        ``"weighted"`` integrates gap and pressure over the contact face with Gauss points, ``"nodal"`` collocates them
+        at its nodes.
+
+    Attributes
+    ----------
+    dN, volume : (n, points, 3, nodes), (n, points) arrays
+        Reference gradients [1/m] and volumes [m^3] of the quadrature points.
+    nodes : (k, 3) array
+        Node positions [m].
+    element_nodes : (n, nodes) array
+    dofs : (k, 3) array
+        Unknown of each displacement; -1 is fixed.
+    face_nodes : (m, face nodes) array
+        Nodes of the faces of the front.
+    face_N, face_area : (points, face nodes), (m, points) arrays
+        Shape functions and reference areas [m^2] at the quadrature points of the front.
+    """
+
+    def __init__(
+        self,
+        shape: PadShape,
+        material: Material,
+        symmetry: tuple[bool, bool] = (False, False),
+        contact: str = "weighted",
+    ) -> None:
+        if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
+            raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
+        self.shape, self.material, self.symmetry = shape, material, tuple(symmetry)
+        element, order = ELEMENTS[shape.element]
+        lines = [shape.lines(0, symmetry[0]), shape.lines(1, symmetry[1]), shape.lines(2, False)]
+        basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
+        self.nodes = np.ascontiguousarray(basis.doflocs.T)
+        self.element_nodes = np.ascontiguousarray(basis.element_dofs.T.astype(np.int32))
+        gradients = np.stack([np.broadcast_to(b[0].grad, (3, *basis.dx.shape)) for b in basis.basis])
+        self.dN = np.ascontiguousarray(gradients.transpose(2, 3, 1, 0))
+        self.volume = np.ascontiguousarray(basis.dx)
+        self._number_unknowns()
+        self._describe_front(lines, contact)
+
+    def _number_unknowns(self) -> None:
+        """Number free displacements, then the travel, then one pressure per node of the front."""
+        x, y, z = self.nodes.T
+        tol = 1e-9 * max(self.shape.size)
+        back = np.abs(z + self.shape.size[2]) < tol
+        free = np.ones((len(x), 3), dtype=bool)
+        free[back] = False
+        for axis, value in enumerate((x, y)):
+            if self.symmetry[axis]:
+                free[np.abs(value) < tol, axis] = False
+        self.travel_dof = int(free.sum())
+        self.dofs = np.full((len(x), 3), -1, dtype=np.int32)
+        self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
+        self.dofs[back, 2] = self.travel_dof
+        front = np.abs(z) < tol
+        order = np.lexsort((y[front], x[front]))
+        self.front_nodes = np.flatnonzero(front)[order].astype(np.int32)
+        self.front_grid = (len(np.unique(np.round(x[front] / tol))), len(np.unique(np.round(y[front] / tol))))
+        self.pressure_index = np.full(len(x), -1, dtype=np.int32)
+        self.pressure_index[self.front_nodes] = np.arange(len(order), dtype=np.int32)
+        self.size = self.travel_dof + 1 + len(order)
+
+    def _describe_front(self, lines: list[FloatArray], contact: str) -> None:
+        """Faces of the front as a tensor grid, and its quadrature."""
+        per_side = 2 if self.shape.element == "hex8" else 3
+        step = per_side - 1
+        grid = self.front_nodes.reshape(self.front_grid)
+        nx, ny = len(lines[0]) - 1, len(lines[1]) - 1
+        local = [(i, j) for i in range(per_side) for j in range(per_side)]
+        self.face_nodes = np.stack(
+            [grid[i : i + step * nx : step, j : j + step * ny : step].ravel() for i, j in local], axis=1
+        )
+        area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
+        self.face_N, weights = _face_rule(per_side, contact)
+        self.face_area = np.outer(area, weights)
+        self.node_area = np.bincount(
+            self.pressure_index[self.face_nodes].ravel(),
+            (self.face_area @ self.face_N).ravel(),
+            len(self.front_nodes),
+        )
+
+    @property
+    def share(self) -> float:
+        """Part of the whole pad that is meshed: 1, 1/2 or 1/4."""
+        return 0.5 ** sum(self.symmetry)
+
+    @cached_property
+    def modulus_per_thickness(self) -> float:
+        """``E / thickness`` [Pa/m]: scales pressures to lengths and estimates the pad as a bed of springs."""
+        return self.material.young_modulus / self.shape.size[2]
+
+    def displacement(self, x: FloatArray) -> FloatArray:
+        """Nodal displacements ``(k, 3)`` [m] of a vector of unknowns."""
+        u = np.zeros(self.dofs.shape)
+        u[self.dofs >= 0] = x[self.dofs[self.dofs >= 0]]
+        return u
+
+
+def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
+    """Shape functions ``(points, face nodes)`` and weights ``(points,)`` of a rule on the unit square with as many points as nodes."""
+    if contact == "weighted":
+        points, weights = np.polynomial.legendre.leggauss(per_side)
+        points, weights = 0.5 * (points + 1.0), 0.5 * weights
+    elif contact == "nodal":
+        points = np.linspace(0.0, 1.0, per_side)
+        weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
+    else:
+        raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
+    one = np.stack([_lagrange(per_side, s) for s in points])  # (points, nodes) along one side
+    N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
+    return N, np.outer(weights, weights).ravel()
+
+
+def _lagrange(n: int, s: float) -> FloatArray:
+    """Lagrange polynomials with ``n`` equidistant nodes on ``[0, 1]``."""
+    t = np.linspace(0.0, 1.0, n)
+    return np.array([np.prod([(s - t[j]) / (t[i] - t[j]) for j in range(n) if j != i]) for i in range(n)])

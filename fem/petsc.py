@@ -1,0 +1,229 @@
+"""The door to PETSc: one nonlinear problem with a fixed sparsity, solved on this rank alone.
+
+``newtonls`` with full steps on the semismooth (primal-dual active set) form is the default; ``-contact_snes_type
+vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every linear system is factorised
+by MUMPS; its symbolic analysis is done once and kept, because the pattern never changes.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fem.errors import ConvergenceError
+
+FloatArray = NDArray[np.float64]
+
+
+def _find_petsc4py() -> None:
+    """Debian installs petsc4py below PETSc's own folder, where only the -dev package's link makes Python look."""
+    if importlib.util.find_spec("petsc4py") is None:
+        for folder in sorted(Path("/usr/lib/petscdir").glob("petsc3*/*-real/lib/python3/dist-packages"), reverse=True):
+            if (folder / "petsc4py").is_dir():
+                sys.path.append(str(folder))
+                return
+        raise ImportError("petsc4py is missing; on Debian and Ubuntu: apt install python3-petsc4py, elsewhere set PETSC_DIR")
+
+
+_find_petsc4py()
+import petsc4py  # noqa: E402  (only importable once the path is known)
+
+petsc4py.init(["softjaw", "-skip_petscrc"])  # no options from files in the working directory
+from petsc4py import PETSc  # noqa: E402  (after init, as petsc4py requires)
+
+PETSc.Log.begin()
+REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
+
+
+class Problem(Protocol):
+    """What a nonlinear problem tells the solver."""
+
+    size: int
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    complementarity: bool
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Residual ``(size,)``."""
+
+    def tangent(self, x: FloatArray) -> FloatArray:
+        """Values of the entries ``(rows, columns)``; entries that coincide are added."""
+
+    def shorten(self, x: FloatArray, step: FloatArray) -> float:
+        """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the unknowns; infinite where there are none."""
+
+
+@dataclass
+class Seconds:
+    """Where the time of the solves went [s]."""
+
+    assembly: float = 0.0
+    factorisation: float = 0.0
+    total: float = 0.0
+
+    @property
+    def rest(self) -> float:
+        """What is neither assembly nor factorisation with its triangular solves."""
+        return self.total - self.assembly - self.factorisation
+
+
+@njit(cache=True)
+def _add_up(slots, values, out):
+    """Add every value into its slot of the compressed matrix."""
+    out[:] = 0.0
+    for k in range(slots.size):
+        if slots[k] >= 0:
+            out[slots[k]] += values[k]
+
+
+class _Pattern:
+    """Fixed compressed-row pattern of entries given as (row, column) pairs; negative indices are dropped."""
+
+    def __init__(self, size: int, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> None:
+        keep = (rows >= 0) & (columns >= 0)
+        diagonal = np.arange(size, dtype=np.int64) * (size + 1)  # stored zeros where nothing else is
+        keys = rows[keep].astype(np.int64) * size + columns[keep]
+        unique = np.unique(np.concatenate([keys, diagonal]))
+        self.slots = np.full(rows.size, -1, dtype=np.int32)
+        self.slots[keep] = np.searchsorted(unique, keys)
+        self.column = (unique % size).astype(np.int32)
+        self.start = np.searchsorted(unique // size, np.arange(size + 1)).astype(np.int32)
+        self.values = np.zeros(unique.size)
+
+
+def factorisation_seconds() -> float:
+    """Seconds this process has spent so far in numeric and symbolic factorisation and triangular solves."""
+    events = ("MatLUFactorSym", "MatLUFactorNum", "MatCholFctrSym", "MatCholFctrNum", "MatSolve")
+    return sum(PETSc.Log.Event(name).getPerfInfo()["time"] for name in events)
+
+
+@dataclass
+class NonlinearSolver:
+    """Newton solver of one problem; the matrix pattern and its symbolic factorisation live as long as it does.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : dict
+        PETSc options with the prefix, as ``{"contact_snes_max_it": 50}``; they override the defaults.
+    """
+
+    problem: Problem
+    options: dict[str, Any] = field(default_factory=dict)
+    prefix: str = "contact_"
+
+    def __post_init__(self) -> None:
+        """Create matrix, vectors and solver."""
+        comm, n = PETSc.COMM_SELF, self.problem.size
+        self.seconds = Seconds()
+        self._pattern = _Pattern(n, self.problem.rows, self.problem.columns)
+        self._matrix = PETSc.Mat().createAIJ(
+            (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
+        )
+        self._x, self._f = self._matrix.createVecs()
+        snes = self._snes = PETSc.SNES().create(comm)
+        snes.setOptionsPrefix(self.prefix)
+        snes.setType("newtonls")
+        snes.setFunction(self._on_residual, self._f)
+        snes.setJacobian(self._on_tangent, self._matrix)
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("lu")
+        ksp.getPC().setFactorSolverType("mumps")
+        with self._options_in_effect():
+            snes.setFromOptions()
+        self.problem.complementarity = snes.getType().startswith("vi")
+        if self.problem.complementarity:
+            lower, upper = (np.where(np.isinf(b), np.sign(b) * PETSc.INFINITY, b) for b in self.problem.bounds())
+            snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in (lower, upper)))
+        snes.setLineSearchPreCheck(self._on_step)
+
+    @contextmanager
+    def _options_in_effect(self) -> Iterator[None]:
+        """Our defaults and the caller's options in PETSc's database, and out of it again; PETSC_OPTIONS wins over defaults."""
+        database = PETSc.Options()
+        given = database.getAll()
+        # thin structures jump by orders of magnitude in the first iteration; a line search on the residual stalls there
+        defaults = {
+            "snes_linesearch_type": "basic", "snes_divergence_tolerance": 1e30, "snes_stol": 0.0, "snes_rtol": 1e-50,
+            "snes_max_it": 25,
+        }  # fmt: skip
+        mine = {self.prefix + key: value for key, value in defaults.items()}
+        mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
+        for key, value in mine.items():
+            database.setValue(key, value)
+        try:
+            yield
+        finally:
+            for key in mine:
+                if key in given:
+                    database.setValue(key, given[key])
+                else:
+                    database.delValue(key)
+
+    def solve(self, x: FloatArray, tolerance: float, iterations: int | None = None) -> tuple[FloatArray, int]:
+        """Solve from ``x`` until the residual's norm is below ``tolerance``; returns the solution and the iterations.
+
+        Raises
+        ------
+        ConvergenceError
+            When the solver stops for any other reason.
+        """
+        snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
+        _, _, _, limit = snes.getTolerances()
+        snes.setTolerances(atol=tolerance, max_it=iterations or limit)
+        self._x.array[:] = x
+        try:
+            snes.solve(None, self._x)
+        finally:
+            snes.setTolerances(max_it=limit)
+            self.seconds.total += time.perf_counter() - start
+            self.seconds.factorisation += factorisation_seconds() - factor
+        reason, done = snes.getConvergedReason(), snes.getIterationNumber()
+        if reason <= 0:
+            raise ConvergenceError(
+                f"the contact solve stopped with {REASONS.get(reason, reason)} after {done} iterations at residual "
+                f"{snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
+            )
+        return self._x.array.copy(), done
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        for thing in (self._snes, self._matrix, self._x, self._f):
+            thing.destroy()
+
+    def _timed(self, work: Callable[[], FloatArray]) -> FloatArray:
+        start = time.perf_counter()
+        result = work()
+        self.seconds.assembly += time.perf_counter() - start
+        return result
+
+    def _on_residual(self, _snes, x, f) -> None:
+        f.array[:] = self._timed(lambda: self.problem.residual(x.array_r))
+
+    def _on_tangent(self, _snes, x, matrix, _preconditioner) -> None:
+        def fill() -> None:
+            _add_up(self._pattern.slots, self.problem.tangent(x.array_r), self._pattern.values)
+            matrix.setValuesCSR(self._pattern.start, self._pattern.column, self._pattern.values)
+            matrix.assemble()
+
+        self._timed(fill)
+
+    def _on_step(self, x, y) -> bool:
+        factor = self.problem.shorten(x.array_r, y.array_r)
+        if factor < 1.0:
+            y.scale(factor)
+        return factor < 1.0

@@ -1,0 +1,306 @@
+"""Press a pad on an object along a ladder of normal forces, each force started from the one before.
+
+A force that Newton does not reach in one step is approached by halves; where that fails too, the sheet is walked by its
+travel until the force is bracketed.  Every state that is passed on has converged and has been checked.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.contact import ContactProblem, Control, Gap
+from fem.errors import CheckError, ConvergenceError
+from fem.pad import Pad
+from fem.petsc import NonlinearSolver, Seconds
+
+FloatArray = NDArray[np.float64]
+RESIDUAL = 1e-10  # of the normal force, where a Newton solve stops
+BALANCE = 1e-8  # of the normal force
+PENETRATION = 1e-9  # of an element's size
+MIN_STEP = 1.0 / 64.0  # of the step between two forces, before the sheet is walked instead
+WALK_STEPS = 60  # of the sheet, for one force
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Measures of a converged state; the first four must be small, ``min_det_f`` positive.
+
+    ``force_balance`` is relative to the force, ``tension`` to the largest pressure, ``penetration`` and
+    ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
+    ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear modulus: not positive means that the
+    foam has lost ellipticity and that strains may localise.
+    """
+
+    force_balance: float
+    tension: float
+    penetration: float
+    complementarity: float
+    min_det_f: float
+    max_strain: float
+    acoustic: float
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A pad in equilibrium on the object at one normal force.
+
+    Parameters
+    ----------
+    force, travel : float
+        Normal force [N] and travel of the sheet from first touch [m].
+    unknowns : (n,) array
+        State of the solver.
+    pressure : (front nodes,) array
+        Nominal contact pressure, in the order of ``Pad.front_nodes`` [Pa].
+    front : (front nodes, 3) array
+        Deformed nodes of the front, in the pad's frame at first touch [m].
+    face_force : (faces, 3) array
+        Contact force of every meshed face of the front on the object [N].
+    """
+
+    force: float
+    travel: float
+    unknowns: FloatArray
+    pressure: FloatArray
+    front: FloatArray
+    face_force: FloatArray
+    checks: Checks
+    iterations: int
+    steps: int
+    cuts: int
+    seconds: Seconds
+
+
+@dataclass
+class _Work:
+    """Effort of one force level."""
+
+    iterations: int = 0
+    steps: int = 0
+    cuts: int = 0
+
+
+@dataclass
+class Press:
+    """One pad against one object; ``gap`` takes points of the pad's frame, the pad at first touch.
+
+    Parameters
+    ----------
+    pad : Pad
+    gap : callable
+        ``(n, 3)`` points to signed distance, gradient and Hessian.
+    options : dict
+        PETSc options with the prefix ``contact_``.
+    """
+
+    pad: Pad
+    gap: Gap
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Set up the solver of this pad and object."""
+        self.problem = ContactProblem(self.pad, self.gap)
+        self.solver = NonlinearSolver(self.problem, self.options)
+        self._directions = _hemisphere(24)
+        size = min(np.ptp(self.pad.nodes[self.pad.face_nodes[0]], axis=0)[:2])
+        self._element_size = float(size)
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
+        """Equilibrium states at ascending normal forces on the whole pad [N].
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            At the first force without an acceptable state.
+        """
+        x, reached = None, 0.0
+        for force in forces:
+            work, before, start = _Work(), _copy(self.solver.seconds), time.perf_counter()
+            if x is None:
+                x, reached = self._first(force, work)
+            x = self._climb(x, reached, force, work)
+            reached = force
+            checks = self._check(x, force)
+            spent = self.solver.seconds
+            seconds = Seconds(
+                spent.assembly - before.assembly,
+                spent.factorisation - before.factorisation,
+                time.perf_counter() - start,
+            )
+            front = (self.pad.nodes + self.pad.displacement(x))[self.pad.front_nodes]
+            pressure, _, face_force = self.problem.contact_state(x)
+            yield Pressed(
+                force, float(x[self.pad.travel_dof]), x.copy(), pressure, front, face_force, checks,
+                work.iterations, work.steps, work.cuts, seconds,
+            )  # fmt: skip
+
+    def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
+        """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""
+        start = self._guess(travel) if x is None else x
+        x = self._solve(start, Control(travel=travel), _Work())
+        return x, self.problem.sheet_force(x)
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self.solver.destroy()
+
+    # -- stepping ------------------------------------------------------------------------------------------------------
+
+    def _solve(self, x: FloatArray, control: Control, work: _Work) -> FloatArray:
+        """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
+        self.problem.control = control
+        scale = control.force if control.force is not None else self._force_scale(control.travel)
+        work.steps += 1
+        try:
+            x, iterations = self.solver.solve(x, RESIDUAL * scale * self.pad.share)
+        except ConvergenceError:
+            work.cuts += 1
+            raise
+        work.iterations += iterations
+        return x
+
+    def _climb(self, x: FloatArray, reached: float, force: float, work: _Work) -> FloatArray:
+        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or along the travel."""
+        fraction, done = 1.0, 0.0
+        while done < 1.0:
+            goal = min(1.0, done + fraction)
+            target = force if goal == 1.0 else reached + goal * (force - reached)
+            try:
+                x = self._solve(x, Control(force=target), work)
+            except ConvergenceError:
+                fraction *= 0.5
+                if fraction < MIN_STEP:
+                    return self._walk(x, force, work)
+                continue
+            done = goal
+        return x
+
+    def _walk(self, x: FloatArray, force: float, work: _Work) -> FloatArray:
+        """Travel on until the force is bracketed, then solve for it from the interpolated state."""
+        dof = self.pad.travel_dof
+        step, low = 0.02 * self.pad.shape.size[2], (x, self.problem.sheet_force(x))
+        for _ in range(WALK_STEPS):
+            try:
+                ahead = self._solve(low[0], Control(travel=low[0][dof] + step), work)
+                high = (ahead, self.problem.sheet_force(ahead))
+                if high[1] >= force:
+                    share = (force - low[1]) / (high[1] - low[1])
+                    return self._solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
+                low, step = high, 1.5 * step
+            except ConvergenceError as error:
+                step *= 0.5
+                if step < 1e-5 * self.pad.shape.size[2]:
+                    raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
+        raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
+
+    def _first(self, force: float, work: _Work) -> tuple[FloatArray, float]:
+        """First state in contact: travel control from the bed-of-springs estimate, because force control has no start."""
+        travel = self._spring_travel(force)
+        for _ in range(12):
+            try:
+                x = self._solve(self._guess(travel), Control(travel=travel), work)
+            except ConvergenceError:
+                travel *= 0.6
+                continue
+            reached = self.problem.sheet_force(x)
+            if reached > 1e-3 * force:
+                return x, reached
+            travel *= 1.5
+        raise ConvergenceError(
+            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on less "
+            f"than an element of its front: refine the pad's mesh or move the candidate"
+        )
+
+    def _height(self) -> FloatArray:
+        """Distance along the approach from every node of the undeformed front to the object, roughly [m]."""
+        gap, normal, _ = self.gap(self.pad.nodes[self.pad.front_nodes])
+        return np.maximum(gap, 0.0) / np.maximum(-normal[:, 2], 0.2)
+
+    def _spring_force(self, travel: float) -> float:
+        bed = self.problem.kappa * np.maximum(0.0, travel - self._height())
+        return float(self.pad.node_area @ bed) / self.pad.share
+
+    def _force_scale(self, travel: float) -> float:
+        return max(self._spring_force(travel), 1e-3 * self.problem.kappa * self.pad.node_area.max() * abs(travel))
+
+    def _spring_travel(self, force: float) -> float:
+        """Travel at which a bed of springs carries the force [m]."""
+        low, high = 0.0, 1e-3 * self.pad.shape.size[2]
+        while self._spring_force(high) < force and high < 10 * self.pad.shape.size[2]:
+            high *= 2.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._spring_force(middle) < force else (low, middle)
+        return high
+
+    def _guess(self, travel: float) -> FloatArray:
+        """Pad squeezed like a bed of springs: columns shortened affinely so that no element starts inverted."""
+        pad = self.pad
+        squeeze = np.clip(travel - self._height(), 0.0, 0.6 * pad.shape.size[2])
+        column = _nearest_column(pad)
+        u = np.zeros(pad.dofs.shape)
+        u[:, 2] = travel - squeeze[column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
+        x = np.zeros(pad.size)
+        x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
+        x[pad.travel_dof] = travel
+        x[pad.travel_dof + 1 :] = squeeze
+        return x
+
+    # -- checking ------------------------------------------------------------------------------------------------------
+
+    def _check(self, x: FloatArray, force: float) -> Checks:
+        """Laws that a right answer obeys, whatever the solver said.
+
+        Raises
+        ------
+        CheckError
+            With the law that is broken, the figure and its bound.
+        """
+        pressure, gap, face_force = self.problem.contact_state(x)
+        det, strain, acoustic = self.problem.strains(x, self._directions)
+        size, largest = self._element_size, float(pressure.max(initial=0.0))
+        product = float(np.max(np.abs(pressure * gap), initial=0.0))
+        checks = Checks(
+            force_balance=abs(face_force[:, 2].sum() / self.pad.share - force) / force,
+            tension=max(0.0, -float(pressure.min())) / max(largest, 1e-300),
+            penetration=max(0.0, -float(gap.min())) / size,
+            complementarity=product / (max(largest, 1e-300) * size),
+            min_det_f=det,
+            max_strain=strain,
+            acoustic=acoustic,
+        )
+        for broken, law in (
+            (not checks.force_balance <= BALANCE, f"force balance is off by {checks.force_balance:.1e} of the force"),
+            (not checks.tension <= 1e-8, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
+            (not checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
+            (not checks.complementarity <= 1e-8, "pressure and gap are both positive at a node"),
+            (not det > 0.0, f"an element is inverted: det F = {det:.3g}"),
+        ):
+            if broken:
+                raise CheckError(f"the state at {force:.4g} N converged but is wrong: {law}")
+        return checks
+
+
+def _nearest_column(pad: Pad) -> NDArray[np.int64]:
+    """For every node the index, in ``front_nodes``, of the front's node above it (columns are straight)."""
+    x, y = np.unique(pad.nodes[pad.front_nodes][:, 0]), np.unique(pad.nodes[pad.front_nodes][:, 1])
+    i = np.abs(pad.nodes[:, 0, None] - x).argmin(axis=1)
+    j = np.abs(pad.nodes[:, 1, None] - y).argmin(axis=1)
+    return i * len(y) + j
+
+
+def _hemisphere(n: int) -> FloatArray:
+    """Unit vectors spread evenly over a hemisphere ``(n, 3)`` (Fibonacci)."""
+    z = (np.arange(n) + 0.5) / n
+    phi = np.arange(n) * np.pi * (3.0 - np.sqrt(5.0))
+    return np.column_stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
+
+
+def _copy(seconds: Seconds) -> Seconds:
+    return Seconds(seconds.assembly, seconds.factorisation, seconds.total)
