@@ -10,6 +10,7 @@ packages=(python3 python3-venv python3-petsc4py python3-h5py python3-h5py-mpi py
 venv=.venv
 stamp=$venv/set-up-of-softjaw
 export OMP_NUM_THREADS=1
+PATH=$PATH:/usr/sbin:/sbin # ldconfig, on Debian out of an ordinary user's way
 
 say() { printf 'set-up: %s\n' "$*"; }
 fail() { printf 'set-up: %s\n' "$@" >&2; exit 1; }
@@ -62,8 +63,11 @@ may_install() {
 }
 
 other_ways() {
+    if [ "$python" != /usr/bin/python3 ]; then
+        fail "$python does not see: $1" "without PYTHON= the system's Python is used, and apt-get can install what is missing"
+    fi
     fail "not found: $1" \
-        "they cannot be installed from here (this needs apt-get, and root or sudo). Either ask an administrator for" \
+        "they cannot be installed from here (that takes apt-get, and root or sudo). Either ask an administrator for" \
         "    apt-get install --no-install-recommends ${packages[*]} libosmesa6" \
         "or, without any rights, make and activate an environment with conda-forge's builds (PETSc with MUMPS, HDF5 with MPI):" \
         "    conda create -n softjaw -c conda-forge 'python>=3.11' petsc4py mpi4py 'h5py=*=mpi_openmpi*' openmpi" \
@@ -77,7 +81,7 @@ install_system_packages() {
     as_root apt-get update -qq || say "the package lists could not be refreshed; trying with those that are here"
     mapfile -t -O "${#wanted[@]}" wanted < <(renderer)
     say "installing with apt-get: ${wanted[*]}"
-    as_root apt-get install -qq -y --no-install-recommends -o Dpkg::Use-Pty=0 "${wanted[@]}" > /dev/null \
+    as_root apt-get install -qq -y --no-install-recommends -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=300 "${wanted[@]}" > /dev/null \
         || fail "apt-get could not install these packages; see its message above"
 }
 
@@ -135,7 +139,7 @@ elif ! grep -q 'include-system-site-packages = true' $venv/pyvenv.cfg; then
 fi
 
 say "installing softjaw and its Python packages into $venv (a minute or two)"
-$venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' \
+$venv/bin/python -m pip install -qq --disable-pip-version-check --editable '.[test]' \
     || fail "pip could not install the packages of pyproject.toml; see its message above"
 if [ -n "$(find $venv/lib/python3*/site-packages -maxdepth 1 -iname h5py)" ]; then
     say "removing h5py from $venv: that build has no MPI and hides the system's"

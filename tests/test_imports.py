@@ -15,13 +15,15 @@ ALLOWED = {
     "friction": {"friction"} | NUMERICS,
     "lsfit": {"lsfit"} | NUMERICS,
     "scoring": {"scoring"} | NUMERICS,
-    "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista"} | NUMERICS,
-    "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista"} | NUMERICS,
+    "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
+    "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
+PICTURES = {"fem/mesh_object.py", "study/pictures.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "h5py": {"study/store.py"},
-    "pyvista": {"fem/mesh_object.py", "study/pictures.py"},
+    "pyvista": PICTURES,
+    "vtkmodules": PICTURES,
 }
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 
