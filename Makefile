@@ -23,6 +23,7 @@ endif
 # It also refuses to start more ranks than there are cores; asked for when the recipe runs, after the set-up.
 AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
+RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
 .PHONY: help setup map test test-long bench lint doctor
@@ -41,7 +42,8 @@ setup:
 
 map: setup
 	@mkdir -p $(dir $(RESULT))
-	$(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT) || [ $$? = $(SOME_FAILED) ]
+	@echo '$(RUN)'
+	@$(RUN) || [ $$? = $(SOME_FAILED) ]
 	@$(BIN)/softjaw report $(RESULT) -o $(PAGE)
 	@$(BIN)/softjaw view $(RESULT) --screenshot $(PICTURE)
 	@$(BIN)/softjaw show $(RESULT) --top 5
