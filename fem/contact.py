@@ -35,6 +35,28 @@ class Control:
     travel: float = 0.0
 
 
+@dataclass(frozen=True)
+class ContactPoints:
+    """Quadrature points of the meshed front in the pad's frame.
+
+    Parameters
+    ----------
+    position, normal : (faces, points, 3) arrays
+        Deformed points [m] and the object's outward normals there.
+    load : (faces, points) array
+        Contact pressure times reference area [N].
+    """
+
+    position: FloatArray
+    normal: FloatArray
+    load: FloatArray
+
+    @property
+    def force(self) -> FloatArray:
+        """Contact force of the meshed part on the object ``(3,)`` [N]."""
+        return -np.einsum("fq,fqi->i", self.load, self.normal)
+
+
 class ContactProblem:
     """Residual and tangent of one pad pressed on one object; ``gap`` takes points of the pad's frame.
 
@@ -110,9 +132,10 @@ class ContactProblem:
         points = np.einsum("qa,fai->fqi", pad.face_N, corners)
         gap, normal, hessian = self.gap(points.reshape(-1, 3))
         shape = points.shape[:2]
+        self._points, self._normal = points, normal.reshape(*shape, 3)
         kernel.contact(
             pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], gap.reshape(shape),
-            normal.reshape(*shape, 3), hessian.reshape(*shape, 3, 3), self._weighted, self._force,
+            self._normal, hessian.reshape(*shape, 3, 3), self._weighted, self._force,
             *((self._K_uu, self._K_ul) if tangent else self._none[1:]),
         )  # fmt: skip
         return np.bincount(self._face_pressures.ravel(), self._weighted.ravel(), len(self.area))
@@ -179,10 +202,12 @@ class ContactProblem:
         kernel.elements(pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._none[0])
         return float(_gather(self._element_dofs, self._r, self.size)[pad.travel_dof]) / pad.share
 
-    def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and each face's force on the object ``(m, 3)`` [N]."""
+    def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
+        """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)
-        return self.kappa * x[self._pressures], weighted_gap / self.area, self._force.sum(axis=2)
+        pressure = self.kappa * x[self._pressures]
+        load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
+        return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, load)
 
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""

@@ -1,11 +1,16 @@
-"""The contact patch of a pressed pad: faces of the deformed front with their pressures, unfolded to the whole pad."""
+"""The contact patch of a pressed pad: the deformed front in small faces with their pressures, unfolded to the whole pad.
+
+Every hexahedron of the front gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
+triquadratic ones).  A face takes point, normal and load from its quadrature point, so that sums over the patch are
+the integrals of the solution: the loads add up to ``S``, their components along the approach to the normal force.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.pad import Pad, PadShape
+from fem.pad import Pad, PadShape, lagrange
 from fem.press import Pressed
 from friction.patch import ContactPatch
 
@@ -13,45 +18,65 @@ FloatArray = NDArray[np.float64]
 
 
 def patch_faces(shape: PadShape) -> tuple[int, int]:
-    """Number of patch faces along the pad's length and width: one per hexahedron of the front."""
-    return shape.elements[0], shape.elements[1]
+    """Number of patch faces along the pad's length and width."""
+    return tuple(shape.per_side * n for n in shape.elements[:2])
 
 
 def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
-    """Faces of the whole pad's front at this state, in the pad's frame at first touch.
+    """Patch of the whole pad at this state, in the pad's frame at first touch.
 
-    A face's load is the contact force ``f = int p n dA`` of the solution over that face: ``pressure * area * normal = f``
-    with the deformed area, so that the loads of all faces add up to the normal force exactly.  An unloaded face keeps the
-    normal of the deformed face.  All normals point into the object.  Faces are numbered along the width first, and
-    their number does not depend on symmetry.
+    ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area`` that of the
+    deformed face and ``pressure`` the load over that area.  Faces are numbered along the width first, and their number
+    does not depend on symmetry.
     """
-    step = 1 if pad.shape.element == "hex8" else 2
-    position = _unfold(pad, pressed.front.reshape(*pad.front_grid, 3), shared=True)[::step, ::step]
-    force = _unfold(pad, pressed.face_force.reshape(*_face_grid(pad), 3), shared=False).reshape(-1, 3)
-    corners = np.stack(
-        [position[:-1, :-1], position[1:, :-1], position[1:, 1:], position[:-1, 1:]], axis=2
-    ).reshape(-1, 4, 3)
-    across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    area = 0.5 * np.linalg.norm(across, axis=1)
-    load = np.linalg.norm(force, axis=1)
-    # a face that touches nothing may carry a rounding error, in any direction
-    loaded = load > 1e-12 * load.max(initial=0.0)
-    normal = np.where(loaded[:, None], force / np.maximum(load, 1e-300)[:, None], across / (2.0 * area[:, None]))
+    points = pressed.points
+    load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
+    nodes = pressed.front.reshape(*pad.front_grid, 3)
+    for axis in range(2):
+        nodes = _subdivide(nodes, axis, pad.shape.per_side)
+    nodes = _unfold(pad, nodes, shared=True)
+    corners = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
     return ContactPatch(
-        centroid=corners.mean(axis=1), area=area, normal=normal, pressure=np.where(loaded, load / area, 0.0), corners=corners
+        centroid=_unfold(pad, _as_grid(pad, points.position), False).reshape(-1, 3),
+        area=area,
+        normal=-_unfold(pad, _as_grid(pad, points.normal), False).reshape(-1, 3),
+        pressure=load / area,
+        corners=corners,
     )
 
 
-def _face_grid(pad: Pad) -> tuple[int, int]:
-    """Number of meshed faces of the front along x and y."""
-    return tuple(n // 2 if half else n for n, half in zip(pad.shape.elements, pad.symmetry, strict=False))
+def _non_negative(load: FloatArray) -> FloatArray:
+    """Loads ``(faces, points)`` without the negative parts of quadratic pressures; each hexahedron keeps its sum."""
+    clipped = np.maximum(load, 0.0)
+    total = clipped.sum(axis=1, keepdims=True)
+    return clipped * (np.maximum(load.sum(axis=1, keepdims=True), 0.0) / np.where(total > 0, total, 1.0))
+
+
+def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
+    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed front ``(i, j, c)``."""
+    nx, ny = (n // 2 if half else n for n, half in zip(pad.shape.elements, pad.symmetry, strict=False))
+    k = pad.shape.per_side
+    return values.reshape(nx, ny, k, k, -1).transpose(0, 2, 1, 3, 4).reshape(nx * k, ny * k, -1)
+
+
+def _subdivide(grid: FloatArray, axis: int, parts: int) -> FloatArray:
+    """Node positions along an axis replaced by the corners of the faces: every side is cut in proportion to the Gauss weights."""
+    grid = np.moveaxis(grid, axis, 0)
+    order = parts - 1  # of the shape functions along a side
+    cuts = np.cumsum(np.polynomial.legendre.leggauss(parts)[1] / 2.0) - np.polynomial.legendre.leggauss(parts)[1] / 2.0
+    fine = np.stack([lagrange(parts, s) for s in cuts])
+    elements = np.stack([grid[k : len(grid) - order + k : order] for k in range(parts)], axis=1)
+    inside = np.einsum("sk,nk...->ns...", fine, elements).reshape(-1, *grid.shape[1:])
+    return np.moveaxis(np.concatenate([inside, grid[-1:]]), 0, axis)
 
 
 def _unfold(pad: Pad, grid: FloatArray, shared: bool) -> FloatArray:
-    """Mirror a grid of vectors ``(i, j, 3)`` to the whole pad; ``shared`` where the first row lies on the mirror itself."""
+    """Mirror a grid ``(i, j, c)`` to the whole pad, vectors with their sign; ``shared`` where the first row lies on the mirror."""
     for axis in range(2):
         if pad.symmetry[axis]:
             mirrored = np.flip(grid, axis).copy()
-            mirrored[..., axis] *= -1.0
+            if grid.shape[2] == 3:
+                mirrored[..., axis] *= -1.0
             grid = np.concatenate([np.delete(mirrored, -1, axis) if shared else mirrored, grid], axis)
     return grid

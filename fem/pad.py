@@ -51,6 +51,11 @@ class PadShape:
         if self.element not in ELEMENTS:
             raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(ELEMENTS)}")
 
+    @property
+    def per_side(self) -> int:
+        """Nodes along a side of an element, and quadrature points along a side of its face."""
+        return 2 if self.element == "hex8" else 3
+
     def halved(self) -> PadShape:
         """The same pad with half as many elements in every direction (at least one; kept even where it was even)."""
         fewer = tuple(max(2, 2 * round(n / 4)) if n % 2 == 0 and n > 1 else max(1, n // 2) for n in self.elements)
@@ -146,7 +151,7 @@ class Pad:
 
     def _describe_front(self, lines: list[FloatArray], contact: str) -> None:
         """Faces of the front as a tensor grid, and its quadrature."""
-        per_side = 2 if self.shape.element == "hex8" else 3
+        per_side = self.shape.per_side
         step = per_side - 1
         grid = self.front_nodes.reshape(self.front_grid)
         nx, ny = len(lines[0]) - 1, len(lines[1]) - 1
@@ -190,12 +195,12 @@ def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
         weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
     else:
         raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
-    one = np.stack([_lagrange(per_side, s) for s in points])  # (points, nodes) along one side
+    one = np.stack([lagrange(per_side, s) for s in points])  # (points, nodes) along one side
     N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
     return N, np.outer(weights, weights).ravel()
 
 
-def _lagrange(n: int, s: float) -> FloatArray:
+def lagrange(n: int, s: float) -> FloatArray:
     """Lagrange polynomials with ``n`` equidistant nodes on ``[0, 1]``."""
     t = np.linspace(0.0, 1.0, n)
     return np.array([np.prod([(s - t[j]) / (t[i] - t[j]) for j in range(n) if j != i]) for i in range(n)])

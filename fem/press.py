@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.contact import ContactProblem, Control, Gap
+from fem.contact import ContactPoints, ContactProblem, Control, Gap
 from fem.errors import CheckError, ConvergenceError
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
@@ -60,8 +60,8 @@ class Pressed:
         Nominal contact pressure, in the order of ``Pad.front_nodes`` [Pa].
     front : (front nodes, 3) array
         Deformed nodes of the front, in the pad's frame at first touch [m].
-    face_force : (faces, 3) array
-        Contact force of every meshed face of the front on the object [N].
+    points : ContactPoints
+        Position, normal and load of the quadrature points of the meshed front.
     """
 
     force: float
@@ -69,7 +69,7 @@ class Pressed:
     unknowns: FloatArray
     pressure: FloatArray
     front: FloatArray
-    face_force: FloatArray
+    points: ContactPoints
     checks: Checks
     iterations: int
     steps: int
@@ -134,9 +134,9 @@ class Press:
                 time.perf_counter() - start,
             )
             front = (self.pad.nodes + self.pad.displacement(x))[self.pad.front_nodes]
-            pressure, _, face_force = self.problem.contact_state(x)
+            pressure, _, points = self.problem.contact_state(x)
             yield Pressed(
-                force, float(x[self.pad.travel_dof]), x.copy(), pressure, front, face_force, checks,
+                force, float(x[self.pad.travel_dof]), x.copy(), pressure, front, points, checks,
                 work.iterations, work.steps, work.cuts, seconds,
             )  # fmt: skip
 
@@ -262,12 +262,12 @@ class Press:
         CheckError
             With the law that is broken, the figure and its bound.
         """
-        pressure, gap, face_force = self.problem.contact_state(x)
+        pressure, gap, points = self.problem.contact_state(x)
         det, strain, acoustic = self.problem.strains(x, self._directions)
         size, largest = self._element_size, float(pressure.max(initial=0.0))
         product = float(np.max(np.abs(pressure * gap), initial=0.0))
         checks = Checks(
-            force_balance=abs(face_force[:, 2].sum() / self.pad.share - force) / force,
+            force_balance=abs(points.force[2] / self.pad.share - force) / force,
             tension=max(0.0, -float(pressure.min())) / max(largest, 1e-300),
             penetration=max(0.0, -float(gap.min())) / size,
             complementarity=product / (max(largest, 1e-300) * size),
