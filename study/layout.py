@@ -28,6 +28,19 @@ SESSION = np.dtype(
 
 
 @dataclass(frozen=True)
+class Header:
+    """What a file says about the scene it was made from; ``labels`` name the candidates in row order."""
+
+    digest: str
+    scene: str
+    title: str = ""
+    scene_file: str = ""
+    overrides: tuple[str, ...] = ()
+    petsc_options: str = ""
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Derived:
     """A dataset that is filled once, after all rows: over some of the axes, with an optional trailing shape."""
 

@@ -33,7 +33,7 @@ class Lock:
             if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB) and self._still_named():
                 break
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
-            os.close(self._fd)
+            self.release()
             if attempt == 5:
                 who = holder or "name unknown"
                 raise StudyError(IN_USE, f"{self.result}: in use by another run ({who}); wait for it")
@@ -54,8 +54,14 @@ class Lock:
             raise StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
 
     def remove(self) -> None:
-        """On rank 0, at the end of the run: take the file away; the lock itself ends with the processes."""
+        """On rank 0, at the end of the run, while all ranks still hold the lock: take the file away."""
         self.path.unlink(missing_ok=True)
+
+    def release(self) -> None:
+        """Let go; a process that dies does so as well."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
 
     def _still_named(self) -> bool:
         try:

@@ -141,6 +141,7 @@ EFFECTS = {
     "pad": ("linear", "hyperelastic"),
     "sheet": ("rigid", "elastic plate"),
     "model_size": ("quarter", "half", "full"),
+    "fingers": ("one", "two"),
     "friction": ("flat", "curved"),
     "wrench": ("3-D", "6-D"),
     "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from study.layout import (
     SESSIONS,
     VERSION,
     Dataset,
+    Header,
     Layout,
     definitions_text,
     groups,
@@ -40,19 +40,6 @@ from study.record import blank, crc32, text_bytes
 LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")
 CODES = np.dtype("u1")
-
-
-@dataclass(frozen=True)
-class Header:
-    """What a file says about the scene it was made from; ``labels`` name the candidates in row order."""
-
-    digest: str
-    scene: str
-    title: str = ""
-    scene_file: str = ""
-    overrides: tuple[str, ...] = ()
-    petsc_options: str = ""
-    labels: tuple[str, ...] = ()
 
 
 # --- creation: one process, before any solve ---------------------------------------------------------------------

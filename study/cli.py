@@ -1,0 +1,108 @@
+"""The command line: words to options, and errors to exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import IO, Any
+
+from study import commands
+from study.environment import pin_threads
+from study.exits import BUG, DONE, MEANING, USAGE, StudyError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit code is the same on every rank."""
+    pin_threads()
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    cut = words.index("--") if "--" in words else len(words)
+    try:
+        options = _parser().parse_args(words[:cut])
+    except SystemExit as leave:
+        return int(leave.code or 0)
+    options.petsc = words[cut + 1 :]
+    try:
+        if options.petsc and options.command is not commands.run:
+            raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
+        return options.command(options)
+    except StudyError as error:
+        return commands.complain(error)
+    except BrokenPipeError:  # the reader of a pipe has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except Exception:
+        traceback.print_exc()
+        return BUG
+
+
+class _Parser(argparse.ArgumentParser):
+    """Speaks on the first rank only, whatever started the ranks."""
+
+    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+        if commands.first_rank():
+            super()._print_message(message, file)
+
+
+def _parser() -> argparse.ArgumentParser:
+    codes = "\n".join(f"  {code:3d}  {text}" for code, text in MEANING.items())
+    parser = _Parser(
+        prog="softjaw",
+        description="How well a two-finger gripper with soft jaws holds an object, place by place.",
+        epilog=f"exit codes:\n{codes}\n\nexample:\n  mpirun -n 8 softjaw run jobs/bottle.toml -o results/bottle.hdf",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    listed = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def add(name: str, command: Any, text: str, example: str) -> argparse.ArgumentParser:
+        made = listed.add_parser(
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=f"example:\n  {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        made.set_defaults(command=command)
+        return made
+
+    check = add("check", commands.check, "find every error of a scene, or say what would be run",
+                "softjaw check jobs/bottle.toml")  # fmt: skip
+    plan = add("plan", commands.plan, "cases, units, disk, memory and time, before anything is spent",
+               "softjaw plan jobs/bottle.toml -n 16")  # fmt: skip
+    run = add("run", commands.run, "solve a scene into a result file; the same command again resumes",
+              "mpirun -n 8 softjaw run jobs/bottle.toml -o results/bottle.hdf -- -contact_snes_monitor")  # fmt: skip
+    for made in (check, plan, run):
+        made.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+        made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
+                          help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
+    plan.add_argument("-n", type=_positive, default=1, metavar="RANKS", dest="ranks", help="ranks (default 1)")
+    for made in (plan, run):
+        made.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
+    run.add_argument("--retry-failed", action="store_true", help="solve failed cases again")
+    status = add("status", commands.status, "what a result file holds so far, also while it grows",
+                 "softjaw status out.hdf")  # fmt: skip
+    show = add("show", commands.show, "the best grasps as a table", "softjaw show out.hdf --force 5 --top 3 --json")
+    report = add("report", commands.report, "one self-contained page with maps, definitions and provenance",
+                 "softjaw report out.hdf -o out.html")  # fmt: skip
+    for made in (status, show, report):
+        made.add_argument("file", metavar="FILE", help="result file (.hdf)")
+    show.add_argument("--force", type=float, metavar="N", help="normal force [N], nearest level (default: the highest)")
+    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0 for all (default 10)")
+    form = show.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
+    form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
+    report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+    add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
+    add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
+    return parser
+
+
+def _positive(text: str) -> int:
+    if (value := int(text)) < 1:
+        raise argparse.ArgumentTypeError(f"found {text}, expected at least 1")
+    return value
+
+
+def _count(text: str) -> int:
+    if (value := int(text)) < 0:
+        raise argparse.ArgumentTypeError(f"found {text}, expected 0 or more")
+    return value

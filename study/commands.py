@@ -1,0 +1,164 @@
+"""The commands. Each imports what it needs when it is called, so that ``check`` loads neither MPI nor PETSc."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from study.exits import BUG, DONE, USAGE, StudyError
+
+RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
+
+
+def first_rank() -> bool:
+    """Whether this process speaks for all ranks; known without MPI."""
+    return next((os.environ[name] == "0" for name in RANK if name in os.environ), True)
+
+
+def complain(error: StudyError) -> int:
+    """Say what went wrong, once, and give the exit code."""
+    if first_rank():
+        for line in error.message.splitlines():
+            print(f"error: {line}", file=sys.stderr, flush=True)
+    return error.code
+
+
+def _scene(options: Namespace) -> Any:
+    from study.scene import load_scene
+    from study.scene_errors import SceneError
+
+    try:
+        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
+
+
+def petsc_overrides(words: Sequence[str]) -> list[str]:
+    """PETSc options of the command line as overrides of the scene's ``[petsc]`` table.
+
+    >>> petsc_overrides(["-contact_snes_monitor", "-contact_snes_rtol", "1e-9"])
+    ['petsc.contact_snes_monitor=true', 'petsc.contact_snes_rtol=1e-9']
+    """
+    found: list[list[str]] = []
+    for word in words:
+        if word.startswith("-contact_"):
+            found.append([word[1:], "true"])
+        elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
+            remedy = "options of the contact solver begin with -contact_, others go into PETSC_OPTIONS"
+            raise StudyError(USAGE, f"PETSc option '{word}' after '--': {remedy}")
+        else:
+            found[-1][1] = word
+    return [f"petsc.{name}={value}" for name, value in found]
+
+
+def check(options: Namespace) -> int:
+    """Find every error of a scene, or say what would be run."""
+    from study.overview import scene_text
+
+    print(scene_text(_scene(options), options.scene))
+    return DONE
+
+
+def plan(options: Namespace) -> int:
+    """Say what a run will take."""
+    from study.overview import plan_text
+    from study.plan import make_plan
+
+    scene = _scene(options)
+    path = Path(options.output or scene.output.file)
+    print(plan_text(make_plan(scene, options.scene, options.overrides), scene, path, options.ranks))
+    return DONE
+
+
+def status(options: Namespace) -> int:
+    """Say what a result file holds so far."""
+    from study.status import status_text
+    from study.store import open_result
+
+    with open_result(options.file) as result:
+        print(status_text(result))
+    return DONE
+
+
+def show(options: Namespace) -> int:
+    """Print the best grasps."""
+    from study.show import as_csv, as_json, as_text, best
+    from study.store import open_result
+
+    form = {"json": as_json, "csv": as_csv, None: as_text}[options.form]
+    with open_result(options.file) as result:
+        print(form(best(result, options.force, options.top)))
+    return DONE
+
+
+def report(options: Namespace) -> int:
+    """Write one page with everything."""
+    from study.report import write_report
+
+    page = Path(options.output or Path(options.file).with_suffix(".html"))
+    write_report(Path(options.file), page)
+    print(f"report: {page}")
+    return DONE
+
+
+def schema(_options: Namespace) -> int:
+    """Print the JSON schema of a scene."""
+    import json
+
+    from study.scene import Scene
+
+    print(json.dumps(Scene.model_json_schema(), indent=2))
+    return DONE
+
+
+def doctor(_options: Namespace) -> int:
+    """Say whether this machine has what is needed."""
+    from study.doctor import doctor
+
+    return doctor()
+
+
+def run(options: Namespace) -> int:
+    """Solve a scene; the same exit code on every rank."""
+    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    try:
+        return _run_on(comm, options)
+    except StudyError as error:
+        return complain(error)
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        if comm.size > 1:
+            comm.Abort(BUG)  # the other ranks wait for this one
+        return BUG
+
+
+def _run_on(comm: Any, options: Namespace) -> int:
+    from study import pipeline
+    from study.plan import make_plan
+    from study.run import Work, on_rank0, run_study
+    from study.status import summary
+
+    def prepare() -> tuple[Any, Any]:
+        scene = _scene(options)
+        overrides = [*options.overrides, *petsc_overrides(options.petsc)]
+        return scene, make_plan(scene, options.scene, overrides)
+
+    scene, plan = on_rank0(comm, prepare)
+    finalise = getattr(pipeline, "finalise", None)
+    work = Work(
+        solve_unit=pipeline.solve_unit,
+        image=getattr(pipeline, "image", None),
+        finalise=(lambda writer: finalise(writer, scene)) if finalise else None,
+        summary=summary,
+    )
+    path = Path(options.output or scene.output.file)
+    return run_study(plan, work, path, comm, retry_failed=options.retry_failed)

@@ -1,0 +1,147 @@
+"""One unit of work: a ladder of forces is climbed from its foot, and the rows that are missing are stored."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from study.layout import FAILED, MISSING
+from study.record import record
+from study.result import CaseFailure, CaseResult
+from study.stopping import AbandonedError, Stopper
+
+DEADLY = 2
+KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"
+
+
+def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
+    """Decide by one process what is missing: torn rows again, failed ones on demand, deadly ones no more.
+
+    Returns
+    -------
+    (rows,) array
+        State of every case as the run begins.
+    """
+    codes, attempts = writer.codes(), writer.attempts()
+    again = [*torn, *(np.flatnonzero(codes == FAILED) if retry_failed else ())]
+    for row in again:
+        writer.forget(int(row))
+        codes[row], attempts[row] = MISSING, 0
+    for unit in units:
+        for rows in unit.rows:
+            deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]
+            for k in range(deadly[0], len(rows)) if deadly else ():
+                if codes[rows[k]] == MISSING:
+                    what = "this case" if k == deadly[0] else "a lower force of this candidate"
+                    writer.fail(rows[k], KILLED.format(n=attempts[rows[deadly[0]]], what=what))
+                    codes[rows[k]] = FAILED
+    return codes
+
+
+class Climber:
+    """Climbs ladders on one rank and stores each case as soon as it is solved."""
+
+    def __init__(self, writer: Any, solve_unit: Callable, image: Callable | None, claims: Any) -> None:
+        self._writer, self._solve_unit, self._image, self._claims = writer, solve_unit, image, claims
+        self._begun: list[int] = []
+
+    def on_stop(self) -> None:
+        """Called by a signal: begin nothing new, and do not count the case in flight as one that killed us."""
+        self._claims.stop()
+        self._uncount()
+
+    def climb(self, unit: Any, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
+        """Solve a unit from its beginning and store the rows that ``codes`` calls missing, never a done one."""
+        pending = _pending(unit, codes)
+        ladder = self._ladder(unit)
+        clock = time.perf_counter()
+        while pending and not self._claims.stopped:
+            self._count(pending)
+            try:
+                with stopper.case():
+                    k, result = next(ladder)
+            except AbandonedError:
+                break
+            except StopIteration:
+                self._fail(pending, "the ladder of forces ended before this one; this is a bug")
+                break
+            except Exception as error:  # whatever a case dies of is its result
+                self._fail(pending, _sentence(error))
+                break
+            now = time.perf_counter()
+            self._store(unit, pending.pop(k, []), result, now - clock)
+            clock = now
+            look()
+        self._uncount()
+        _close(ladder)
+
+    def _ladder(self, unit: Any) -> Iterator[tuple[int, Any]]:
+        yield from self._solve_unit(unit)
+
+    def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
+        rows = {row for _, row in served}
+        self._begun = [row for row in self._begun if row not in rows]
+        for c, row in served:
+            if isinstance(result, CaseFailure):
+                self._writer.fail(row, result.message)
+            else:
+                mine = self._image(result, unit, c) if self._image else result
+                self._writer.write(row, record(self._writer.layout, _with_work(mine, c, seconds)))
+
+    def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
+        self._begun = []
+        for served in pending.values():
+            for _, row in served:
+                self._writer.fail(row, message)
+        pending.clear()
+
+    def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
+        rows = [row for _, row in pending[min(pending)]]
+        if rows != self._begun:
+            self._uncount()
+            for row in rows:
+                self._writer.count_attempt(row)
+            self._begun = rows
+
+    def _uncount(self) -> None:
+        rows, self._begun = self._begun, []
+        for row in rows:
+            self._writer.count_attempt(row, -1)
+
+
+def _pending(unit: Any, codes: np.ndarray) -> dict[int, list[tuple[int, int]]]:
+    """Missing rows of a unit: for each force, the candidates and their rows."""
+    pending: dict[int, list[tuple[int, int]]] = {}
+    for c, rows in enumerate(unit.rows):
+        for k, row in enumerate(rows):
+            if codes[row] == MISSING:
+                pending.setdefault(k, []).append((c, row))
+    return dict(sorted(pending.items()))
+
+
+def _with_work(result: CaseResult, c: int, seconds: float) -> CaseResult:
+    # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
+    if c:
+        return replace(result, values={k: v for k, v in result.values.items() if not k.startswith("work/")})
+    return replace(result, values={"work/seconds_total": seconds, **result.values})
+
+
+def _sentence(error: Exception) -> str:
+    text = f"{type(error).__name__}: {error}"
+    if type(error).__module__ == "builtins" and error.__traceback__:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        text += f" ({Path(frame.filename).name}:{frame.lineno})"
+    return text
+
+
+def _close(ladder: Any) -> None:
+    try:
+        ladder.close()
+    except Exception as error:  # the rows are stored; what the solver says while it is being closed changes nothing
+        print(f"warning: closing a ladder: {_sentence(error)}", flush=True)

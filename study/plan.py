@@ -1,0 +1,110 @@
+"""What a run will do, before anything is spent: layout, units of work, disk, memory and time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from study.layout import Header, Layout
+
+LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
+FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done: the file's layout and header, and the units of work (``rows``, ``cost``)."""
+
+    layout: Layout
+    header: Header
+    units: tuple[Any, ...]
+
+    @property
+    def costs(self) -> list[float]:
+        """Cost of every unit, in any unit of time."""
+        return [float(unit.cost) for unit in self.units]
+
+    @property
+    def served(self) -> int:
+        """Number of candidates, those that share a unit by symmetry counted one by one."""
+        return sum(len(unit.rows) for unit in self.units)
+
+
+def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
+    """The plan of a scene; builds its objects, so a mesh is read here."""
+    from study import pipeline, sweep
+
+    patches = scene.output.patches != "none"
+    faces = pipeline.patch_faces(scene) if patches else 0
+    derived = tuple(pipeline.derived(scene)) if hasattr(pipeline, "derived") else ()
+    header = Header(
+        digest=scene.digest,
+        scene=scene.effective_toml(),
+        title=getattr(scene.object, "name", None) or Path(scene_file).stem,
+        scene_file=scene_file,
+        overrides=tuple(overrides),
+        petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
+        labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
+    )
+    layout = Layout(tuple(sweep.axes(scene)), faces, scene.accuracy.meshes, patches, derived)
+    return Plan(layout, header, tuple(sweep.units(scene, pipeline.axis_symmetry)))
+
+
+def by_cost(costs: Sequence[float]) -> list[int]:
+    """Positions with the most expensive first; equal costs keep their order.
+
+    >>> by_cost([1.0, 5.0, 5.0, 2.0])
+    [1, 2, 3, 0]
+    """
+    return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+
+
+def makespan(costs: Sequence[float], ranks: int) -> float:
+    """Time until the last unit ends when ranks take the most expensive remaining unit whenever they are free.
+
+    >>> makespan([3.0, 3.0, 2.0, 2.0, 2.0], 2)
+    7.0
+    """
+    busy = np.zeros(max(ranks, 1))
+    for i in by_cost(costs):
+        busy[busy.argmin()] += costs[i]
+    return float(busy.max())
+
+
+def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
+    """Largest number of ranks that are busy for at least this share of the time.
+
+    >>> sensible_ranks([1.0] * 10)
+    10
+    """
+    total = sum(costs)
+    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= efficiency * n * makespan(costs, n)]
+    return max(good, default=1)
+
+
+def memory(scene: Any) -> float:
+    """Rough memory of one rank [bytes]: the libraries, and the factors of the whole pad's stiffness."""
+    nx, ny, nz = (n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in scene.gripper.elements)
+    return LIBRARIES + 8.0 * FILL * (3.0 * nx * ny * nz) ** (4.0 / 3.0)
+
+
+def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
+    """Expected time of every unit from the measured times of some cases, ``(rows,)`` with NaN for the others [s].
+
+    Measured units keep their time, the others are judged by their cost; empty where nothing was measured.
+    """
+    known = [_measured(unit, seconds) for unit in plan.units]
+    pairs = [(t, cost) for t, cost in zip(known, plan.costs, strict=True) if t is not None]
+    if not pairs or not sum(cost for _, cost in pairs):
+        return []
+    rate = sum(t for t, _ in pairs) / sum(cost for _, cost in pairs)
+    return [rate * cost if t is None else t for t, cost in zip(known, plan.costs, strict=True)]
+
+
+def _measured(unit: Any, seconds: np.ndarray) -> float | None:
+    times = seconds[list(unit.rows[0])]
+    return None if np.isnan(times).any() else float(times.sum())

@@ -1,0 +1,96 @@
+"""How far a run has come: one line that is rewritten on a terminal, timed lines in a log."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+import numpy as np
+
+from study.layout import DONE, FAILED, MISSING
+
+
+def duration(seconds: float) -> str:
+    """A time in the two units that matter.
+
+    >>> duration(6660.0), duration(75.0), duration(0.2)
+    ('1 h 51 min', '1 min 15 s', '0.2 s')
+    """
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
+
+
+class Progress:
+    """Prints how many cases are done and how long the rest will take, judged by the cost of the cases.
+
+    Parameters
+    ----------
+    weights : (rows,) array
+        Expected cost of each case, in any unit.
+    codes : (rows,) array
+        State of each case at the start.
+    stream : text stream
+        Where to write.
+    live : bool
+        Rewrite one line (a terminal) instead of adding lines. Under mpirun every output looks like a terminal, so the
+        caller has to know.
+    clock : callable
+        Seconds that only grow.
+    """
+
+    def __init__(
+        self,
+        weights: np.ndarray,
+        codes: np.ndarray,
+        stream: TextIO,
+        *,
+        live: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._weights, self._todo = weights, codes == MISSING
+        self._stream, self._live, self._clock = stream, live, clock
+        self._start = self._looked = self._printed = clock()
+        self._share = 0.0
+
+    def due(self) -> bool:
+        """Whether it is time to look at the states again; cheap, to be asked often."""
+        if self._clock() - self._looked < (0.2 if self._live else 1.0):
+            return False
+        self._looked = self._clock()
+        return True
+
+    def update(self, codes: np.ndarray) -> None:
+        """Print a line if the last one is ten seconds or five percent old, on a terminal always."""
+        share = float(np.mean(codes != MISSING))
+        if not self._live and self._clock() - self._printed < 10 and share - self._share < 0.05:
+            return
+        self._share, self._printed = share, self._clock()
+        text = self.line(codes)
+        stamp = time.strftime("%H:%M:%S")
+        self._stream.write(f"\r\x1b[K{text}" if self._live else f"[{stamp}] {text}\n")
+        self._stream.flush()
+
+    def line(self, codes: np.ndarray) -> str:
+        """Counts, seconds for each case and the expected rest."""
+        solved = self._todo & (codes != MISSING)
+        done, failed = int(np.sum(codes == DONE)), int(np.sum(codes == FAILED))
+        text = f"{done}/{codes.size} done" + (f", {failed} failed" if failed else "")
+        elapsed, gone = self._clock() - self._start, float(self._weights[solved].sum())
+        if gone > 0:
+            left = elapsed * float(self._weights[self._todo & ~solved].sum()) / gone
+            text += f", {elapsed / solved.sum():.3g} s/case, {duration(left)} left"
+        return text
+
+    def clear(self) -> None:
+        """Leave the terminal with an empty line."""
+        if self._live:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
