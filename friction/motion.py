@@ -1,0 +1,89 @@
+"""Slip motions: the twists for which a contact's friction is asked.
+
+A 3-D twist is ``[v_x, v_y, omega_z]`` and a 6-D twist ``[v, omega]``, both of the origin of the contact frame. Only the
+direction of a twist matters. A translation has ``omega = 0``: no centre of rotation has to be sent to infinity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+SLIDE_X: FloatArray = np.array([1.0, 0.0, 0.0])
+SLIDE_Y: FloatArray = np.array([0.0, 1.0, 0.0])
+TURN_Z: FloatArray = np.array([0.0, 0.0, 1.0])
+for _twist in (SLIDE_X, SLIDE_Y, TURN_Z):
+    _twist.flags.writeable = False
+
+
+def cor_twists(cor: ArrayLike) -> FloatArray:
+    """Unit rotations about axes along z through the centres of rotation, ``[c_y, -c_x, 1]``.
+
+    The opposite sense gives the opposite wrench, so one sense is enough.
+
+    Parameters
+    ----------
+    cor : (m, 2) array
+        Centres of rotation in the contact frame [m].
+
+    Returns
+    -------
+    (m, 3) array
+        Twists [m/s, rad/s].
+
+    Examples
+    --------
+    >>> cor_twists([[0.1, 0.2]])
+    array([[ 0.2, -0.1,  1. ]])
+    """
+    c = np.asarray(cor, float).reshape(-1, 2)
+    return np.column_stack([c[:, 1], -c[:, 0], np.ones(len(c))])
+
+
+def cor_grid(n: int, rho: float) -> FloatArray:
+    """Twists of the paper's grid: ``n x n`` centres of rotation on the square with side ``10 rho``, ``(n * n, 3)``.
+
+    The grid samples torques above half the largest one with about one motion in a hundred; errors of limit surfaces
+    should be judged on `fibonacci_twists`.
+    """
+    c = np.linspace(-5 * rho, 5 * rho, n)
+    return cor_twists(np.stack(np.meshgrid(c, c, indexing="ij"), axis=-1))
+
+
+def fibonacci_twists(K: int, rho: float) -> FloatArray:
+    """``K`` twists with ``(v_x, v_y, rho omega)`` spread evenly over the unit hemisphere ``omega > 0``, ``(K, 3)``."""
+    i = np.arange(K)
+    z = (i + 0.5) / K
+    phi = i * np.pi * (3 - np.sqrt(5))
+    r = np.sqrt(1 - z**2)
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z / rho])
+
+
+def screw_twist(axis: ArrayLike, point: ArrayLike, pitch: ArrayLike) -> FloatArray:
+    """Unit screws as 6-D twists: ``omega = e``, ``v = h e + e x (O - q)``; an infinite pitch is the translation ``e``.
+
+    Parameters
+    ----------
+    axis : (m, 3) or (3,) array
+        Directions ``e`` of any length but zero [-].
+    point : (m, 3) or (3,) array
+        Points ``q`` on the axes [m].
+    pitch : (m,) array or float
+        Advance per angle ``h`` [m/rad]; ``inf`` for a translation.
+
+    Returns
+    -------
+    (m, 6) array
+        ``[v, omega]`` of the origin [m/s, rad/s].
+    """
+    e = np.atleast_2d(np.asarray(axis, float))
+    length = np.linalg.norm(e, axis=1, keepdims=True)
+    if (length == 0).any():
+        raise ValueError(f"axis[{int(np.argmin(length))}] is zero: a screw needs a direction")
+    e = e / length
+    q, h = np.broadcast_to(np.asarray(point, float), e.shape), np.broadcast_to(np.asarray(pitch, float), len(e))
+    straight = np.isinf(h)[:, None]
+    v = np.where(straight, e, np.where(straight, 0.0, h[:, None]) * e - np.cross(e, q))
+    return np.hstack([v, np.where(straight, 0.0, e)])

@@ -1,0 +1,141 @@
+"""Contact patch: the faces in contact, each with its place, size, orientation and pressure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class NoContactError(ValueError):
+    """The patch carries no normal force, so nothing can be said about its friction."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPatch:
+    """Faces of a contact area in its final, deformed configuration.
+
+    Every array is checked, copied and made read-only; normals are scaled to unit length. All normals point to the
+    same side of the patch. Faces without pressure have no effect on any quantity.
+
+    Parameters
+    ----------
+    centroid : (n, 3) array
+        Centres of the faces ``r`` [m].
+    area : (n,) array
+        Areas ``a >= 0`` [m^2].
+    normal : (n, 3) array
+        Normals ``n`` of any length but zero [-].
+    pressure : (n,) array
+        Contact pressures ``p >= 0``, normal to the faces [Pa].
+    corners : (n, k, 3) array, optional
+        Corners of the faces in order around each [m]; a triangle among quadrilaterals repeats its last corner.
+
+    Raises
+    ------
+    NoContactError
+        If the total normal force is zero.
+    ValueError
+        If an array has the wrong shape, a value that is not finite, a negative pressure or area, or a zero normal.
+
+    Examples
+    --------
+    >>> patch = ContactPatch([[0, 0, 0]], [2e-4], [[0, 0, 3]], [5e3])
+    >>> patch.normal, patch.load
+    (array([[0., 0., 1.]]), array([1.]))
+    """
+
+    centroid: FloatArray
+    area: FloatArray
+    normal: FloatArray
+    pressure: FloatArray
+    corners: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Check every field, then freeze the arrays."""
+        n = len(np.atleast_1d(np.asarray(self.pressure, float)))
+        checked = {
+            "centroid": _finite("centroid", self.centroid, (n, 3)),
+            "area": _not_negative("area", self.area, n),
+            "normal": _unit(_finite("normal", self.normal, (n, 3))),
+            "pressure": _not_negative("pressure", self.pressure, n),
+        }
+        if self.corners is not None:
+            k = np.shape(self.corners)[1] if np.ndim(self.corners) == 3 else 4
+            checked["corners"] = _finite("corners", self.corners, (n, max(k, 3), 3))
+        for name, array in checked.items():
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if not self.load.any():
+            raise NoContactError(
+                f"the {n} faces of the patch carry zero normal force: press further, or leave this patch out"
+            )
+
+    @property
+    def load(self) -> FloatArray:
+        """Normal force ``p a`` on each face, ``(n,)`` [N]."""
+        return self.pressure * self.area
+
+    @property
+    def loaded(self) -> ContactPatch:
+        """The same patch without the faces that carry no force."""
+        keep = self.load > 0
+        if keep.all():
+            return self
+        corners = None if self.corners is None else self.corners[keep]
+        return ContactPatch(self.centroid[keep], self.area[keep], self.normal[keep], self.pressure[keep], corners)
+
+
+def moved(patch: ContactPatch, rotation: ArrayLike, translation: ArrayLike) -> ContactPatch:
+    """Patch after the rigid motion ``x -> rotation @ x + translation``.
+
+    Parameters
+    ----------
+    patch : ContactPatch
+        ``n`` faces in any frame.
+    rotation : (3, 3) array
+        Right-handed rotation [-].
+    translation : (3,) array
+        Displacement after the rotation [m].
+    """
+    R, t = np.asarray(rotation, float), np.asarray(translation, float)
+    if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-9) or np.linalg.det(R) < 0:
+        raise ValueError(f"rotation must be an orthonormal, right-handed (3, 3) matrix, found {R.tolist()}")
+    corners = None if patch.corners is None else patch.corners @ R.T + t
+    return replace(patch, centroid=patch.centroid @ R.T + t, normal=patch.normal @ R.T, corners=corners)
+
+
+def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    array = np.array(value, dtype=float)
+    if array.shape != shape:
+        raise ValueError(
+            f"{name} has shape {array.shape}, expected {shape}: every array needs one row per face "
+            f"(the patch has as many faces as pressures, {shape[0]})"
+        )
+    if not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(
+            f"{name}{list(index)} is {array[index]}: every value must be finite; repair or drop face {index[0]}"
+        )
+    return array
+
+
+def _not_negative(name: str, value: ArrayLike, n: int) -> FloatArray:
+    array = _finite(name, np.atleast_1d(np.asarray(value, float)), (n,))
+    if (array < 0).any():
+        i = int(np.argmax(array < 0))
+        raise ValueError(f"{name}[{i}] is {array[i]}: it must not be negative; clip it to 0 or repair face {i}")
+    return array
+
+
+def _unit(normal: FloatArray) -> FloatArray:
+    # Dividing by the largest component first keeps the squares of very long and very short normals in range.
+    largest = np.abs(normal).max(axis=1, keepdims=True, initial=0.0)
+    if (largest == 0).any():
+        i = int(np.argmax(largest == 0))
+        raise ValueError(f"normal[{i}] is zero: a face needs a direction; recompute or drop face {i}")
+    scaled = normal / largest
+    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
