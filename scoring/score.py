@@ -1,0 +1,114 @@
+"""Score of a grasp by two antipodal contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+
+from scoring.epsilon import epsilon_l1, epsilon_linf
+from scoring.volume import volume_l1, volume_linf
+
+
+class ScoreFlag(IntFlag):
+    """Why a score is zero or smaller than the forces suggest; flags add up."""
+
+    CLEAN = 0
+    NO_TORQUE = 1  # a contact carries no torque about its normal
+    NO_FORCE = 2  # a contact carries no friction along one of its axes
+
+
+@dataclass(frozen=True)
+class Score:
+    """Qualities of a grasp, for normal forces of one.
+
+    Parameters
+    ----------
+    quality : float
+        Volume of the L-infinity grasp wrench space [-].
+    quality_l1 : float
+        Volume of the L1 grasp wrench space [-].
+    epsilon : float
+        Radius of the largest ball around 0 in the L-infinity grasp wrench space [-].
+    flag : ScoreFlag
+        0 if nothing is unusual.
+    epsilon_l1 : float
+        The same radius in the L1 grasp wrench space [-].
+    """
+
+    quality: float
+    quality_l1: float
+    epsilon: float
+    flag: ScoreFlag
+    epsilon_l1: float
+
+
+def score(
+    contact1: Sequence[float],
+    contact2: Sequence[float],
+    distance: float,
+    object_length: float,
+    contact_length: float,
+    centre_of_mass: float = 0.0,
+) -> Score:
+    """Score of two ellipsoidal soft contacts that face each other.
+
+    Parameters
+    ----------
+    contact1, contact2 : (3,) sequence
+        Semi-axes ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the simplified surface
+        of Eq. (12), see `simplified_contact`.
+    distance : float
+        Distance of the contacts [m].
+    object_length : float
+        Length by which the arms of the contacts are divided [m].
+    contact_length : float
+        Length by which the torques about the normals are divided [m].
+    centre_of_mass : float
+        Its place on the line of the contacts, from the midpoint towards contact 2 [m]; only epsilon depends on it.
+
+    Examples
+    --------
+    >>> score((1, 1, 0.01), (1, 1, 0.01), distance=0.06, object_length=0.06, contact_length=0.05).flag
+    <ScoreFlag.CLEAN: 0>
+    """
+    a = _scaled("contact1", contact1, _positive("contact_length", contact_length))
+    b = _scaled("contact2", contact2, contact_length)
+    L = _positive("object_length", object_length)
+    d = _positive("distance", distance) / L
+    x = centre_of_mass / L
+    bodies = (*_volume_and_shadow(a), *_volume_and_shadow(b))
+    arms = -d / 2 - x, d / 2 - x
+    flag = ScoreFlag.CLEAN
+    if a[2] == 0 or b[2] == 0:
+        flag |= ScoreFlag.NO_TORQUE
+    if 0 in (*a[:2], *b[:2]):
+        flag |= ScoreFlag.NO_FORCE
+    return Score(
+        volume_linf(*bodies, d), volume_l1(*bodies, d), epsilon_linf(a, b, *arms), flag, epsilon_l1(a, b, *arms)
+    )
+
+
+def simplified_contact(mu: float, e_n: float) -> tuple[float, float, float]:
+    """Semi-axes ``mu (1, 1, e_n)`` of Eq. (12), the simplified limit surface, too large for curved contacts."""
+    return mu, mu, mu * e_n
+
+
+def _scaled(name: str, contact: Sequence[float], length: float) -> tuple[float, float, float]:
+    f_x, f_y, tau_z = map(float, contact)
+    for label, value in (("f_x", f_x), ("f_y", f_y), ("tau_z", tau_z)):
+        if not 0 <= value < math.inf:
+            raise ValueError(f"{name}: {label} is {value}; semi-axes must be finite and not negative")
+    return f_x, f_y, tau_z / length
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0 < value < math.inf:
+        raise ValueError(f"{name} is {value}: it must be a positive length in metres")
+    return float(value)
+
+
+def _volume_and_shadow(axes: tuple[float, float, float]) -> tuple[float, float]:
+    f_x, f_y, tau_z = axes
+    return 4 / 3 * math.pi * f_x * f_y * tau_z, math.pi * f_x * f_y
