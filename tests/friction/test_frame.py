@@ -1,0 +1,144 @@
+"""Contact frames: iteration for origin and normal, its exceptions, and what is flagged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friction.frame import FrameFlag, contact_frame, contact_length, in_frame
+from friction.patch import NoContactError, moved
+from friction.wrench import friction_limits
+from tests.generators import (
+    bump,
+    cap_polar,
+    cyl_mesh,
+    cylinder_grid,
+    disc_polar,
+    grid_mesh,
+    lcg,
+    mesh_patch,
+    points_patch,
+    rect_grid,
+)
+
+X = [1.0, 0.0, 0.0]
+
+
+def some_rotation(seed):
+    return np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0] @ np.diag([1, 1, 1])
+
+
+def test_a_vertical_line_through_a_vertex_meets_all_its_faces():
+    patch = mesh_patch(grid_mesh(4, 4, 1, 1, lambda x, y: -(x**2 + y**2) / 2))
+    frame = contact_frame(patch, X)
+    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-12)
+    assert frame.flag == FrameFlag.CLEAN
+
+
+def test_the_frame_moves_with_the_patch():
+    patch = mesh_patch(grid_mesh(7, 6, 1, 1, bump), lambda r: 1 + 0.3 * r[:, 0] + 0.2 * r[:, 1])
+    frame = contact_frame(patch, X)
+    R = some_rotation(3)
+    R[:, 2] *= np.sign(np.linalg.det(R))
+    there = contact_frame(moved(patch, R, [0.1, 0.2, 0.3]), R @ X)
+    np.testing.assert_allclose(there.origin, R @ frame.origin + [0.1, 0.2, 0.3], atol=1e-12)
+    np.testing.assert_allclose(there.axes, frame.axes @ R.T, atol=1e-12)
+    one = friction_limits(in_frame(patch, frame), 0.5)
+    two = friction_limits(in_frame(moved(patch, R, [0.1, 0.2, 0.3]), there), 0.5)
+    assert two.tau_z == pytest.approx(one.tau_z, rel=1e-12)
+
+
+def test_the_patch_in_its_frame_has_its_pressure_on_the_normal():
+    patch = mesh_patch(cyl_mesh(1, 1.0, 2, 16, 16), lambda r: 1 + 0.8 * r[:, 1])
+    local = in_frame(patch, contact_frame(patch, X))
+    cop = local.load @ local.centroid / local.load.sum()
+    np.testing.assert_allclose(cop[:2], 0, atol=1e-14)
+    np.testing.assert_allclose(local.corners.mean(axis=1), local.centroid, atol=1e-14)
+
+
+def test_the_normal_of_a_skew_cylinder_is_within_half_a_facet():
+    """Exact normal direction 15.8376 degrees; a facet's normal differs by less than half the facet's angle."""
+    for n in (8, 16, 32, 64, 128):
+        patch = mesh_patch(cyl_mesh(1, np.pi / 3, 2, n, 4), lambda r: 1 + 0.8 * r[:, 1])
+        N = contact_frame(patch, X).axes[2]
+        assert abs(np.degrees(np.arctan2(N[1], N[2])) - 15.8376) < 60 / n + 2
+
+
+def test_a_hole_under_the_centre_of_pressure_takes_the_nearest_faces():
+    patch = mesh_patch(grid_mesh(5, 5, 1, 1))
+    ring = replace(patch, pressure=(np.linalg.norm(patch.centroid, axis=1) > 0.1).astype(float))
+    frame = contact_frame(ring, X)
+    assert frame.flag == FrameFlag.HOLE
+    np.testing.assert_allclose(frame.origin, 0, atol=1e-15)
+    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
+
+
+def test_without_corners_the_nearest_face_stands_in():
+    frame = contact_frame(cylinder_grid(1, 1, 2, 17, 17), X)
+    assert frame.flag == FrameFlag.NO_CORNERS
+    np.testing.assert_allclose(frame.origin, 0, atol=1e-15)
+    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
+
+
+def test_a_cycle_between_faces_ends_with_their_mean_normal():
+    """A roof between two raised shelves, pressed above its ridge: each side's normal leads to the other side."""
+
+    def strip(x0, z0, x1, z1):
+        return [[x0, -1, z0], [x1, -1, z1], [x1, 1, z1], [x0, 1, z0]]
+
+    roof = [strip(-1, -0.5, 0, 0), strip(0, 0, 1, -0.5)]
+    shelves = [strip(-3, 1, -2, 1), strip(2, 1, 3, 1)]
+    patch = replace(mesh_patch(roof + shelves), pressure=np.array([1.0, 1.01, 1.0, 1.0]))
+    frame = contact_frame(patch, X)
+    assert frame.flag == FrameFlag.CYCLE
+    np.testing.assert_allclose(frame.axes[2], [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(frame.origin[:2], frame.centre_of_pressure[:2], atol=1e-15)
+    assert frame.origin[2] == pytest.approx(-0.5 * frame.origin[0], rel=1e-12)
+
+
+def test_random_bumps_always_give_a_frame():
+    """The iteration ends for every mesh, and its origin lies on the line of pressure."""
+    for seed in range(60):
+        draw = lcg(seed)
+        height = np.array([[0.3 * next(draw) for _ in range(7)] for _ in range(7)])
+        corners = grid_mesh(6, 6, 1, 1)
+        corners[..., 2] = height[
+            np.rint((corners[..., 0] + 1) * 3).astype(int), np.rint((corners[..., 1] + 1) * 3).astype(int)
+        ]
+        frame = contact_frame(mesh_patch(corners), X)
+        arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
+        np.testing.assert_allclose(frame.axes @ frame.axes.T, np.eye(3), atol=1e-14)
+        assert np.abs(arm[:2]).max() < 1e-12
+        assert frame.iterations < 10
+
+
+def test_flipped_normals_are_found_with_and_without_corners():
+    patch = mesh_patch(cyl_mesh(1, 0.6, 2, 12, 12))
+    sign = np.where(np.arange(len(patch.load)) % 5 == 0, -1, 1)[:, None]
+    flipped = replace(patch, normal=sign * patch.normal)
+    assert contact_frame(flipped, X).flag & FrameFlag.ORIENTATION
+    assert contact_frame(replace(flipped, corners=None), X).flag & FrameFlag.ORIENTATION
+    rewound = mesh_patch(np.where(sign[:, None] > 0, patch.corners, patch.corners[:, ::-1]))
+    assert contact_frame(rewound, X).flag & FrameFlag.ORIENTATION
+
+
+def test_overhanging_faces_are_counted_and_no_flipped_ones_seen():
+    """A cap with the half angle 120 degrees: a third of its area looks back, (cos 90 - cos 120) / (1 - cos 120)."""
+    frame = contact_frame(cap_polar(1, np.radians(120), 60, 40), X)
+    assert frame.flag == FrameFlag.OVERHANG | FrameFlag.NO_CORNERS
+    assert frame.overhang_share == pytest.approx(1 / 3, rel=1e-12)
+    assert frame.overhang_count == 15 * 40
+
+
+def test_contact_length_is_the_longer_side_of_the_rectangle():
+    assert contact_length(mesh_patch(grid_mesh(4, 4, 1.0, 0.6))) == pytest.approx(2.0)
+    assert contact_length(rect_grid(0.6, 2.0, 3, 10)) == pytest.approx(2.0)
+    assert contact_length(disc_polar(1, 60, 120)) == pytest.approx(2.0, rel=0.02)
+
+
+def test_what_has_no_frame_is_an_error():
+    patch = points_patch([[0, 0], [1, 0]], [1, 1], [[0, 0, 1], [0, 0, -1]])
+    with pytest.raises(NoContactError, match="normals of the patch cancel"):
+        contact_frame(patch, X)
+    with pytest.raises(ValueError, match="parallel to the contact normal"):
+        contact_frame(points_patch([[0, 0]], [1]), [0, 0, 1])

@@ -1,0 +1,82 @@
+"""A patch is checked once, when it is made."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friction.patch import ContactPatch, NoContactError, moved
+from friction.wrench import friction_limits
+from tests.generators import grid_mesh, lcg_patch, mesh_patch
+
+
+@pytest.mark.parametrize(
+    ("name", "index", "value", "match"),
+    [
+        ("centroid", (2, 1), np.nan, r"centroid\[2, 1\] is nan.*face 2"),
+        ("area", (4,), np.inf, r"area\[4\] is inf"),
+        ("normal", (1, 0), -np.inf, r"normal\[1, 0\] is -inf"),
+        ("pressure", (3,), np.nan, r"pressure\[3\] is nan"),
+        ("pressure", (3,), -1.0, r"pressure\[3\] is -1.0: it must not be negative.*clip"),
+        ("area", (0,), -2e-4, r"area\[0\] is -0.0002: it must not be negative"),
+        ("normal", (5,), 0.0, r"normal\[5\] is zero"),
+    ],
+)
+def test_a_bad_value_is_named_with_its_place_and_the_remedy(name, index, value, match):
+    patch = lcg_patch(1, 10)
+    array = getattr(patch, name).copy()
+    array[index] = value
+    with pytest.raises(ValueError, match=match):
+        replace(patch, **{name: array})
+
+
+@pytest.mark.parametrize("name", ["centroid", "area", "normal"])
+def test_a_missing_row_is_an_error(name):
+    patch = lcg_patch(1, 10)
+    with pytest.raises(ValueError, match=f"{name} has shape"):
+        replace(patch, **{name: getattr(patch, name)[:-1]})
+
+
+def test_corners_need_three_per_face():
+    patch = lcg_patch(1, 10)
+    with pytest.raises(ValueError, match="corners has shape"):
+        replace(patch, corners=np.zeros((10, 2, 3)))
+    with pytest.raises(ValueError, match="corners has shape"):
+        replace(patch, corners=np.zeros((10, 12)))
+
+
+def test_no_normal_force_is_an_error_of_its_own_kind():
+    patch = lcg_patch(1, 10)
+    with pytest.raises(NoContactError, match="zero normal force"):
+        replace(patch, pressure=np.zeros(10))
+    with pytest.raises(NoContactError, match="zero normal force"):
+        ContactPatch(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
+
+
+def test_a_patch_cannot_be_changed():
+    patch = lcg_patch(1, 10)
+    with pytest.raises(ValueError, match="read-only"):
+        patch.pressure[0] = 1.0
+    source = np.ones(3)
+    ContactPatch(np.eye(3), source, np.eye(3), source)
+    source[0] = 2.0
+
+
+@pytest.mark.parametrize("length", [4.0, 1e-200, 1e200])
+def test_only_the_direction_of_a_normal_counts(length):
+    patch = lcg_patch(2, 50)
+    scaled = replace(patch, normal=length * patch.normal)
+    np.testing.assert_allclose(scaled.normal, patch.normal, rtol=1e-15)
+    if length == 4.0:
+        assert friction_limits(scaled, 1.0) == friction_limits(patch, 1.0)
+
+
+def test_a_rigid_motion_moves_corners_with_centres():
+    """The corners' mean stays the centre, and the winding stays the normal's."""
+    patch = mesh_patch(grid_mesh(3, 2, 1, 1, lambda x, y: x * y))
+    c, s = np.cos(0.7), np.sin(0.7)
+    there = moved(patch, [[c, -s, 0], [s, c, 0], [0, 0, 1]], [1, 2, 3])
+    np.testing.assert_allclose(there.corners.mean(axis=1), there.centroid, atol=1e-15)
+    np.testing.assert_allclose(mesh_patch(there.corners).normal, there.normal, atol=1e-15)
+    with pytest.raises(ValueError, match="right-handed"):
+        moved(patch, np.diag([1, 1, -1]), [0, 0, 0])

@@ -1,0 +1,130 @@
+"""Ellipsoids as limit surfaces, and the exact body they stand for."""
+
+import numpy as np
+import pytest
+
+from friction.motion import fibonacci_twists
+from friction.wrench import friction_limits, friction_support, friction_wrench
+from lsfit.body import body_volume, hull_volume, shadow_area
+from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
+from lsfit.misfit import misfit
+from lsfit.samples import normalised_samples, sample_rank
+from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
+
+AXES = np.array([0.8, 0.6, 0.15])
+
+
+def on_the_surface(K=200):
+    """Wrenches of the ellipsoid with `AXES` and the unit normals there."""
+    t = fibonacci_twists(K, 1.0)
+    return t * AXES**2 / np.linalg.norm(t * AXES, axis=1, keepdims=True), t
+
+
+def test_an_ellipsoid_fits_itself():
+    W, T = on_the_surface()
+    ellipsoid = Ellipsoid(AXES)
+    np.testing.assert_allclose(ellipsoid.value(W), 1, rtol=1e-14)
+    np.testing.assert_allclose(misfit(ellipsoid, W, T), 0, atol=1e-13)
+    np.testing.assert_allclose(ellipsoid.support(T), (W * T).sum(axis=1), rtol=1e-14)
+    assert all(ellipsoid.holds(w) for w in W * (1 - 1e-9))
+    assert not any(ellipsoid.holds(w) for w in W * (1 + 1e-9))
+
+
+def test_the_gradient_is_the_derivative_of_the_value():
+    ellipsoid, W = Ellipsoid(AXES), np.random.default_rng(0).normal(size=(20, 3))
+    step = 1e-6 * np.eye(3)
+    slope = np.stack([(ellipsoid.value(W + h) - ellipsoid.value(W - h)) / 2e-6 for h in step], axis=1)
+    np.testing.assert_allclose(ellipsoid.gradient(W), slope, rtol=1e-7, atol=1e-7)
+
+
+def test_errors_of_a_swollen_ellipsoid():
+    """Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1."""
+    W, T = on_the_surface()
+    errors = misfit(Ellipsoid(1.1 * AXES), W, T)
+    np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_axis_that_carries_nothing_is_zero_and_never_infinite(axis):
+    axes = AXES.copy()
+    axes[axis] = 0
+    flat = Ellipsoid(axes)
+    assert (flat.rank, flat.volume) == (2, 0)
+    inside, outside = 0.1 * axes, 0.1 * axes + 1e-9 * np.eye(3)[axis]
+    assert flat.holds(inside)
+    assert not flat.holds(outside)
+    assert np.isfinite(flat.support(np.eye(3))).all()
+    assert np.isfinite(flat.gradient(inside)).all()
+
+
+def test_a_single_face_has_rank_two():
+    limits = friction_limits(points_patch([[0, 0]], [2.0]), 0.5)
+    assert three_motion_ellipsoid(limits.f_x, limits.f_y, limits.tau_z, rho=0.01).rank == 2
+    assert three_motion_ellipsoid(1.0, 1.0, 1e-17, rho=0.01).rank == 2
+    assert three_motion_ellipsoid(1.0, 1.0, 1e-9, rho=0.01).rank == 3
+
+
+@pytest.mark.parametrize("axes", [[1, 1], [1, 1, -1], [1, np.nan, 1], [1, 1, np.inf]])
+def test_semi_axes_are_lengths(axes):
+    with pytest.raises(ValueError, match="semi_axes is"):
+        Ellipsoid(axes)
+
+
+def samples(patch, K, rho=2.0):
+    twist, S = fibonacci_twists(K, rho), friction_limits(patch, 1.0).S
+    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, S, rho)
+
+
+@pytest.mark.parametrize(
+    ("patch", "ratio"), [(disc_polar(1, 40, 96), 1.120), (cylinder_grid(1, np.pi / 3, 2, 48, 48), 1.123)]
+)
+def test_three_motions_enclose_too_much(patch, ratio):
+    """The ellipsoid's volume over the exact one, as found by an independent implementation."""
+    V = body_volume(samples(patch, 500)[0], samples(patch, 2000)[0])
+    ellipsoid = Ellipsoid(np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2])
+    assert ellipsoid.volume / V == pytest.approx(ratio, abs=1e-3)
+
+
+def test_every_wrench_is_inside_the_box_of_the_maxima():
+    patch = lcg_patch(6, 50)
+    W, T = samples(patch, 300)
+    limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
+    assert (np.abs(W) <= limits * (1 + 1e-13)).all()
+    assert ((W * T).sum(axis=1) > 0).all()
+
+
+def test_hulls_approach_the_body_with_order_one_in_the_samples():
+    body = Ellipsoid(AXES)
+    missing = [1 - hull_volume(on_the_surface(K)[0]) / body.volume for K in (500, 1000, 2000, 4000)]
+    np.testing.assert_allclose(np.log2(np.divide(missing[:-1], missing[1:])), 1, atol=0.05)
+    assert body_volume(on_the_surface(2000)[0], on_the_surface(8000)[0]) == pytest.approx(body.volume, rel=5e-6)
+    assert hull_volume(on_the_surface()[0] * [1, 1, 0]) == 0
+    with pytest.raises(ValueError, match="must be larger"):
+        body_volume(np.eye(3), np.eye(3))
+
+
+def test_shadow_of_an_ellipse_and_of_a_curved_patch():
+    phi = 2 * np.pi * np.arange(64) / 64
+    circle = np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])
+    assert shadow_area(Ellipsoid(AXES).support(circle)) == pytest.approx(Ellipsoid(AXES).shadow_area, rel=1e-12)
+    assert shadow_area(Ellipsoid(AXES).support(circle)[1:]) != pytest.approx(Ellipsoid(AXES).shadow_area, rel=1e-4)
+    patch = disc_polar(1, 4, 8)
+    assert shadow_area(friction_support(patch, circle, 0.5)) == pytest.approx(
+        np.pi * (0.5 * patch.load.sum()) ** 2, rel=1e-12
+    )
+
+
+def test_samples_do_not_depend_on_the_size_of_the_patch():
+    for R in (1e-6, 1.0):
+        W, _ = samples(disc_polar(R, 8, 16), 50, rho=2 * R)
+        np.testing.assert_allclose(W, samples(disc_polar(3.0, 8, 16), 50, rho=6.0)[0], atol=1e-14)
+
+
+def test_rank_of_samples_and_bad_scales():
+    assert sample_rank(on_the_surface()[0]) == 3
+    assert sample_rank(on_the_surface()[0] * [1, 0, 1]) == 2
+    assert sample_rank(np.zeros((4, 3))) == 0
+    with pytest.raises(ValueError, match="positive force and length"):
+        normalised_samples(np.eye(3), np.eye(3), 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"twist\[1\] is zero"):
+        normalised_samples(np.eye(3)[:2], [[1, 0, 0], [0, 0, 0]], 1.0, 1.0)
