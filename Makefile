@@ -45,12 +45,11 @@ map: setup
 	@echo '$(RUN)'
 	@$(RUN) || [ $$? = $(SOME_FAILED) ]
 	@$(BIN)/softjaw report $(RESULT) -o $(PAGE)
-	@$(BIN)/softjaw view $(RESULT) --screenshot $(PICTURE)
 	@$(BIN)/softjaw show $(RESULT) --top 5
 	@echo
-	@echo 'result   $(RESULT)    every number, with units and definitions'
-	@echo 'report   $(PAGE)   open it in a browser'
-	@echo 'picture  $(PICTURE)'
+	@echo 'result   $(RESULT)   every number, with units and definitions'
+	@echo 'report   $(PAGE)  one page with the picture, maps and definitions; open it in a browser'
+	@if [ -f $(PICTURE) ]; then echo 'picture  $(PICTURE)'; fi
 
 test: setup
 	$(LIMIT) 12m $(BIN)/python -m pytest -q
