@@ -1,0 +1,284 @@
+"""Analytic objects: derivatives, distances with a closed form, shapes of profiles, the first touch."""
+
+import numpy as np
+import pytest
+
+from fem.objects import Box, EllipticCylinder, Plane, Revolution, Sphere
+from fem.pose import Pose
+from fem.touch import NoContactError, first_touch
+
+MM = 1e-3
+BOTTLE = MM * np.array(
+    [[0, 0], [0, 15], [0, 28], [3, 33], [20, 33], [50, 33], [80, 33], [100, 25], [115, 14], [125, 12], [140, 12],
+     [150, 12]]
+)
+SHAPES = {
+    "plane": Plane(0.02),
+    "sphere": Sphere(0.03),
+    "elliptic cylinder": EllipticCylinder(0.03, 0.012, 0.1),
+    "box": Box((0.05, 0.06, 0.07), 0.008),
+    "sharp box": Box((0.05, 0.06, 0.07), 0.0),
+    "bottle": Revolution(BOTTLE),
+    "open tube": Revolution([[0, 0.03], [0.1, 0.03]]),
+    "spindle": Revolution([[0, 0], [0.05, 0.03], [0.1, 0]]),
+}
+X_AXIS, Z_AXIS = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
+
+
+@pytest.fixture(params=SHAPES)
+def shape(request):
+    return SHAPES[request.param]
+
+
+def around(shape, n=300, low=-3e-3, high=20e-3):
+    """Points in a layer about the surface."""
+    rng = np.random.default_rng(5)
+    lower, upper = shape.bounds
+    x = rng.uniform(lower - high, upper + high, (20 * n, 3))
+    g = shape.gap(x)[0]
+    return x[(g > low) & (g < high)][:n]
+
+
+def differences(f, x, h):
+    """Central differences of f, last axis = direction."""
+    return np.stack([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(3)], axis=-1)
+
+
+def pose(origin, approach, long_side=Z_AXIS):
+    z = np.asarray(approach, dtype=float)
+    return Pose(np.stack([long_side, np.cross(z, long_side), z], axis=1), np.asarray(origin, dtype=float))
+
+
+def face(nx=11, ny=7, length=0.05, width=0.022):
+    x, y = np.meshgrid(np.linspace(-length / 2, length / 2, nx), np.linspace(-width / 2, width / 2, ny), indexing="ij")
+    return np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+
+
+def test_normal_is_the_gradient_and_has_unit_length(shape):
+    x = around(shape)
+    _, normal, _ = shape.gap(x)
+    assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-14
+    assert np.abs(differences(lambda y: shape.gap(y)[0], x, 1e-6) - normal).max() < 2e-6
+
+
+def test_hessian_is_the_derivative_of_the_normal(shape):
+    x, h = around(shape), 1e-7
+    _, normal, H = shape.gap(x)
+    D = differences(lambda y: shape.gap(y)[1], x, h)
+    error = np.abs(D - H).max(axis=(1, 2))
+    # where a flat side meets its rounding, the curvature jumps between the two points of the difference
+    assert np.mean(error > 1e-5 * np.abs(H).max() + 1e-4) < 0.01
+    assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-12 * max(1, np.abs(H).max())
+    assert np.abs(np.einsum("nij,nj->ni", H, normal)).max() < 1e-12 * max(1, np.abs(H).max())
+
+
+def test_a_step_along_the_normal_changes_the_gap_by_its_length(shape):
+    x = around(shape, low=0, high=5e-3)
+    g, normal, _ = shape.gap(x)
+    assert shape.gap(x + 1e-3 * normal)[0] == pytest.approx(g + 1e-3, abs=1e-14)
+    assert np.abs(shape.gap(x - g[:, None] * normal)[0]).max() < 1e-15
+
+
+def test_surface_lies_on_the_object_and_is_drawn_from_outside(shape):
+    points, triangles = shape.surface()
+    if isinstance(shape, (Plane, EllipticCylinder)):
+        inner = np.abs(points[:, 2]) < 0.999 * shape.bounds[1, 2]  # a slab's and a cylinder's ends are only drawn
+        inner &= np.abs(points[:, 1]) < 0.099
+    else:
+        inner = np.ones(len(points), dtype=bool)
+    assert np.abs(shape.gap(points[inner])[0]).max() < 1e-12
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    facing = np.einsum("ij,ij->i", np.cross(b - a, c - a), shape.gap((a + b + c) / 3)[1])
+    large = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12
+    assert np.mean(facing[large & inner[triangles].all(axis=1)] > 0) == 1
+    assert 500 < len(triangles) < 12_000
+    lower, upper = shape.bounds
+    assert (points >= lower - 1e-12).all()
+    assert (points <= upper + 1e-12).all()
+
+
+def test_near_is_the_shape_itself(shape):
+    assert shape.near(pose([0.2, 0, 0], -X_AXIS), np.zeros(3), np.ones(3)) is shape
+
+
+def test_no_value_is_nan_at_centres_and_axes(shape):
+    x = np.array([[0, 0, 0], [0, 0, 0.02], [1e-300, 0, 0.01], [0.01, 0, 0], [0, 0.005, 0], [0, 0, -1], [1e3, 1e3, 1e3]])
+    for value in shape.gap(x):
+        assert np.isfinite(value).all()
+
+
+def test_distances_with_a_closed_form():
+    x = np.array([[0.05, 0, 0], [0, 0, -0.01], [0.03, 0.04, 0]])
+    assert Sphere(0.03).gap(x)[0] == pytest.approx([0.02, -0.02, 0.02], abs=1e-16)
+    assert Plane(0.02).gap(x)[0] == pytest.approx([0.04, -0.01, 0.02], abs=1e-16)
+    corner = np.array([[0.02 + 0.003, 0.03 + 0.004, 0], [0.03, 0.0, 0.0], [0.02, 0, 0], [0, 0, 0]])
+    box = Box((0.05, 0.07, 0.2), 0.005)  # the shrunken box has the half sides 20, 30 and 95 mm
+    assert box.gap(corner)[0] == pytest.approx([0.0, 0.005, -0.005, -0.025], abs=1e-16)
+    tube = SHAPES["open tube"].gap(np.array([[0.04, 0, 0.05], [0, 0.01, 0.05]]))[0]
+    assert tube == pytest.approx([0.01, -0.02], abs=1e-15)
+
+
+@pytest.mark.parametrize(("symmetry", "shape"), [
+    (0, Sphere(0.03)), (0, EllipticCylinder(0.02, 0.02, 0.1)), (2, EllipticCylinder(0.02, 0.03, 0.1)), (2, Plane(0.01)),
+    (4, Box((0.05, 0.05, 0.1), 0.01)), (2, Box((0.05, 0.06, 0.1), 0.01)), (0, SHAPES["bottle"]),
+])  # fmt: skip
+def test_axis_symmetry_is_a_symmetry_of_the_gap(symmetry, shape):
+    assert shape.axis_symmetry == symmetry
+    t = 2 * np.pi / (symmetry or 7.3)
+    x = around(shape)
+    turned = x @ np.array([[np.cos(t), np.sin(t), 0], [-np.sin(t), np.cos(t), 0], [0, 0, 1]])
+    assert shape.gap(turned)[0] == pytest.approx(shape.gap(x)[0], abs=1e-14)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.4, 0.9999, 1.0, 2.5, 20.0])
+@pytest.mark.parametrize("share", [-0.999, -0.5, 0.0, 1e-9, 0.3, 100.0])
+def test_ellipse_distance_is_exact_out_to_the_medial_axis(ratio, share):
+    """c(t) + d n(t) has distance d, from d = -(distance to the long axis) on, where the foot stops being closest."""
+    a, b = 0.03, 0.03 * ratio
+    t = np.concatenate([np.linspace(0, 2 * np.pi, 1001), [1e-9, 1e-5, np.pi / 2 - 1e-7]])
+    speed = np.hypot(b * np.cos(t), a * np.sin(t))
+    normal = np.stack([b * np.cos(t), a * np.sin(t)]) / speed
+    d = share * np.minimum(b * speed / a, a * speed / b)
+    x = np.stack([a * np.cos(t) + d * normal[0], b * np.sin(t) + d * normal[1], 0 * t], axis=1)
+    g, n, _ = EllipticCylinder(a, b, 0.1).gap(x)
+    assert np.abs(g - d).max() < 1e-13 * max(a, b, np.abs(d).max())
+    if share > -0.9:  # near the medial axis the direction is as sensitive as the foot
+        assert np.abs(n[:, :2].T - normal).max() < 1e-9
+
+
+def test_ellipse_near_its_axes_and_evolute_is_finite_and_below_every_other_distance():
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 2 * np.pi, 4001)
+    for ratio in (0.05, 0.5, 20.0):
+        a, b = 0.03, 0.03 * ratio
+        evolute = np.stack([(a * a - b * b) / a * np.cos(t) ** 3, (b * b - a * a) / b * np.sin(t) ** 3], axis=1)
+        axes = np.concatenate([np.outer(np.linspace(-2, 2, 401), e) * max(a, b) for e in np.eye(2)])
+        cusps = [evolute[::20], evolute[::20] * (1 + 1e-12)]
+        x = np.concatenate([*cusps, axes, axes + 1e-300, rng.normal(0, a, (300, 2))])
+        g, n, H = EllipticCylinder(a, b, 0.1).gap(np.column_stack([x, np.zeros(len(x))]))
+        assert np.isfinite(g).all()
+        assert np.isfinite(n).all()
+        assert np.isfinite(H).all()
+        brute = np.hypot(x[:, :1] - a * np.cos(t), x[:, 1:] - b * np.sin(t)).min(axis=1)
+        assert (np.abs(g) <= brute + 1e-15).all()
+        assert np.abs(np.abs(g) - brute).max() < 2e-3 * max(a, b)
+
+
+def test_straight_runs_of_a_profile_stay_straight():
+    z = MM * np.linspace(3, 80, 500)
+    x = np.column_stack([np.full(500, 33 * MM), np.zeros(500), z])
+    g, _, H = SHAPES["bottle"].gap(x)
+    assert np.abs(g).max() < 1e-16
+    assert np.abs(H[:, 2, 2]).max() == 0
+
+
+def test_profile_passes_its_points_and_has_continuous_curvature():
+    bottle = SHAPES["bottle"]
+    x = np.column_stack([BOTTLE[:, 1], 0 * BOTTLE[:, 0], BOTTLE[:, 0]])
+    assert np.abs(bottle.gap(x)[0]).max() < 1e-15
+    curve, s = bottle.curve, bottle.curve.breaks[1:-1]
+    for order, scale in ((0, 1e-12), (1, 1e-9), (2, 1e-6)):
+        jump = curve.derivative(s, order) - curve.derivative(s - 1e-13, order)
+        assert np.abs(jump).max() < scale
+    assert 1e-3 < bottle.smallest_radius < 5e-3  # the heel turns a right angle within 5 mm
+    assert bottle.overshoot < 3e-3
+
+
+def test_profile_of_a_circle_converges_to_the_sphere():
+    radius, errors = 0.03, []
+    x = around(Sphere(radius))
+    for n in (8, 16, 32):
+        t = np.linspace(0, np.pi, n + 1)
+        profile = radius * np.stack([-np.cos(t), np.sin(t)], axis=1)
+        profile[[0, -1], 1] = 0
+        body = Revolution(profile)
+        errors.append(np.abs(body.gap(x)[0] - Sphere(radius).gap(x)[0]).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders.min() > 3.5
+    assert errors[-1] < 1e-7
+    assert body.smallest_radius == pytest.approx(radius, rel=0.02)
+
+
+def test_revolution_distance_matches_a_search_along_the_profile():
+    rng = np.random.default_rng(2)
+    for name in ("bottle", "open tube", "spindle"):
+        shape = SHAPES[name]
+        lower, upper = shape.bounds
+        x = rng.uniform(lower - 0.05, upper + 0.05, (200, 3))
+        c = shape.curve.derivative(np.linspace(0, shape.curve.breaks[-1], 50_001))
+        brute = np.array([np.hypot(c[:, 0] - p[2], c[:, 1] - np.hypot(p[0], p[1])).min() for p in x])
+        assert np.abs(np.abs(shape.gap(x)[0]) - brute).max() < 1e-8
+
+
+def test_gap_grows_past_an_open_end():
+    """Beyond the rim of an open tube (top at 100 mm) a pad's points move away from the object, never into it."""
+    z = np.linspace(0.095, 0.15, 200)
+    g = SHAPES["open tube"].gap(np.column_stack([np.full(200, 0.03), 0 * z, z]))[0]
+    assert g.min() > -1e-15
+    assert (np.diff(g[z > 0.101]) > 0).all()
+    assert SHAPES["open tube"].bounds[:, 2] == pytest.approx([-0.002, 0.102])
+
+
+def test_corner_between_straight_runs_is_rounded():
+    can = Revolution([[0, 0], [0, 0.015], [0, 0.03], [0.05, 0.03], [0.1, 0.03], [0.1, 0.015], [0.1, 0]], rim=0.004)
+    x = np.array([[0.03, 0, 0.1], [0.03, 0, 0.05], [0.01, 0, 0.1], [0.03 - 0.004, 0, 0.1]])
+    g = can.gap(x)[0]
+    assert g[0] == pytest.approx((np.sqrt(2) - 1) * 0.004, rel=0.05)  # a circle's; the C2 rounding is close to one
+    assert np.abs(g[1:]).max() < 1e-15
+
+
+def test_profile_given_from_top_to_bottom_is_the_same_body():
+    x = around(SHAPES["bottle"])
+    assert Revolution(BOTTLE[::-1]).gap(x)[0] == pytest.approx(SHAPES["bottle"].gap(x)[0], abs=1e-13)
+
+
+@pytest.mark.parametrize(("profile", "message"), [
+    ([[0, 0.03]], "at least two pairs"),
+    ([[0, 0.03], [0.05, np.nan], [0.1, 0.03]], "point 2 is not a pair of finite numbers"),
+    ([[0, 0.03], [0.05, 0.0], [0.1, 0.03]], "point 2 has radius 0 m; only the two ends"),
+    ([[0, -0.03], [0.1, 0.03]], "point 1 has radius -0.03"),
+    ([[0, 0.03], [0, 0.03], [0.1, 0.03]], "points 1 and 2 are the same"),
+    ([[0, 0.03], [0, 0.02]], "encloses no area"),
+    ([[0, 0.03], [0.05, 0.03], [0.02, 0.01], [0.02, 0.06], [0.06, 0.04]], "crosses itself near z ="),
+    ([[0, 0.05], [0.02, 0.002], [0.05, 0.002], [0.07, 0.05]], "swings to the axis near z ="),
+])  # fmt: skip
+def test_impossible_profiles_are_refused(profile, message):
+    with pytest.raises(ValueError, match=message):
+        Revolution(profile)
+
+
+@pytest.mark.parametrize(("build", "message"), [
+    (lambda: Sphere(-0.03), "radius must be a positive length in metres, found -0.03"),
+    (lambda: EllipticCylinder(0.03, np.nan, 0.1), "b must be a positive"),
+    (lambda: Plane(0.0), "thickness must be"),
+    (lambda: Box((0.05, 0.05, 0.05), 0.03), "edge_radius must lie between 0 and half the smallest side, 0.025 m"),
+    (lambda: Box((0.05, 0.05), 0.03), "three lengths"),
+    (lambda: Revolution(BOTTLE, rim=0.0), "rim must be a positive"),
+])  # fmt: skip
+def test_impossible_dimensions_are_refused(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
+
+
+def test_first_touch_on_a_sphere_and_a_cylinder():
+    """A pad's centre meets the crest; a row of points beside the crest meets R - sqrt(R^2 - y^2) later."""
+    start = pose([0.2, 0, 0], -X_AXIS)
+    for shape in (Sphere(0.03), EllipticCylinder(0.03, 0.03, 0.1)):
+        assert first_touch(shape, start, face(), 0.5) == pytest.approx(0.17, abs=2e-12)
+        off = face(ny=2)  # two rows at y = +-11 mm; on the sphere its middle point, x = 0, is first
+        assert first_touch(shape, start, off, 0.5) == pytest.approx(0.2 - np.sqrt(0.03**2 - 0.011**2), abs=2e-12)
+
+
+def test_first_touch_catches_a_grazing_edge_and_says_when_the_pad_passes():
+    shape = Sphere(0.03)
+    graze = pose([0.2, 0, 0.03 + 0.025 - 1e-7], -X_AXIS)  # the pad's lower edge dips 0.1 um below the pole
+    expected = 0.2 - np.sqrt(0.03**2 - (0.03 - 1e-7) ** 2)
+    assert first_touch(shape, graze, face(), 0.5) == pytest.approx(expected, abs=1e-9)
+    with pytest.raises(NoContactError, match=r"passes the object: within 500 mm .* closer than 0.1 mm; check station"):
+        first_touch(shape, pose([0.2, 0, 0.0551], -X_AXIS), face(), 0.5)
+    with pytest.raises(NoContactError, match="passes the object"):
+        first_touch(shape, pose([0.2, 0, 0], X_AXIS), face(), 0.5)
+    with pytest.raises(NoContactError, match="starts 30 mm inside the object"):
+        first_touch(shape, pose([0, 0, 0], -X_AXIS), face(), 0.5)
+    with pytest.raises(NoContactError, match="passes the object"):
+        first_touch(shape, pose([0.2, 0, 0], -X_AXIS), face(), 0.169)
