@@ -1,0 +1,182 @@
+"""What a triangle mesh has to be before a distance to it means anything: closed, simple, turned outwards."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fem.crossing import crossing_pairs
+from fem.pose import FloatArray
+from fem.shape import IntArray
+
+MOST_TRIANGLES = 500_000
+MOST_PIECES = 50
+SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
+TOLERATED_CROSSINGS = 1e-3  # share of crossing triangle pairs that is a scan's blemish, not a wrong shape
+DEBRIS = 0.02  # loose pieces below this share of the object's diagonal are dropped
+UNITS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254, "cm": 0.01}
+
+
+class MeshError(ValueError):
+    """A mesh that cannot serve as an object; the message says why and what to do."""
+
+
+def sound_mesh(
+    points: FloatArray, triangles: IntArray, unit: str = "m"
+) -> tuple[FloatArray, IntArray, tuple[str, ...]]:
+    """Mesh in metres, points merged, closed, oriented outwards, and notes on what was repaired or tolerated.
+
+    Repaired: doubled points, collapsed triangles, orientation, specks of debris, shells inside the object. Tolerated: a
+    few crossing triangles. Refused: all else that leaves inside and outside undefined.
+
+    Parameters
+    ----------
+    points : (k, 3) array
+        Corners, in ``unit``.
+    triangles : (m, 3) array of int
+        Corners of each triangle.
+    unit : str
+        One of ``UNITS``.
+
+    Raises
+    ------
+    MeshError
+        With one sentence on the first thing found.
+    """
+    points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
+    if unit not in UNITS:
+        raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
+    _check_numbers(points, triangles)
+    points, triangles, notes = _merged(points, triangles)
+    _check_size(float(np.ptp(points, axis=0).max()), unit)
+    points = points * UNITS[unit]
+    neighbours = _closed(triangles)
+    triangles, turned = _oriented(points, triangles, *neighbours)
+    crossings = crossing_pairs(points, triangles)
+    if len(crossings) > TOLERATED_CROSSINGS * len(triangles):
+        place = ", ".join(f"{x:.4g}" for x in points[triangles[crossings[0, 0]]].mean(axis=0))
+        raise MeshError(
+            f"the mesh intersects itself: {len(crossings)} pairs of triangles cross, the first near ({place}) m of the "
+            "file's frame; unite its parts into one outer surface (a boolean union or remeshing does it)"
+        )
+    if len(crossings):
+        notes.append(f"{len(crossings)} pairs among {len(triangles)} triangles cross; tolerated")
+    points, triangles, dropped = _outer_pieces(points, triangles)
+    return points, triangles, tuple(notes + turned + dropped)
+
+
+def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
+    """Refuse what would crash or silently spoil everything after it."""
+    if points.ndim != 2 or points.shape[1:] != (3,) or not len(points) or not len(triangles):
+        raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
+    if len(triangles) > MOST_TRIANGLES:
+        raise MeshError(f"the mesh has {len(triangles)} triangles, more than {MOST_TRIANGLES}; decimate it, to about a "
+                        "tenth of the pad's element size nothing is lost")
+    astray = (triangles < 0) | (triangles >= len(points))
+    if astray.any():
+        raise MeshError(f"a triangle refers to point {triangles[astray][0]}, but there are only {len(points)} (counted "
+                        "from 0); the file is damaged, export it again")
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        raise MeshError(f"{bad.sum()} of {len(points)} points have a coordinate that is not a finite number, "
+                        f"the first is point {np.flatnonzero(bad)[0]} (counted from 0); repair the file")
+
+
+def _check_size(extent: float, unit: str) -> None:
+    """Refuse an ``extent``, in the file's own numbers, that makes no plausible object in this unit."""
+    size = extent * UNITS[unit]
+    if SMALLEST <= size <= LARGEST:
+        return
+    fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
+    advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
+    raise MeshError(f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
+                    f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Equal points as one, unused ones left out, triangles that collapse dropped."""
+    used, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
+    triangles = inverse.reshape(-1, 3).astype(np.int64)
+    a, b, c = triangles.T
+    whole = (a != b) & (b != c) & (c != a)
+    notes = [] if whole.all() else [f"dropped {np.sum(~whole)} triangles without area"]
+    if not whole.any():
+        raise MeshError("the mesh is empty: all its triangles have collapsed to lines or points")
+    return used, triangles[whole], notes
+
+
+def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Pairs of triangles that share an edge ``(e,)``, ``(e,)``, and whether they run through it in the same sense."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    unique, inverse, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    if (count == 1).any():
+        raise MeshError(f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
+                        "triangle only; fill the holes in a mesh editor, or give the object as a profile")
+    if (count > 2).any():
+        raise MeshError(f"the mesh is not manifold: at {np.sum(count > 2)} edges more than two triangles meet; remove "
+                        "the inner walls or doubled triangles there")
+    order = np.argsort(inverse.ravel(), kind="stable").reshape(-1, 2)
+    return order[:, 0] // 3, order[:, 1] // 3, forward[order[:, 0]] == forward[order[:, 1]]
+
+
+def _oriented(
+    points: FloatArray, triangles: IntArray, i: IntArray, j: IntArray, clash: IntArray
+) -> tuple[IntArray, list[str]]:
+    """Triangles turned so that neighbours agree and every piece encloses a positive volume."""
+    n = len(triangles)
+    mirrored = np.where(clash, n, 0)
+    ends = np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]
+    links = coo_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
+    _, label = connected_components(links, directed=False)
+    if (label[:n] == label[n:]).any():
+        raise MeshError("the mesh has only one side (like a Moebius strip), so it has no inside; rebuild it as a solid")
+    flip = label[:n] > label[n:]
+    triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
+    piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
+    inverted = np.bincount(piece, _volumes(points, triangles)) < 0
+    triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
+    turned = int(np.sum(flip != inverted[piece]))
+    return np.ascontiguousarray(triangles), [f"turned {turned} of {n} triangles outwards"] if turned else []
+
+
+def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Signed volumes ``(m,)`` of the tetrahedra from the bounding box's centre to each triangle [m^3]."""
+    a, b, c = (points[triangles] - 0.5 * (points.min(axis=0) + points.max(axis=0))).transpose(1, 0, 2)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+
+
+def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Mesh without debris and without shells inside another piece: the object is grasped from outside."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
+    count, label = connected_components(links, directed=False)
+    if count == 1:
+        return points, triangles, []
+    if count > MOST_PIECES:
+        raise MeshError(f"the mesh falls into {count} separate pieces; keep the object's outer surface only")
+    pieces = [triangles[label[triangles[:, 0]] == k] for k in range(count)]
+    size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
+    speck = size < DEBRIS * size.max()
+    inner = np.array([
+        any(winding_number(points[pieces[k][0, 0]], points, pieces[m]) > 0.5 for m in np.flatnonzero(~speck) if m != k)
+        for k in range(count)
+    ])
+    keep = ~speck & ~inner
+    if not keep.any():
+        raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
+    triangles = np.concatenate([piece for piece, wanted in zip(pieces, keep, strict=True) if wanted])
+    used, inverse = np.unique(triangles, return_inverse=True)
+    notes = [f"dropped {number} {kind}" for number, kind in
+             ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object")) if number]
+    return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
+
+
+def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:
+    """How often a closed mesh surrounds the point ``x (3,)``: 1 inside, 0 outside (solid angle over 4 pi)."""
+    a, b, c = (points[triangles] - x).transpose(1, 0, 2)
+    A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
+    lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
+    return float(np.arctan2(dot(a, np.cross(b, c)), lower).sum() / (2 * np.pi))

@@ -1,0 +1,360 @@
+"""Meshes as objects: what is refused and why, the frame, convergence to the analytic shapes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from fem.closest import ellipse_gap
+from fem.crossing import crossing_pairs
+from fem.mesh_check import MeshError, sound_mesh, winding_number
+from fem.mesh_object import MeshObject
+from fem.objects import Sphere
+from fem.pose import Pose
+from fem.touch import NoContactError, first_touch
+
+FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
+RADIUS = 0.03
+# looking along -x, turned about the approach so that no grid line is parallel to an axis of the object
+TILT = np.array([[0, np.sin(0.3), np.cos(0.3)], [0, np.cos(0.3), -np.sin(0.3)], [-1, 0, 0]]).T
+
+
+def ball(level, radii=(RADIUS, RADIUS, RADIUS), centre=(0, 0, 0)):
+    """Points and triangles of a refined icosahedron, scaled; its corners lie on the ellipsoid."""
+    mesh = pv.Icosphere(radius=1.0, nsub=level)
+    x = np.asarray(mesh.points, dtype=float)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    return x * radii + centre, mesh.regular_faces.astype(np.int64)
+
+
+def stl(path, points, triangles):
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    facets = np.zeros(len(triangles), record)
+    facets["corners"] = np.asarray(points)[triangles]
+    path.write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
+    return path
+
+
+def box_points(lower, upper, n=400):
+    return np.random.default_rng(3).uniform(lower, upper, (n, 3))
+
+
+def region_error(mesh, exact, pose, lower, upper):
+    """Largest errors of gap and normal near the surface, in the box shrunk by nothing."""
+    region = mesh.near(pose, lower, upper)
+    x = pose.to_object(box_points(np.asarray(lower), np.asarray(upper)))
+    g, normal, _ = region.gap(x)
+    reference, direction = exact(x)
+    close = np.abs(reference) < 4e-3
+    return np.abs(g - reference)[close].max(), np.abs(normal - direction)[close].max()
+
+
+def spheroid(x, a=0.025, c=0.04):
+    """Distance to the ellipsoid of revolution with semi-axes a (x, y) and c (z): an ellipse in the meridian's plane."""
+    r = np.hypot(x[:, 0], x[:, 1])
+    g, n, _ = ellipse_gap(np.stack([r, x[:, 2]], axis=1), a, c)
+    return g, np.stack([n[:, 0] * x[:, 0] / r, n[:, 0] * x[:, 1] / r, n[:, 1]], axis=1)
+
+
+def test_region_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_refined():
+    """Halving triangles and grid: the facets' sagitta, edge^2 / (8 R), bounds the distance, and falls to a quarter."""
+    lower, upper = [-0.008, -0.006, -0.004], [0.008, 0.006, 0.004]
+    for radii, exact in (((RADIUS,) * 3, lambda x: Sphere(RADIUS).gap(x)[:2]), ((0.025, 0.025, 0.04), spheroid)):
+        pose = Pose(TILT, np.array([radii[0], 0, 0]))
+        errors = [
+            region_error(MeshObject(*ball(level, radii), grid_step=step), exact, pose, lower, upper)
+            for level, step in ((3, 1.6e-3), (4, 0.8e-3), (5, 0.4e-3))
+        ]
+        gap, normal = np.array(errors).T
+        assert (np.log2(gap[:-1] / gap[1:]) > 1.8).all(), gap
+        assert (normal[:-1] / normal[1:] > 1.5).all(), normal
+        assert gap[-1] < 3e-5
+
+
+def test_spline_alone_is_of_fourth_order():
+    """Samples of a sphere's distance, without triangles: orders 4, 3, 2 for the value and its derivatives."""
+    from fem.tricubic import coefficients, evaluate
+
+    x, errors = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)), []
+    for n in (21, 41, 81):
+        s = np.linspace(-1, 1, n)
+        grid = np.stack(np.meshgrid(s, s, s + 3, indexing="ij"), axis=-1)
+        c = coefficients(np.linalg.norm(grid, axis=-1))
+        y = x + np.array([0, 0, 3])
+        g, gradient, H = evaluate(c, np.array([-1.0, -1.0, 2.0]), s[1] - s[0], y)
+        r, e, exact = Sphere(1.0).gap(y)
+        errors.append([np.abs(g - r - 1).max(), np.abs(gradient - e).max(), np.abs(H - exact).max()])
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))[-1]
+    assert orders == pytest.approx([4, 3, 2], abs=0.3)
+
+
+@pytest.fixture(scope="module")
+def flask():
+    return MeshObject.from_file(FLASK, "mm", grid_step=0.8e-3)
+
+
+@pytest.fixture(scope="module")
+def region(flask):
+    return flask.near(Pose(TILT, np.array([0.032, 0, 0.05])), [-0.016, -0.010, -0.006], [0.016, 0.010, 0.006])
+
+
+def test_region_is_twice_differentiable(region):
+    y, h = box_points(region.lower + 1e-4, region.upper - 1e-4, 100), 1e-6
+    x = region.pose.to_object(y)
+    _, normal, H = region.gap(x)
+    for e, column in zip(np.eye(3), range(3), strict=True):
+        up, down = region.gap(x + h * e), region.gap(x - h * e)
+        assert np.abs((up[0] - down[0]) / (2 * h) - normal[:, column]).max() < 1e-6
+        assert np.abs((up[1] - down[1]) / (2 * h) - H[:, :, column]).max() < 1e-3 * np.abs(H).max()
+    g = region.gap(x)[0]
+    assert np.abs(np.linalg.norm(normal, axis=1) - 1)[np.abs(g) < 2e-3].max() < 0.03
+
+
+def test_region_reports_errors_that_the_triangles_explain(region, flask):
+    """Both errors stay below the distance over which the spline rounds an edge: step x turn of the facets."""
+    assert region.grid_step == 0.8e-3
+    assert 0 < region.vertex_error < 0.1e-3
+    assert 0 < region.centre_error < 0.1e-3
+    x = region.pose.to_object(box_points(region.lower, region.upper))
+    near = np.abs(flask.distance(x)) < 1e-3
+    assert np.abs(region.gap(x)[0] - flask.distance(x))[near].max() < 2 * region.centre_error
+
+
+def test_region_depends_on_its_arguments_alone(region, flask):
+    again = MeshObject.from_file(FLASK, "mm", grid_step=0.8e-3)
+    again.near(Pose(TILT, np.array([-0.032, 0, 0.08])), [-0.01] * 3, [0.01] * 3)
+    other = again.near(region.pose, region.lower, region.upper)
+    assert other.coefficients.tobytes() == region.coefficients.tobytes()
+
+
+def test_points_outside_the_region_keep_the_sign_and_grow(region, flask):
+    """Outside the box the distance to the triangles is taken; far out along the approach it grows like the way."""
+    z = -np.array([0.007, 0.02, 0.1, 1.0])
+    far = region.pose.to_object(np.stack([0 * z, 0 * z, z], axis=1))
+    assert (np.diff(region.gap(far)[0]) > 0).all()
+    x = box_points(*(flask.bounds + np.array([[-0.02], [0.02]])), n=300)
+    inside = np.array([winding_number(p, flask.points, flask.triangles) > 0.5 for p in x])
+    g = region.gap(x)[0]
+    clear = np.abs(g) > region.centre_error
+    assert ((g < 0) == inside)[clear].all()
+    for value in region.gap(np.concatenate([x, flask.points[:50], far])):
+        assert np.isfinite(value).all()
+
+
+def test_distance_to_the_triangles_has_a_unit_normal_that_is_its_gradient(flask):
+    x = box_points(*(flask.bounds + np.array([[-0.02], [0.02]])), n=200)
+    g, normal, _ = flask.gap(x)
+    D = np.stack([(flask.distance(x + e) - flask.distance(x - e)) / 2e-7 for e in 1e-7 * np.eye(3)], axis=1)
+    assert np.mean(np.abs(D - normal).max(axis=1) > 1e-5) < 0.01  # the medial axis has two normals
+    on = flask.points[flask.triangles[::97]].mean(axis=1)
+    g, normal, _ = flask.gap(on)
+    assert np.abs(g).max() < 1e-15
+    assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-12
+    assert (flask.distance(on + 1e-5 * normal) > 0).all()
+
+
+def test_shipped_flask_is_sound_and_stands_on_its_frame(flask):
+    assert flask.notes == ()
+    assert 2000 <= len(flask.triangles) <= 4000
+    lower, upper = flask.bounds
+    assert lower[2] == 0
+    assert upper[2] == pytest.approx(0.12, abs=1e-6)
+    assert (lower + upper)[:2] == pytest.approx(0, abs=1e-15)
+    assert flask.axis_symmetry == 1
+    points, triangles = flask.surface()
+    assert winding_number(np.array([0, 0, 0.06]), points, triangles) == pytest.approx(1)
+
+
+def test_first_touch_on_the_flask(flask):
+    pose = Pose(TILT, np.array([0.2, 0, 0.05]))
+    grid = np.stack(np.meshgrid(np.linspace(-0.02, 0.02, 9), np.linspace(-0.01, 0.01, 5), [0.0]), -1).reshape(-1, 3)
+    d = first_touch(flask, pose, grid, 0.4)
+    x = pose.to_object(grid) + d * pose.rotation[:, 2]
+    assert np.abs(flask.distance(x).min()) < 1e-10
+    with pytest.raises(NoContactError, match="passes the object"):
+        first_touch(flask, Pose(TILT, np.array([0.2, 0, 0.25])), grid, 0.4)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_chosen_axis_becomes_z_without_mirroring(tmp_path, axis):
+    points, triangles = ball(2, (0.01, 0.02, 0.03), centre=(0.1, 0.2, 0.3))
+    mesh = MeshObject.from_file(stl(tmp_path / "a.stl", points, triangles), "m", axis=axis)
+    size = np.ptp(mesh.bounds, axis=0)
+    assert size[2] == pytest.approx({"x": 0.02, "y": 0.04, "z": 0.06}[axis], rel=0.05)
+    assert mesh.bounds[0, 2] == 0
+    assert winding_number(np.array([0, 0, size[2] / 2]), mesh.points, mesh.triangles) == pytest.approx(1)
+    assert mesh.notes == ()
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "stl"])
+def test_same_mesh_from_every_format(tmp_path, ending):
+    points, triangles = ball(2)
+    path = tmp_path / f"ball.{ending}"
+    surface = pv.PolyData.from_regular_faces(points, triangles)
+    surface.save(path, binary=False) if ending == "stl" else surface.save(path)
+    mesh = MeshObject.from_file(path, "m")
+    assert len(mesh.points) == len(points)
+    assert len(mesh.triangles) == len(triangles)
+    assert mesh.distance(np.array([[0, 0, RADIUS]]))[0] == pytest.approx(-RADIUS, rel=0.05)
+
+
+def test_unit_is_applied():
+    points, triangles = ball(1)
+    for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254)):
+        x, _, _ = sound_mesh(points / factor, triangles, unit)
+        assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
+
+
+def without(k):
+    points, triangles = ball(2)
+    return points, np.delete(triangles, range(k), axis=0)
+
+
+def moebius(n=12):
+    """Closed surface without an inside: a torus grid glued with a flip (a Klein bottle)."""
+    index = lambda i, j: (i % n) * n + (j if i < n else -j) % n  # noqa: E731
+    quads = [[index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)] for i in range(n) for j in range(n)]
+    quads = np.array(quads)
+    return np.random.default_rng(0).uniform(0, 0.1, (n * n, 3)), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+def two(a, b):
+    return np.concatenate([a[0], b[0]]), np.concatenate([a[1], b[1] + len(a[0])])
+
+
+def spoilt(value):
+    points, triangles = ball(2)
+    points[7] = value
+    return points, triangles
+
+
+@pytest.mark.parametrize(("mesh", "message"), [
+    (without(1), r"not closed: 3 of its 480 edges border on one triangle only; fill the holes"),
+    (without(320), "is empty: it holds no triangles"),
+    (spoilt(np.nan), r"1 of 162 points have a coordinate that is not a finite number, the first is point 7"),
+    (spoilt(np.inf), "not a finite number"),
+    ((ball(2)[0], ball(2)[1] + 1), r"refers to point 162, but there are only 162"),
+    ((ball(2)[0], ball(2)[1] - 1), r"refers to point -1, but"),
+    ((ball(2)[0] * 1e3, ball(2)[1]), r'an object of 60 m\? With unit = "m" .* the unit should be "mm" \(60 mm\)'),
+    ((ball(2)[0] * 1e-3, ball(2)[1]), r"an object of 6e-05 m\?"),
+    (two(ball(2), ball(2, centre=(0.02, 0.003, 0.001))), r"intersects itself: \d+ pairs of triangles"),
+    ((ball(2)[0], np.concatenate([ball(2)[1], ball(2)[1][:1]])), r"not manifold: at 3 edges more than two"),
+    (moebius(), "only one side"),
+    ((0 * ball(2)[0], ball(2)[1]), "collapsed"),
+])  # fmt: skip
+def test_meshes_that_make_no_object_are_refused(mesh, message):
+    with pytest.raises(MeshError, match=message):
+        sound_mesh(*mesh)
+
+
+def test_orientation_is_repaired_and_said():
+    points, triangles = ball(2)
+    for flipped in (triangles[:, ::-1], np.where(np.arange(320)[:, None] < 5, triangles[:, ::-1], triangles)):
+        x, turned, notes = sound_mesh(points, flipped)
+        assert winding_number(np.zeros(3), x, turned) == pytest.approx(1)
+        assert notes in (("turned 320 of 320 triangles outwards",), ("turned 5 of 320 triangles outwards",))
+
+
+def test_shells_inside_and_specks_are_dropped_and_separate_parts_are_kept():
+    inner, speck = ball(2, (0.028,) * 3), ball(0, (2e-4,) * 3, centre=(0.05, 0, 0))
+    _, triangles, notes = sound_mesh(*two(two(ball(2), inner), speck))
+    assert len(triangles) == 320
+    assert notes == ("dropped 1 specks of debris", "dropped 1 shells inside the object")
+    _, triangles, notes = sound_mesh(*two(ball(2), ball(2, centre=(0.07, 0, 0))))
+    assert len(triangles) == 640
+    assert notes == ()
+
+
+def test_few_crossing_triangles_are_tolerated_and_said():
+    points, triangles = ball(5)
+    k = triangles[0]
+    points[k[0]] += 1.2 * (points[k[1]] - points[k[0]])  # one corner pushed past its neighbour
+    crossings = crossing_pairs(points, triangles)
+    _, _, notes = sound_mesh(points, triangles)
+    assert 0 < len(crossings) <= 20
+    assert "cross; tolerated" in notes[0]
+
+
+def test_crossings_are_found_exactly():
+    """A needle through a triangle crosses; with a common corner, or when it ends on the plane, it does not."""
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    needle = np.array([[0.2, 0.2, -1], [0.2, 0.2, 1], [0.25, 0.2, 1]])
+    both = np.array([[0, 1, 2], [3, 4, 5]])
+    assert crossing_pairs(np.concatenate([flat, needle]), both).tolist() in ([[0, 1]], [[1, 0]])
+    assert not len(crossing_pairs(np.concatenate([flat, needle + np.array([0, 0, 1])]), both))
+    assert not len(crossing_pairs(np.concatenate([flat, needle + np.array([1, 1, 0])]), both))
+    assert not len(crossing_pairs(np.concatenate([flat, needle[1:]]), np.array([[0, 1, 2], [0, 3, 4]])))
+
+
+PLY = """ply
+format ascii 1.0
+element vertex {}
+property float x
+property float y
+property float z
+element face {}
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+3 0 1 {}
+"""
+
+
+@pytest.mark.parametrize(("name", "content", "message"), [
+    ("cut.stl", FLASK.read_bytes()[:20_000], r"cut short or no STL file: 20000 bytes, but its header calls for 179284"),
+    ("junk.stl", b"hello", "cut short or no STL file"),
+    ("huge.stl", bytes(80) + b"\xff" * 4, "its header calls for 214748364834"),
+    ("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "damaged or no STL file|is empty"),
+    ("empty.stl", b"", "the file is empty"),
+    ("a.step", b"ISO-10303-21;", r"meshes are read from .stl, .obj, .ply files"),
+    ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "refers to point 8, but there are only 3"),
+    ("b.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not a finite number"),
+    ("c.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "is empty: it holds no triangles"),
+    ("d.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "not closed: 4 of its 5 edges"),
+    ("a.ply", PLY.format(3, 1, 9).encode(), "refers to point 9, but there are only 3"),
+    ("b.ply", PLY.format(300_000_000_000, 1, 2).encode(), "cut short: 4 lines of data"),
+    ("c.ply", b"ply\nformat ascii 1.0\n", "no PLY file with a complete header"),
+    ("d.ply", PLY.format(-3, 1, 2).encode(), "no PLY file with a complete header"),
+])  # fmt: skip
+def test_damaged_files_are_refused_with_their_name(tmp_path, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=message) as caught:
+        MeshObject.from_file(tmp_path / name, "m")
+    assert name in str(caught.value)
+
+
+def test_file_with_nan_wrong_unit_missing_or_too_large_is_refused(tmp_path, monkeypatch):
+    with pytest.raises(MeshError, match=r'flask.stl: an object of 120 m\? .* should be "mm" \(120 mm\)'):
+        MeshObject.from_file(FLASK, "m")
+    with pytest.raises(MeshError, match="unit must be one of mm, m, inch, cm, found 'foot'"):
+        MeshObject.from_file(FLASK, "foot")
+    with pytest.raises(MeshError, match="axis must be one of x, y, z"):
+        MeshObject.from_file(FLASK, "mm", axis="w")
+    with pytest.raises(MeshError, match=r"cannot be read \(No such file"):
+        MeshObject.from_file(tmp_path / "none.stl", "mm")
+    with pytest.raises(MeshError, match="not a finite number"):
+        MeshObject.from_file(stl(tmp_path / "nan.stl", *spoilt(np.nan)), "m")
+    monkeypatch.setattr("fem.mesh_file.LARGEST_FILE", 1000)
+    with pytest.raises(MeshError, match="decimate the mesh"):
+        MeshObject.from_file(FLASK, "mm")
+
+
+def test_regions_that_make_no_sense_are_refused(flask):
+    pose = Pose(TILT, np.array([0.03, 0, 0.05]))
+    with pytest.raises(ValueError, match=r"box from .* is empty"):
+        flask.near(pose, [0, 0, 0], [0.01, 0.01, 0])
+    with pytest.raises(ValueError, match="raise grid_step"):
+        MeshObject(flask.points, flask.triangles, 1e-5).near(pose, [0, 0, 0], [0.01] * 3)
+    with pytest.raises(ValueError, match="grid_step must be a positive length"):
+        MeshObject(flask.points, flask.triangles, -1.0)
+
+
+@pytest.mark.long
+def test_check_of_a_large_mesh_is_bounded():
+    """80 000 triangles, checked for crossings in seconds."""
+    _, triangles, notes = sound_mesh(*ball(6))
+    assert len(triangles) == 81_920
+    assert notes == ()
