@@ -57,18 +57,18 @@ MAPS = (
     Quantity("quality", "", "grasp quality", "Volume of the grasp wrench space spanned by both contacts with unit"
              " normal forces; torque components are divided by the scales given in the scene.", by_model=True),
     Quantity("e_n", "m", "eccentricity parameter e_n", "max tau_z / (mu S), with S the sum of pressure times area over"
-             " the patch; mean of both fingers.", by_model=True),
+             " the patch; of the weaker finger.", by_model=True),
     Quantity("e_n_projected", "m", "eccentricity parameter, physical normal force", "max tau_z / (mu F_N), with F_N the"
-             " sum of pressure times area times the cosine between face normal and contact normal; mean of both"
-             " fingers.", by_model=True),
+             " sum of pressure times area times the cosine between face normal and contact normal; of the weaker"
+             " finger.", by_model=True),
     Quantity("epsilon", "", "largest-minimum resisted wrench", "Radius of the largest ball around the origin inside the"
              " grasp wrench space.", by_model=True),
     Quantity("f_x_max", "N", "largest friction along x", "Total friction force along the contact frame's x axis when"
-             " the pad slides along x, Eqs. (6)-(8); mean of both fingers.", by_model=True),
+             " the pad slides along x, Eqs. (6)-(8); of the weaker finger.", by_model=True),
     Quantity("f_y_max", "N", "largest friction along y", "Total friction force along the contact frame's y axis when"
-             " the pad slides along y; mean of both fingers.", by_model=True),
+             " the pad slides along y; of the weaker finger.", by_model=True),
     Quantity("tau_z_max", "N m", "largest friction torque about z", "Total friction torque about the contact normal"
-             " when the pad turns about it; mean of both fingers.", by_model=True),
+             " when the pad turns about it; of the weaker finger.", by_model=True),
     Quantity("S", "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", "N", "normal force", "Sum of pressure times area times (n . N), the force along the contact normal;"
              " mean of both fingers."),
@@ -76,9 +76,14 @@ MAPS = (
              " mean of both fingers."),
     Quantity("contact_area", "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
     Quantity("p_max", "Pa", "largest pressure", "Largest contact pressure on either finger."),
-    Quantity("contact_distance", "m", "distance of the contacts", "Distance between the fingers' centres of pressure."),
-    Quantity("tilt", "", "tilt of the loaded normals", "1 - F_N / S: zero for a flat contact, what curvature takes off"
-             " the normal force otherwise; mean of both fingers."),
+    Quantity("contact_distance", "m", "distance of the contacts", "Distance between the origins of the contact frames."),
+    Quantity("curvature_loss", "", "force lost to curvature", "1 - F_N / S: zero for a flat contact, what the tilt of the"
+             " loaded normals takes off the normal force otherwise; both fingers together."),
+    Quantity("misalignment", "rad", "misalignment of the contacts", "Angle between one contact normal and the other"
+             " reversed; the score's closed form is exact at 0 and off by about 1 % at 0.09 rad."),
+    Quantity("flags", "", "flags of the case", "Sum of: 1 a contact carries no torque, 2 a contact carries no force along"
+             " an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no corners,"
+             " 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal."),
     Quantity("e_n_error", "", "relative error of e_n", "Difference of e_n (curved) between the mesh and one with half"
              " as many elements per direction, over its value.", only_with_two_meshes=True),
     Quantity("f_x_max_error", "", "relative error of f_x_max", "As e_n_error.", only_with_two_meshes=True),
@@ -109,20 +114,22 @@ FINGER = (
 )
 
 CHECKS = (
-    _finger("checks", "force_balance", "", "force balance", "Difference of contact force and load over the load."),
-    _finger("checks", "tension", "Pa", "largest tension", "Largest negative contact pressure; a contact has none."),
-    _finger("checks", "penetration", "m", "largest penetration", "Deepest overlap of pad and object."),
+    _finger("checks", "force_balance", "", "force balance", "Difference of contact force and load, over the load."),
+    _finger("checks", "tension", "", "largest tension", "Largest negative nodal pressure over the largest pressure."),
+    _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over the element size."),
+    _finger("checks", "complementarity", "", "complementarity", "Largest product of pressure and gap at a node, over the"
+            " largest pressure and the element size."),
     _finger("checks", "min_det_f", "", "smallest det F", "Smallest ratio of deformed to undeformed volume."),
-    _finger("checks", "max_strain", "", "largest strain", "Largest principal Green-Lagrange strain in the pad."),
-    _finger("checks", "complementarity", "N m", "complementarity", "Largest product of contact force and gap."),
-    _finger("checks", "acoustic", "Pa", "smallest acoustic eigenvalue", "Negative where the material lost stability."),
+    _finger("checks", "max_strain", "", "largest strain", "Largest difference of a principal stretch from 1."),
+    _finger("checks", "acoustic", "", "smallest acoustic eigenvalue", "Over the shear modulus, in 24 directions at one"
+            " point per element; not positive: the foam lost ellipticity and strains may localise."),
 )
 
 WORK = (
-    _finger("work", "newton_iterations", "", "Newton iterations", "Of the load steps up to this force."),
-    _finger("work", "load_steps", "", "load steps", "Since the force below."),
-    _finger("work", "cuts", "", "step cuts", "Load steps that were halved and tried again."),
-    *(Quantity(f"seconds_{part}", "s", f"seconds in {part}", f"Wall time of the case spent in {part}.", group="work")
+    _finger("work", "newton_iterations", "", "Newton iterations", "Since the force below."),
+    _finger("work", "load_steps", "", "load steps", "Newton solves since the force below."),
+    _finger("work", "cuts", "", "step cuts", "Solves that failed and were tried again in shorter steps."),
+    *(Quantity(f"seconds_{part}", "s", f"seconds in {part}", f"Time of the case spent in {part}.", group="work")
       for part in ("assembly", "factorisation", "rest", "friction", "total")),
 )
 

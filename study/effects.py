@@ -1,0 +1,40 @@
+"""Which level of each effect a case was simulated with, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import Any
+
+from study.quantities import REASONS
+from study.scene import Scene
+
+ONLY, FORCED, SYMMETRY = (REASONS.index(r) for r in (REASONS[0], "forced by the scene", "exact by symmetry"))
+MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
+
+
+def effects_of(scene: Scene, contacts: Sequence[Any]) -> dict[str, tuple[str, float, int]]:
+    """Level, indicator and reason of every effect of one case; keys and levels as in ``study.quantities.EFFECTS``.
+
+    The indicators are those that a choice between levels is made by: the largest strain for the pad, the share of the
+    normal force that the tilt of the loaded normals takes away for the friction model.
+    """
+    wanted = scene.effects
+
+    def only(name: str) -> int:
+        return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
+
+    strain = max(c.state.checks.max_strain for c in contacts)
+    S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
+    size = MODEL_SIZES[min(sum(c.symmetry) for c in contacts)]
+    return {
+        "object": ("rigid", nan, only("object")),
+        "pad": ("hyperelastic", strain, only("pad")),
+        "sheet": ("rigid", nan, only("sheet")),
+        "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
+        "fingers": ("two", nan, only("fingers")),
+        "friction": ("curved", 1.0 - F_N / S, only("friction")),
+        "wrench": ("3-D", nan, only("wrench")),
+        "limit_surface": ("ellipsoid from three motions", nan, only("limit_surface")),
+        "friction_pressure_coupling": ("none", nan, ONLY),
+    }

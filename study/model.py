@@ -1,0 +1,164 @@
+"""From a scene to the finite element model of one finger: object, pad, place of first touch, symmetry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.contact import Gap
+from fem.materials import Material, material
+from fem.mesh_object import MeshObject
+from fem.objects import Box, EllipticCylinder, Plane, Sphere
+from fem.pad import Pad, PadShape
+from fem.pose import Pose
+from fem.revolution import Revolution
+from fem.shape import GapFunction, GapObject
+from fem.touch import first_touch
+from study.scene import Scene
+from study.scene_sections import Gripper
+from study.scene_shapes import Shape
+
+FloatArray = NDArray[np.float64]
+DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known
+
+
+@lru_cache(maxsize=8)
+def build_object(shape: Shape) -> GapObject:
+    """Object of a scene's section ``[object]``."""
+    match shape.shape:
+        case "revolution":
+            return Revolution(np.array(shape.profile))
+        case "elliptic_cylinder":
+            return EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
+        case "sphere":
+            return Sphere(shape.radius)
+        case "box":
+            return Box(np.array(shape.size), shape.edge_radius)
+        case "plane":
+            return Plane(shape.thickness)
+        case _:
+            return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
+
+
+def pad_material(gripper: Gripper) -> Material:
+    """Foam of the pads."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
+
+
+def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
+    """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
+    shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)
+    return shape.halved() if coarser else shape
+
+
+@lru_cache(maxsize=8)
+def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool) -> Pad:
+    """Discrete pad; the same for all candidates, so it is made once."""
+    return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact)
+
+
+@dataclass(frozen=True, eq=False)
+class Finger:
+    """A pad at first touch with the object.
+
+    Parameters
+    ----------
+    pose : Pose
+        The pad's frame at first touch.
+    surface : GapFunction
+        The object round the contact, in the object's frame.
+    """
+
+    pose: Pose
+    surface: GapFunction
+
+    def gap(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Signed distance, gradient and Hessian at points of the pad's frame."""
+        R = self.pose.rotation
+        g, normal, hessian = self.surface.gap(self.pose.to_object(x))
+        return g, normal @ R, R.T @ hessian @ R
+
+
+def approach(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Finger:
+    """Move a pad of this size from afar along its approach to first touch.
+
+    Raises
+    ------
+    NoContactError
+        If the pad passes the object.
+    """
+    lower, upper = obj.bounds
+    reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
+    ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
+    start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
+    distance = first_touch(obj, start, _front(size), 2.0 * reach)
+    touching = Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
+    box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
+    return Finger(touching, obj.near(touching, box * [-1, -1, -0.5], box))
+
+
+def _front(size: tuple[float, float, float]) -> FloatArray:
+    """Points spread over the undeformed front, independent of the mesh, the planes of symmetry among them."""
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+
+
+def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, bool]:
+    """Whether the object is its own mirror image in the pad's planes ``x = 0`` and ``y = 0``, as far as the pad sees it."""
+    u = np.linspace(0.03, 0.55, 12)
+    x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, DEEP, 7) * size[2], indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    quadrants = {(i, j): gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
+    tolerance = 1e-9 * size[0]
+
+    def same(pairs) -> bool:
+        return all(np.abs(quadrants[a] - quadrants[b]).max() <= tolerance for a, b in pairs)
+
+    return (
+        same([((1, 1), (-1, 1)), ((1, -1), (-1, -1))]),
+        same([((1, 1), (1, -1)), ((-1, 1), (-1, -1))]),
+    )
+
+
+def image_of(first: Pose, second: Pose, axis_symmetry: int) -> bool:
+    """Whether turning the object about its axis, within its symmetry, takes one approaching pad to the other."""
+    turn = second.rotation @ first.rotation.T
+    if abs(turn[2, 2] - 1.0) > 1e-9:
+        return False
+    angle = np.arctan2(turn[1, 0], turn[0, 0])
+    step = 2.0 * np.pi / axis_symmetry if axis_symmetry else 0.0
+    if step and abs(angle - step * round(angle / step)) > 1e-9:
+        return False
+    aside = second.rotation.T @ (turn @ first.origin - second.origin)
+    return bool(np.abs(aside[:2]).max() <= 1e-9)
+
+
+def usable_symmetry(scene: Scene, finger: Finger) -> tuple[bool, bool]:
+    """Planes of symmetry that this scene uses: those that exist, halve the mesh evenly and are allowed by its effects.
+
+    Raises
+    ------
+    ValueError
+        If the scene forces a symmetry that this candidate does not have.
+    """
+    gripper, wanted = scene.gripper, scene.effects.model_size
+    if wanted == "full":
+        return False, False
+    found = mirror_planes(finger.gap, gripper.pad_size)
+    coarse = pad_shape(gripper, coarser=True).elements if scene.accuracy.meshes == 2 else gripper.elements
+    usable = tuple(
+        f and n % 2 == 0 and m % 2 == 0 for f, n, m in zip(found, gripper.elements, coarse, strict=False)
+    )
+    need = {"auto": 0, "half": 1, "quarter": 2}[wanted]
+    if sum(usable) < need:
+        raise ValueError(
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have {sum(usable)} "
+            f"here; use 'auto'"
+        )
+    if wanted == "half" and all(usable):
+        return False, True
+    return usable

@@ -1,0 +1,211 @@
+"""The paper on one page: press both fingers, read the contact patches, bound the friction, score the grasp.
+
+``solve_unit`` climbs the forces of one candidate; everything it computes goes into the ``CaseResult`` of each force.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import CheckError, ConvergenceError
+from fem.extract import extract
+from fem.extract import patch_faces as faces_of
+from fem.pose import Pose
+from fem.press import Press, Pressed
+from friction.frame import Frame, contact_frame, in_frame
+from friction.patch import ContactPatch
+from friction.wrench import FrictionLimits, friction_limits
+from scoring.score import ScoreFlag, score
+from study import model
+from study.effects import effects_of
+from study.quantities import MODELS
+from study.result import CaseFailure, CaseResult
+from study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
+ANTIPODAL = np.radians(5.0)  # beyond this angle between the contacts the antipodal score is flagged
+NOT_ANTIPODAL = 256  # flag, above those of score and contact frame
+FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
+
+
+class Contact:
+    """One finger at one force: its patch in the pad's frame, its contact frame and its friction limits per model."""
+
+    def __init__(self, scene: Scene, finger: model.Finger, press: Press, state: Pressed) -> None:
+        self.finger, self.state, self.symmetry = finger, state, press.pad.symmetry
+        self.patch: ContactPatch = extract(press.pad, state)
+        self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
+        self.local: ContactPatch = in_frame(self.patch, self.frame)
+        self.limits: dict[str, FrictionLimits] = {
+            name: friction_limits(self.local, scene.friction.mu, name) for name in MODELS
+        }
+
+    def placed(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
+        """Origin and inward normal of the contact in the object's frame, for a pad that stands at ``pose``."""
+        return pose.to_object(self.frame.origin[None])[0], pose.rotation @ self.frame.axes[2]
+
+
+def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
+    """Cases of one candidate, force by force upward; each force starts from the state at the one before."""
+    scene, forces = unit.scene, unit.scene.load.normal_force
+    obj = model.build_object(scene.object)
+    size = scene.gripper.pad_size
+    fingers = [model.approach(obj, pose, size) for pose in unit.candidate.poses]
+    shared = model.image_of(*unit.candidate.poses, obj.axis_symmetry)
+    presses = [[_press(scene, f, coarser) for coarser in _meshes(scene)] for f in (fingers[:1] if shared else fingers)]
+    ladders = [[press.ladder(forces) for press in presses_of] for presses_of in presses]
+    for k, force in enumerate(forces):
+        try:
+            states = [[next(ladder) for ladder in ladders_of] for ladders_of in ladders]
+        except (ConvergenceError, CheckError) as error:
+            yield from _given_up(forces, k, error)
+            return
+        start = time.perf_counter()
+        # an image finger has its partner's states; only its place differs
+        contacts = [
+            [Contact(scene, finger, press, state) for press, state in zip(presses[i], states[i], strict=True)]
+            for i, finger in ((0, fingers[0]), (0 if shared else 1, fingers[1]))
+        ]
+        values = _values(scene, obj, [fine for fine, *_ in contacts])
+        if scene.accuracy.meshes == 2:
+            values |= _mesh_errors(contacts)
+        seconds = time.perf_counter() - start
+        yield k, _result(scene, values, contacts, [s for one in states for s in one], seconds, force)
+
+
+def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
+    """The result of the ``c``-th candidate that a unit serves: the same grasp, turned about the object's axis."""
+    angle = unit.turns[c]
+    if angle == 0.0:
+        return result
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
+    values = dict(result.values)
+    values["fingers/pose_rotation"] = turn @ values["fingers/pose_rotation"]
+    values["fingers/pose_origin"] = values["fingers/pose_origin"] @ turn.T
+    return replace(result, values=values)
+
+
+def patch_faces(scene: Scene) -> int:
+    """Number of faces of a patch of this scene."""
+    return int(np.prod(faces_of(model.pad_shape(scene.gripper))))
+
+
+def axis_symmetry(scene: Scene) -> int:
+    """Order of the object's rotational symmetry about its axis; 0 is every angle."""
+    return model.build_object(scene.object).axis_symmetry
+
+
+def _meshes(scene: Scene) -> tuple[bool, ...]:
+    return (False, True)[: scene.accuracy.meshes]
+
+
+def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
+    symmetry = model.usable_symmetry(scene, finger)
+    pad = model.pad(scene.gripper, symmetry, scene.accuracy.contact, coarser)
+    return Press(pad, finger.gap, dict(scene.petsc))
+
+
+def _given_up(forces: tuple[float, ...], k: int, error: Exception) -> Iterator[tuple[int, CaseFailure]]:
+    """The failed force and those above it, which had no state to start from."""
+    good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
+    yield k, CaseFailure(f"{type(error).__name__}: {error}; {good}")
+    for j in range(k + 1, len(forces)):
+        yield j, CaseFailure(f"not tried, because the ladder of forces ended at {forces[k]:g} N: {error}")
+
+
+def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
+    """Maps and per-finger values of one case, keyed as in ``study.quantities``."""
+    limits = {
+        name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
+        for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
+    }
+    S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
+    (origin1, normal1), (origin2, normal2) = (c.placed(c.finger.pose) for c in contacts)
+    distance = float(np.linalg.norm(origin2 - origin1))
+    scores = [_score(scene, obj, contacts, m, distance) for m in MODELS]
+    apart = float(np.arccos(np.clip(-normal1 @ normal2, -1.0, 1.0)))
+    flags = int(scores[0].flag) | NOT_ANTIPODAL * (apart > ANTIPODAL)
+    for c in contacts:
+        flags |= FRAME_FLAGS * int(c.frame.flag)
+    areas = [float(c.patch.area[c.patch.pressure > 0].sum()) for c in contacts]
+    values = {
+        "maps/quality": [s.quality for s in scores],
+        "maps/epsilon": [s.epsilon for s in scores],
+        "maps/S": S.mean(),
+        "maps/F_N": F_N.mean(),
+        "maps/travel": np.mean([c.state.travel for c in contacts]),
+        "maps/contact_area": np.mean(areas),
+        "maps/p_max": max(float(c.patch.pressure.max()) for c in contacts),
+        "maps/contact_distance": distance,
+        "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
+        "maps/misalignment": apart,
+        "maps/flags": flags,
+        "fingers/S": S,
+        "fingers/F_N": F_N,
+        "fingers/travel": [c.state.travel for c in contacts],
+        "fingers/frame_origin": [c.frame.origin for c in contacts],
+        "fingers/frame_axes": [c.frame.axes for c in contacts],
+        "fingers/frame_flag": [int(c.frame.flag) for c in contacts],
+        "fingers/pose_rotation": np.array([c.finger.pose.rotation for c in contacts]),
+        "fingers/pose_origin": np.array([c.finger.pose.origin for c in contacts]),
+    }
+    for name, key in (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max")):
+        values[f"maps/{key}"] = limits[name].min(axis=0)
+        values[f"fingers/{key}"] = limits[name]
+    for key in ("e_n", "e_n_projected"):
+        values[f"maps/{key}"] = limits[key].min(axis=0)
+    return values
+
+
+def _score(scene: Scene, obj, contacts: list[Contact], name: str, distance: float):
+    """Score with the limit surface of one friction model, the ellipsoid from three motions, per unit normal force."""
+    object_length = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
+    contact_length = scene.score.contact_length or scene.gripper.pad_length
+    if scene.score.torque_scale == "object":
+        contact_length = object_length
+    one, two = (c.limits[name].per_unit_force for c in contacts)
+    return score(one, two, distance, object_length, contact_length)
+
+
+def _mesh_errors(contacts: list[list[Contact]]) -> dict[str, float]:
+    """Relative differences of the curved model's results between the mesh and the one half as fine."""
+    errors = {}
+    for name, key in (("e_n", "e_n"), ("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max")):
+        fine, coarse = ([getattr(pair[i].limits["curved"], name) for pair in contacts] for i in (0, 1))
+        errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in zip(fine, coarse, strict=True))
+    return errors
+
+
+def _result(
+    scene: Scene, values: dict[str, Any], contacts: list[list[Contact]], states: list[Pressed], friction: float, force: float
+) -> CaseResult:
+    """Values, checks, work and patches of one case."""
+    fine = [c for c, *_ in contacts]
+    checks = {f"checks/{name}": [getattr(c.state.checks, name) for c in fine] for name in vars(fine[0].state.checks)}
+    for key, name in (("newton_iterations", "iterations"), ("load_steps", "steps"), ("cuts", "cuts")):
+        values[f"work/{key}"] = [getattr(c.state, name) for c in fine]
+    spent = [s.seconds for s in states]
+    for part in ("assembly", "factorisation", "rest"):
+        values[f"work/seconds_{part}"] = sum(getattr(s, part) for s in spent)
+    values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
+    patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in ("pressure", "area", "centroid", "normal")}
+    return CaseResult(values | checks, patch, _remark(values, fine, force), effects_of(scene, fine))
+
+
+def _remark(values: dict[str, Any], contacts: list[Contact], force: float) -> str:
+    """What the reader should know about a valid result."""
+    remarks = []
+    if values["maps/flags"] & NOT_ANTIPODAL:
+        remarks.append(f"contacts {np.degrees(values['maps/misalignment']):.0f} deg from antipodal: score approximate")
+    if values["maps/flags"] & (ScoreFlag.NO_TORQUE | ScoreFlag.NO_FORCE):
+        remarks.append("a contact carries no torque or force along an axis")
+    if min(c.state.checks.acoustic for c in contacts) <= 0:
+        remarks.append("foam lost ellipticity: strains may localise")
+    return "; ".join(remarks)
