@@ -66,8 +66,7 @@ def check(options: Namespace) -> int:
 
 def plan(options: Namespace) -> int:
     """Say what a run will take."""
-    from study.overview import plan_text
-    from study.plan import make_plan
+    from study.plan import make_plan, plan_text
 
     scene = _scene(options)
     path = Path(options.output or scene.output.file)

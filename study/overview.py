@@ -1,15 +1,9 @@
-"""Answers of ``check`` and ``plan``: what a scene means and what it will take."""
+"""Answer of ``check``: what a scene means."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
-
-from study.layout import Layout
-from study.plan import Plan, makespan, memory, sensible_ranks, unit_seconds
-from study.progress import duration
 
 
 def scene_text(scene: Any, file: str) -> str:
@@ -38,52 +32,7 @@ def scene_text(scene: Any, file: str) -> str:
         "results": scene.output.file,
     }
     warnings = [f"warning: {text}" for text in scene.warnings]
-    return "\n".join([f"{file}: no errors", *_aligned(rows), *warnings])
-
-
-def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
-    """Cases, units, disk, memory and time on so many ranks."""
-    layout = plan.layout
-    each = memory(scene)
-    forces = layout.shape[-1]
-    shared = plan.served - len(plan.units)
-    symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
-    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
-    free = _free(path)
-    rows = {
-        "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
-        "units": f"{len(plan.units)} ladders of {forces} forces{symmetric}",
-        "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
-        "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
-        "time": _time(plan, path, ranks),
-        "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
-    }
-    return "\n".join(_aligned(rows))
-
-
-def _time(plan: Plan, path: Path, ranks: int) -> str:
-    seconds = _seconds(plan.layout, path)
-    expected = unit_seconds(plan, seconds) if seconds is not None else []
-    if not expected:
-        return f"not known before a few ladders are in {path}: start the run, then plan again"
-    whole = duration(makespan(expected, ranks))
-    return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
-
-
-def _seconds(layout: Layout, path: Path) -> Any:
-    if not path.is_file():
-        return None
-    from study.store import open_result
-
-    with open_result(path) as result:
-        return result.work("seconds_total").ravel() if result.layout.shape == layout.shape else None
-
-
-def _free(path: Path) -> int:
-    for folder in path.absolute().parents:
-        if folder.is_dir():
-            return shutil.disk_usage(folder).free
-    return -1
+    return "\n".join([f"{file}: no errors", *aligned(rows), *warnings])
 
 
 def _list(values: Sequence[Any], unit: str = "") -> str:
@@ -94,5 +43,6 @@ def _list(values: Sequence[Any], unit: str = "") -> str:
     return f"{', '.join(texts)} {unit}".rstrip()
 
 
-def _aligned(rows: dict[str, str]) -> list[str]:
+def aligned(rows: dict[str, str]) -> list[str]:
+    """One line for each row that says something."""
     return [f"  {name:<10}  {text}" for name, text in rows.items() if text]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from study.layout import Header, Layout
+from study.overview import aligned
+from study.progress import duration
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -108,3 +111,48 @@ def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
 def _measured(unit: Any, seconds: np.ndarray) -> float | None:
     times = seconds[list(unit.rows[0])]
     return None if np.isnan(times).any() else float(times.sum())
+
+
+def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
+    """Cases, units, disk, memory and time on so many ranks."""
+    layout = plan.layout
+    each = memory(scene)
+    forces = layout.shape[-1]
+    shared = plan.served - len(plan.units)
+    symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
+    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
+    free = _free(path)
+    rows = {
+        "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
+        "units": f"{len(plan.units)} ladders of {forces} forces{symmetric}",
+        "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
+        "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
+        "time": _time(plan, path, ranks),
+        "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
+    }
+    return "\n".join(aligned(rows))
+
+
+def _time(plan: Plan, path: Path, ranks: int) -> str:
+    seconds = _seconds(plan.layout, path)
+    expected = unit_seconds(plan, seconds) if seconds is not None else []
+    if not expected:
+        return f"not known before a few ladders are in {path}: start the run, then plan again"
+    whole = duration(makespan(expected, ranks))
+    return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
+
+
+def _seconds(layout: Layout, path: Path) -> Any:
+    if not path.is_file():
+        return None
+    from study.store import open_result
+
+    with open_result(path) as result:
+        return result.work("seconds_total").ravel() if result.layout.shape == layout.shape else None
+
+
+def _free(path: Path) -> int:
+    for folder in path.absolute().parents:
+        if folder.is_dir():
+            return shutil.disk_usage(folder).free
+    return -1

@@ -73,7 +73,7 @@ def sessions(result: Any, running: bool) -> list[str]:
     lines = []
     for i, s in enumerate(found):
         last = i == len(found) - 1
-        reason = s["reason"] if s["stop"] else "running" if last and running else "killed"
+        reason = s["reason"] if s["stop"] else "running" if last and running else "ended without a word (killed?)"
         wall = _between(s["start"], s["stop"])
         lines.append(f"  session {i + 1}: {s['start']}, {s['ranks']} ranks on {s['host']}{wall}, {reason}")
     return lines

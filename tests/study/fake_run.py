@@ -1,0 +1,121 @@
+"""A study whose cases are a formula, to be started under mpirun by the tests: ``fake_run.py FILE [options]``."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.update(H5PY_ALWAYS_USE_MPI="1", OMP_NUM_THREADS="1")
+
+import argparse
+import resource
+import signal
+import sys
+import time
+import traceback
+from pathlib import Path
+from types import SimpleNamespace
+
+sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+
+import numpy as np
+
+FACES, FORCES = 6, 3
+
+
+def fake_plan(digest="scene", stations=6, derived=True):
+    """Stations x two angles x three forces; both angles of an even station are one unit."""
+    from study.layout import Derived, Header, Layout
+    from study.plan import Plan
+    from study.reading import StoredAxis
+
+    axes = (
+        StoredAxis("station", np.linspace(0, 0.1, stations), "m", "station along the object's axis"),
+        StoredAxis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
+        StoredAxis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
+    )
+    slope = (Derived("slope", "m/N", "slope", "e_n over force", ("station",)),) if derived else ()
+    units = []
+    for s in range(stations):
+        rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
+        for served in [tuple(rows)] if s % 2 == 0 else [(r,) for r in rows]:
+            units.append(SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3)))
+    labels = tuple(f"candidate {i}" for i in range(2 * stations))
+    header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
+    return Plan(Layout(axes, FACES, derived=slope), header, tuple(units))
+
+
+def fake_result(row):
+    """Every value from the row alone."""
+    from study.result import CaseResult
+
+    random = np.random.default_rng(row)
+    values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n", "f_x_max", "tau_z_max")}
+    values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/tension": random.random(2)}
+    values |= {"work/seconds_assembly": 1e-3, "fingers/pose_rotation": random.random((2, 3, 3))}
+    patch = {"pressure": random.random((2, FACES)), "normal": random.random((2, FACES, 3))}
+    return CaseResult(values, patch, "a note" if row % 7 == 3 else "", {"pad": ("hyperelastic", 0.5, 1)})
+
+
+def fake_ladder(options):
+    """The injected solver; rows are named by the first candidate that a unit serves."""
+    from study.result import CaseFailure
+
+    def solve_unit(unit):
+        for k, row in enumerate(unit.rows[0]):
+            deadline = time.monotonic() + (60.0 if row == options.hang else options.delay)
+            while time.monotonic() < deadline:
+                time.sleep(0.002)
+            if row == options.kill:
+                os.kill(os.getpid(), signal.SIGKILL)
+            if row == options.raises:
+                raise ArithmeticError("the contact solve diverged")
+            yield k, CaseFailure("no contact at this force") if row == options.fail else fake_result(row)
+
+    return solve_unit
+
+
+def finalise(writer):
+    """Fill the derived dataset."""
+    e_n = writer.read("e_n/curved")
+    writer.write_derived("slope", (e_n[:, 0, -1] - e_n[:, 0, 0]) / 4.0)
+
+
+def main():
+    """Run it and leave with its exit code."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--digest", default="scene")
+    parser.add_argument("--delay", type=float, default=0.0)
+    parser.add_argument("--file-limit", type=int, default=0)
+    parser.add_argument("--retry-failed", action="store_true")
+    for name in ("fail", "raises", "kill", "hang", "bug"):
+        parser.add_argument(f"--{name}", type=int, default=-1)
+    options = parser.parse_args()
+    from mpi4py import MPI
+
+    from study.commands import complain
+    from study.exits import StudyError
+    from study.run import Work, run_study
+    from study.status import summary
+
+    comm = MPI.COMM_WORLD
+    if options.file_limit:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (options.file_limit, options.file_limit))
+    image = None
+    if options.bug >= 0:  # outside of a case: the run itself is broken
+
+        def image(result, unit, c):
+            return 1 / (unit.index - options.bug) and result
+
+    work = Work(fake_ladder(options), image, finalise, summary)
+    try:
+        return run_study(fake_plan(options.digest), work, options.file, comm, retry_failed=options.retry_failed)
+    except StudyError as error:
+        return complain(error)
+    except BaseException:
+        traceback.print_exc()
+        comm.Abort(70)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""The command line: answers, exit codes, and how little ``--help``, ``check``, ``plan`` and ``status`` load."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+import sys
+import time
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import study
+from study.cli import main
+from study.commands import petsc_overrides
+from study.exits import MEANING, StudyError
+from tests.study.fake_run import fake_plan, fake_result
+from tests.study.launching import ROOT, launch
+from tests.study.launching import study as run_fake
+
+HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy")
+SCENE = """
+[object]
+shape = "sphere"
+radius_mm = 30
+
+[candidates]
+stations_mm = [-5, 0, 5]
+angles_deg = [0, 90]
+
+[load]
+normal_force_n = [1, 2]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, comm):
+    """A result file with one failed case."""
+    path = None
+    if comm.rank == 0:
+        path = tmp_path_factory.mktemp("finished") / "done.hdf"
+        assert run_fake(0, path, "--fail", 9)[0] == 6
+    return comm.bcast(path)
+
+
+@pytest.mark.parametrize("words", ["", "chek", "check", "plan x.toml -n 0", "show f --json --csv", "show f --top -1"])
+def test_bad_usage_is_code_2(words, capsys):
+    assert main(words.split()) == 2
+    assert "error" in capsys.readouterr().err
+
+
+def test_every_command_has_an_example(capsys):
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(meaning in text for meaning in MEANING.values())
+    for command in ("check", "plan", "run", "status", "show", "report", "schema", "doctor"):
+        assert command in text
+        assert main([command, "--help"]) == 0
+        assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in capsys.readouterr().out
+
+
+def test_check_says_what_would_be_run(scene, capsys):
+    assert main(["check", str(scene), "--set", "friction.mu=0.5"]) == 0
+    text = capsys.readouterr().out
+    assert "no errors" in text
+    assert "sphere" in text
+    assert "mu = 0.5" in text
+    assert "-5, 0, 5 mm along the axis, 0, 90 deg about it" in text
+    assert "12" in text.split("cases")[-1].splitlines()[0]
+
+
+def test_check_lists_every_problem_and_starts_nothing(scene, capsys):
+    scene.write_text(SCENE.replace("radius_mm = 30", "radius_mm = -30").replace("[load]", "[laod]"))
+    assert main(["check", str(scene)]) == 2
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) >= 2
+    assert all(line.startswith("error: ") for line in errors)
+    assert any("radius_mm" in line for line in errors)
+    assert any("laod" in line for line in errors)
+
+
+def test_a_missing_file_is_a_sentence(tmp_path, capsys):
+    assert main(["check", str(tmp_path / "no.toml")]) == 2
+    assert main(["status", str(tmp_path / "no.hdf")]) == 3
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith("error: ") and "no." in line for line in lines)
+
+
+def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
+    assert petsc_overrides(["-contact_ksp_rtol", "-1", "-contact_view"]) == [
+        "petsc.contact_ksp_rtol=-1",
+        "petsc.contact_view=true",
+    ]
+    assert main(["check", str(scene), "--", "-contact_snes_monitor"]) == 2
+    for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):
+        with pytest.raises(StudyError, match="-contact_"):
+            petsc_overrides(words)
+
+
+def fake_pipeline(monkeypatch):
+    """What the commands need of ``study.pipeline``."""
+    module = ModuleType("study.pipeline")
+    module.patch_faces = lambda scene: 200
+    module.axis_symmetry = lambda scene: 0
+    monkeypatch.setitem(sys.modules, "study.pipeline", module)
+    monkeypatch.setattr(study, "pipeline", module, raising=False)
+
+
+def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypatch):
+    fake_pipeline(monkeypatch)
+    target = tmp_path / "new" / "ball.hdf"
+    assert main(["plan", str(scene), "-n", "4", "-o", str(target)]) == 0
+    text = capsys.readouterr().out
+    assert "12 = 3 x 2 x 2 (station, angle, normal_force)" in text
+    assert "3 ladders of 2 forces, 3 candidates are images of others" in text
+    assert "not known before" in text
+    assert not target.parent.exists()
+
+
+def test_status_tells_counts_reasons_and_sessions(finished, capsys):
+    assert main(["status", str(finished)]) == 0
+    text = capsys.readouterr().out
+    assert "35 of 36 cases done, 1 failed, 0 missing" in text
+    assert "failed 1 x no contact at this force [station 20 mm, angle 90 deg, normal_force 1 N]" in text
+    assert "session 1: 20" in text
+    assert text.rstrip().endswith("complete")
+
+
+def test_the_best_grasp_is_the_one_with_the_highest_quality(finished, capsys):
+    rows = {i: fake_result(first) for unit in fake_plan().units for first, i in shared_rows(unit)}
+    forces = fake_plan().layout.axes[-1].values
+    for force, k in ((5.0, 2), (1.9, 1)):
+        quality = {i: r.values["maps/quality"][0] for i, r in rows.items() if i % 3 == k}
+        expected = sorted(quality, key=lambda i: -quality[i])[:4]
+        assert main(["show", str(finished), "--force", str(force), "--top", "4", "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["units"]["station"] == "m"
+        assert f"at {forces[k]:g} N" in found["title"]
+        assert [g["quality"] for g in found["grasps"]] == [quality[i] for i in expected]
+        station = fake_plan().layout.axes[0].values
+        assert found["grasps"][0]["station"] in {station[expected[0] // 6], station[expected[1] // 6]}
+        assert found["grasps"][0]["f_y_max"] is None  # the formula gives none
+
+
+def shared_rows(unit):
+    """Which row's formula every row of a unit holds."""
+    return [(unit.rows[0][k], row) for rows in unit.rows for k, row in enumerate(rows)]
+
+
+def test_show_writes_a_table_that_programs_read(finished, capsys):
+    assert main(["show", str(finished), "--top", "0", "--csv"]) == 0
+    table = list(csv.reader(io.StringIO(capsys.readouterr().out)))
+    assert table[0][:4] == ["rank", "station [m]", "angle [rad]", "quality"]
+    assert len(table) == 1 + 12
+    quality = np.array([float(row[3]) for row in table[1:]])
+    assert (np.diff(quality) <= 0).all()
+    assert main(["show", str(finished), "--force", "1", "--top", "0"]) == 0
+    text = capsys.readouterr().out.splitlines()
+    assert text[0] == "best 11 of 11 solved candidates at 1 N"
+    assert "station [mm]" in text[1]
+
+
+def test_schema_is_json(capsys):
+    assert main(["schema"]) == 0
+    assert "gripper" in json.loads(capsys.readouterr().out)["properties"]
+
+
+def loaded(*words):
+    """Modules that a command imports, its exit code and its quickest time of three [s]."""
+    command = [sys.executable, "-m", "study", *map(str, words)]
+    told = subprocess.run([command[0], "-X", "importtime", *command[1:]], capture_output=True, text=True, cwd=ROOT)
+    lines = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]
+    times = []
+    for _ in range(3):
+        began = time.perf_counter()
+        subprocess.run(command, capture_output=True, cwd=ROOT)
+        times.append(time.perf_counter() - began)
+    return {line.partition(".")[0] for line in lines}, told.returncode, min(times)
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("command", ["help", "check", "status", "show"])
+def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once):
+    words = {"help": ["--help"], "check": ["check", scene], "status": ["status", finished], "show": ["show", finished]}
+    modules, code, seconds = once(lambda: loaded(*words[command]))
+    assert code == 0
+    assert modules.isdisjoint(HEAVY)
+    assert ("numpy" in modules) == (command in ("status", "show"))
+    # 0.3 s on an idle machine; what is asserted leaves room for a busy one.
+    assert seconds < 1.0
+
+
+@pytest.mark.launches
+def test_a_bad_scene_is_told_once_by_all_ranks_together(once, tmp_path):
+    code, output, errors = once(lambda: launch(2, "-m", "study", "run", tmp_path / "no.toml"))
+    assert code == 2
+    assert output == ""
+    assert errors.count("error: ") == 1
+    code, _, errors = once(lambda: launch(2, "-m", "study", "rum"))
+    assert code == 2
+    assert errors.count("invalid choice") == 1

@@ -1,0 +1,284 @@
+"""Runs of a fake study under mpirun: the same bits on any number of ranks, and no kill, full disk or bug loses work."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from study.layout import DONE, FAILED, MISSING
+from study.store import open_result
+from tests.study.launching import ROOT, contents, start, study, wait_for
+
+pytestmark = pytest.mark.launches
+
+
+def states(path):
+    with open_result(path) as result:
+        return result.status.ravel()
+
+
+def begun(path):
+    """Whether at least two cases are done and some are not."""
+    return path.exists() and 2 <= (states(path) == DONE).sum() < states(path).size
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory, comm):
+    """What one rank writes without being disturbed."""
+    found = None
+    if comm.rank == 0:
+        path = tmp_path_factory.mktemp("whole") / "whole.hdf"
+        assert study(0, path)[0] == 0
+        found = contents(path)
+    return comm.bcast(found)
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, uninterrupted, ranks):
+    path = shared_path / "ranks.hdf"
+    code, output, errors = once(study, ranks, path)
+    assert code == 0, errors
+    assert "36 of 36 cases done" in output
+    assert once(contents, path) == uninterrupted
+    assert not list(shared_path.glob("*.lock"))
+    assert not list(shared_path.glob("*.part"))
+
+
+def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on(once, shared_path, uninterrupted):
+    path = shared_path / "killed.hdf"
+    code, _, _ = once(study, 2, path, "--kill", 20)
+    assert code not in (0, 6, 75)
+    before = once(contents, path)
+    done = once(states, path) == DONE
+    assert 0 < done.sum() < 36
+    code, output, errors = once(study, 3, path)
+    assert code == 0, errors
+    assert f"resumed, {36 - done.sum()} of 36 cases" in output
+    assert before != uninterrupted
+    assert once(contents, path) == uninterrupted
+
+
+def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once, shared_path, uninterrupted):
+    path = shared_path / "orphans.hdf"
+
+    def kill_mpirun():
+        process = start(2, path, "--delay", 0.3)
+        wait_for(lambda: begun(path))
+        process.kill()
+        process.communicate()
+        codes = [study(0, path)[0]]
+        deadline = time.monotonic() + 40
+        while codes[-1] == 4 and time.monotonic() < deadline:
+            codes.append(study(0, path)[0])
+            time.sleep(0.2)
+        return codes
+
+    codes = once(kill_mpirun)
+    assert codes[-1] == 0
+    assert set(codes[:-1]) <= {4}
+    assert once(contents, path) == uninterrupted
+
+
+def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, uninterrupted):
+    path = shared_path / "deadly.hdf"
+    assert once(study, 0, path, "--kill", 13)[0] == -signal.SIGKILL
+    assert once(study, 0, path, "--kill", 13)[0] == -signal.SIGKILL
+    code, output, _ = once(study, 0, path, "--kill", 13)
+    assert code == 6
+    assert "the process was killed 2 times while it solved this case" in output
+    # Row 13 and the force above it, for both candidates of the unit; everything else is solved.
+    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [13, 14, 16, 17]
+    assert once(study, 0, path)[0] == 6
+    assert once(study, 2, path, "--retry-failed")[0] == 0
+    assert once(contents, path) == uninterrupted
+
+
+def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninterrupted):
+    path = shared_path / "failed.hdf"
+    code, output, errors = once(study, 2, path, "--fail", 9, "--raises", 25)
+    assert code == 6, errors
+    assert "1 x no contact at this force [station 20 mm, angle 90 deg, normal_force 1 N]" in output
+    # The exception ends the ladder: its row and the one above, for both candidates.
+    assert "4 x ArithmeticError: the contact solve diverged (fake_run.py:" in output
+    assert (once(states, path) == FAILED).sum() == 5
+    with open_result(path) as result:
+        assert result.messages.ravel()[9] == "no contact at this force"
+        assert np.isnan(result.map("e_n", "curved").ravel()[[9, 25, 26]]).all()
+        assert result.map("e_n", "curved").ravel()[10] > 0
+    assert once(study, 0, path)[0] == 6
+    assert once(study, 2, path, "--retry-failed")[0] == 0
+    assert once(contents, path) == uninterrupted
+
+
+@pytest.mark.parametrize(("name", "ranks"), [("SIGUSR1", 2), ("SIGTERM", 0), ("SIGINT", 0)])
+def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path, uninterrupted, name, ranks):
+    path = shared_path / f"{name}.hdf"
+
+    def stop():
+        process = start(ranks, path, "--delay", 0.15)
+        wait_for(lambda: begun(path))
+        process.send_signal(getattr(signal, name))
+        output, _ = process.communicate(timeout=60)
+        return process.returncode, output
+
+    code, output = once(stop)
+    assert code == 75
+    left = (once(states, path) == MISSING).sum()
+    assert left > 0
+    assert f"{left} missing" in output
+    with open_result(path) as result:
+        assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
+        assert not result.read("status/attempts")[result.status == MISSING].any()
+    assert once(study, 1, path)[0] == 0
+    assert once(contents, path) == uninterrupted
+
+
+def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, shared_path):
+    path = shared_path / "hangs.hdf"
+
+    def stop():
+        process = start(0, path, "--hang", 14)
+        wait_for(lambda: begun(path) and states(path)[13] == DONE)
+        began = time.monotonic()
+        process.terminate()
+        process.communicate(timeout=60)
+        return process.returncode, time.monotonic() - began
+
+    code, seconds = once(stop)
+    assert code == 75
+    assert seconds < 10  # the case would take a minute
+    with open_result(path) as result:
+        assert result.status.ravel()[14] == MISSING
+        assert result.read("status/attempts").ravel()[14] == 0
+
+
+def test_another_scene_is_refused(once, shared_path):
+    path = shared_path / "scene.hdf"
+    assert once(study, 0, path)[0] == 0
+    before = once(contents, path)
+    code, _, errors = once(study, 2, path, "--digest", "other")
+    assert code == 3
+    assert errors.count("error: ") == 1
+    assert "made from another scene" in errors
+    assert once(contents, path) == before
+
+
+@pytest.mark.parametrize(("what", "ranks"), [("text", 0), ("truncated", 2)])
+def test_a_file_that_is_no_result_is_refused(once, shared_path, what, ranks):
+    path = shared_path / f"{what}.hdf"
+
+    def spoil():
+        if what == "truncated":
+            assert study(0, path)[0] == 0
+            os.truncate(path, 100_000)
+        else:
+            path.write_text("my notes")
+        size = path.stat().st_size
+        return *study(ranks, path), size == path.stat().st_size
+
+    code, _, errors, same = once(spoil)
+    assert code == 3
+    assert errors.count("error: ") == 1
+    assert "not a readable result file" in errors
+    assert same
+
+
+def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, shared_path):
+    path = shared_path / "busy.hdf"
+
+    def second():
+        process = start(2, path, "--delay", 0.2)
+        wait_for(lambda: begun(path))
+        told = subprocess.run(
+            [sys.executable, "-m", "study", "status", str(path)], cwd=ROOT, capture_output=True, text=True
+        )
+        answer = study(0, path)
+        process.communicate(timeout=60)
+        return told, answer, process.returncode
+
+    told, (code, _, errors), first = once(second)
+    assert told.returncode == 0
+    assert "running now: host " in told.stdout
+    assert " missing" in told.stdout
+    assert code == 4
+    assert "in use by another run (host " in errors
+    assert first == 0
+
+
+@pytest.mark.parametrize(("place", "ranks"), [("/proc/softjaw.hdf", 0), ("a_file/x.hdf", 2), ("", 0)])
+def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(once, shared_path, place, ranks):
+    (shared_path / "a_file").write_text("")
+    code, _, errors = once(study, ranks, shared_path / place)
+    assert code == 5, errors
+    assert errors.count("error: ") == 1
+
+
+@pytest.mark.parametrize("how", ["full", "limit"])
+def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path, how):
+    def squeeze():
+        if how == "limit":
+            return study(0, shared_path / "x.hdf", "--file-limit", 300_000)
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", shared_path], capture_output=True)
+        if mounted.returncode:
+            pytest.skip("no right to mount a small file system")
+        try:
+            return study(2, shared_path / "x.hdf")
+        finally:
+            subprocess.run(["umount", shared_path], check=True)
+
+    try:
+        code, output, errors = once(squeeze)
+    except pytest.skip.Exception:
+        pytest.skip("no right to mount a small file system")
+    assert code == 5, errors
+    assert errors.count("error: ") == 1
+    assert "MB" in errors
+    assert "cases to solve" not in output
+    assert not (shared_path / "x.hdf.part").exists()
+
+
+def test_a_torn_row_is_solved_again(once, shared_path, uninterrupted):
+    import h5py
+
+    path = shared_path / "torn.hdf"
+
+    def tear():
+        assert study(0, path)[0] == 0
+        with h5py.File(path, "r+") as file:
+            file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
+            file["study/patch/normal"][30, 0, 3, 1] = 0.0
+        return study(2, path)
+
+    code, output, _ = once(tear)
+    assert code == 0
+    assert "2 of 36 cases to solve on 2 ranks, 2 torn results are solved again" in output
+    assert once(contents, path) == uninterrupted
+
+
+def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(once, shared_path, uninterrupted):
+    path = shared_path / "bug.hdf"
+    code, _, errors = once(study, 2, path, "--bug", 2)
+    assert code == 70
+    assert "ZeroDivisionError" in errors
+    assert once(study, 2, path)[0] == 0
+    assert once(contents, path) == uninterrupted
+
+
+def test_a_finished_file_is_left_as_it_is(once, shared_path):
+    path = shared_path / "twice.hdf"
+    assert once(study, 0, path)[0] == 0
+    before = once(contents, path)
+    code, output, _ = once(study, 2, path, "--fail", 3)
+    assert code == 0
+    assert "0 of 36 cases to solve" in output
+    assert once(contents, path) == before
+    with open_result(path) as result:
+        assert [s["reason"] for s in result.sessions] == ["complete", "complete"]
+        assert [s["ranks"] for s in result.sessions] == [1, 2]
+        assert "numpy" in result.sessions[0]["versions"]

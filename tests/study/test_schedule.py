@@ -1,0 +1,98 @@
+"""Who solves what: every unit once, the expensive ones first, and nothing new after a stop."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from itertools import chain
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from study.environment import launch_environment
+from study.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
+
+CLAIMS = """
+from mpi4py import MPI
+from study.schedule import Claims
+import time
+comm = MPI.COMM_WORLD
+node = comm.Split({color}) if {color} is not None else None
+claims = Claims(comm, {count}, node)
+mine = []
+for position in claims:
+    mine.append(position)
+    time.sleep(0.002 * (1 + 4 * (comm.rank == 0)))
+    if position == {stop}:
+        claims.stop()
+everybody = comm.gather(mine)
+stopped = comm.gather(claims.stopped)
+claims.free()
+if comm.rank == 0:
+    print(everybody, stopped)
+"""
+
+
+def claims(ranks, **values):
+    """Positions of each rank, and whether each saw a stop."""
+    words = f"timeout -k 5 60 mpirun --timeout 50 -n {ranks} --oversubscribe {sys.executable}".split()
+    code = CLAIMS.format(**{"color": None, "stop": -1, **values})
+    done = subprocess.run([*words, "-c", code], env=launch_environment(), capture_output=True, text=True, timeout=70)
+    assert done.returncode == 0, done.stderr
+    return eval(done.stdout.strip().replace("] [", "], ["))
+
+
+@pytest.mark.launches
+def test_every_position_goes_to_one_rank_and_a_slow_rank_takes_fewer(once):
+    taken, _ = once(lambda: claims(3, count=60))
+    assert sorted(list(chain(*taken))) == list(range(60))
+    assert all(own == sorted(own) for own in taken)
+    assert len(taken[0]) < min(len(taken[1]), len(taken[2]))
+
+
+@pytest.mark.launches
+def test_nodes_take_positions_in_turn(once):
+    """Ranks 0 and 2 share one memory, rank 1 has its own: even positions there, odd ones here."""
+    taken, _ = once(lambda: claims(3, count=21, color="comm.rank % 2"))
+    assert sorted(taken[0] + taken[2]) == list(range(0, 21, 2))
+    assert taken[1] == list(range(1, 21, 2))
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("count", [0, 1])
+def test_more_ranks_than_work(once, count):
+    taken, _ = once(lambda: claims(3, count=count))
+    assert list(chain(*taken)) == list(range(count))
+
+
+@pytest.mark.launches
+def test_a_stop_reaches_the_other_ranks(once):
+    taken, stopped = once(lambda: claims(2, count=100_000, stop=20))
+    assert stopped == [True, True]
+    assert 20 < len(list(chain(*taken))) < 200
+
+
+def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
+    """Graham: longest first needs at most 4/3 - 1/(3 n) of the best; the best is at least mean and largest cost."""
+    random = np.random.default_rng(1)
+    for n in (2, 3, 8):
+        costs = list(random.random(40))
+        best = max(sum(costs) / n, max(costs))
+        assert best <= makespan(costs, n) <= (4 / 3 - 1 / (3 * n)) * best
+    assert makespan([1.0, 2.0, 4.0], 1) == 7.0
+    assert makespan([1.0, 2.0, 4.0], 5) == 4.0
+    assert by_cost([2.0, 3.0, 2.0]) == [1, 0, 2]
+
+
+def test_more_ranks_than_ladders_are_not_sensible():
+    assert sensible_ranks([1.0] * 35) == 35
+    assert sensible_ranks([10.0, 1.0, 1.0]) == 1
+    assert sensible_ranks([]) == 1
+
+
+def test_times_of_unsolved_units_follow_from_their_cost():
+    units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c) for i, c in enumerate([1.0, 2.0, 4.0]))
+    plan = Plan(None, None, units)
+    assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == [6.0, 12.0, 24.0]
+    assert unit_seconds(plan, np.full(6, np.nan)) == []

@@ -1,0 +1,311 @@
+"""The result file: what it holds, what viewers see, and what is refused when it comes from elsewhere."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections import namedtuple
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.layout import Derived, Header, Layout, groups, layout_from_options, view_slice
+from study.lock import Lock, holder
+from study.quantities import MAPS, MODELS, quantities
+from study.reading import StoredAxis
+from study.record import blank, crc32, record, text_bytes
+from study.result import CaseResult
+from study.store import create, open_result, torn_rows, verify
+from tests.study.fake_run import fake_result
+
+HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))
+
+
+def axis(name, n, units=""):
+    return StoredAxis(name, np.arange(n, dtype=float), units, f"the {name}")
+
+
+def small(**options):
+    sizes = {"station": 5, "angle": 2, "normal_force": 3, **options.pop("sizes", {})}
+    return Layout(tuple(axis(name, n, "m" if name == "station" else "") for name, n in sizes.items()), 4, **options)
+
+
+@pytest.fixture
+def path(tmp_path):
+    created = tmp_path / "small.hdf"
+    create(created, small(), HEADER)
+    return created
+
+
+def put(path, layout, row, values):
+    """A done row, written without MPI."""
+    with h5py.File(path, "r+") as file:
+        index = np.unravel_index(row, layout.shape)
+        for column, value in zip(layout.columns, values, strict=True):
+            file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
+        file["study/status/crc"][index] = crc32(layout, values)
+        file["study/status/code"][index] = 1
+
+
+def test_what_was_written_is_read(path):
+    layout, result = small(), fake_result(3)
+    patch = {name: values[:, :4] for name, values in result.patch.items()}
+    put(path, layout, 10, record(layout, replace(result, patch=patch, message="grüße")))
+    with open_result(path) as read:
+        assert [a.name for a in read.axes] == ["station", "angle", "normal_force"]
+        assert read.axes[0].units == "m"
+        assert read.axes[0].long_name == "the station"
+        assert read.row(1, 1, 1) == 10
+        for i, model in enumerate(MODELS):
+            assert read.map("e_n", model)[1, 1, 1] == result.values["maps/e_n"][i]
+        assert read.map("S")[1, 1, 1] == result.values["maps/S"]
+        assert np.array_equal(read.fingers("f_x_max")[1, 1, 1], result.values["fingers/f_x_max"])
+        assert np.array_equal(read.checks("tension")[1, 1, 1], result.values["checks/tension"])
+        assert np.array_equal(read.patch(10)["normal"], patch["normal"])
+        assert np.isnan(read.patch(10)["centroid"]).all()
+        assert {k: v[1, 1, 1] for k, v in read.effects("pad").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
+        assert read.messages[1, 1, 1] == "grüße"
+        assert (read.status == 1).sum() == 1
+        assert read.scene == 'a = "µ"\n'
+        assert read.title == "Flasche"
+        assert list(read.labels.ravel()[:3]) == ["left", "ötken", ""]
+        for q in MAPS:
+            assert (q.key in read.definitions) != q.only_with_two_meshes
+
+
+def test_a_fresh_file_is_empty_everywhere(path):
+    layout = small()
+    with open_result(path) as read:
+        for q in quantities():
+            values = [read.map(q.name, m) for m in MODELS] if q.group == "maps" and q.by_model else None
+            values = values or ([read.map(q.name)] if q.group == "maps" else [read.read(q.key)])
+            assert all(np.isnan(v).all() for v in values), q.key
+        assert not read.status.any()
+        assert not read.sessions
+    assert layout.nbytes >= path.stat().st_size > 0.5 * layout.nbytes - 2**17
+
+
+def test_viewers_find_a_plot_from_the_root_down(path):
+    with h5py.File(path) as file:
+        assert file.attrs["NX_class"] == "NXroot"
+        entry = file[file.attrs["default"]]
+        assert entry.attrs["NX_class"] == "NXentry"
+        plot = entry[entry.attrs["default"]]
+        assert plot.attrs["NX_class"] == "NXdata"
+        signals = [plot.attrs["signal"], *plot.attrs["auxiliary_signals"]]
+        assert signals == ["curved", "flat", "projected"]
+        # silx draws nothing over an axis of two values: that one is named '.' and keeps its dimension scale.
+        assert list(plot.attrs["axes"]) == ["station", ".", "normal_force"]
+        assert list(plot.attrs["default_slice"]) == [".", ".", "2"]
+        for name in signals:
+            assert plot[name].attrs["long_name"] == f"grasp quality, {name}"
+            assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["station", "angle", "normal_force"]
+        assert entry["e_n/curved"].attrs["units"] == "m"
+        assert entry["patch/normal"].dims[3][0].shape == (3,)
+
+
+def test_every_dimension_has_a_scale_beside_the_data(path):
+    """xarray refuses datasets of which only some dimensions have one."""
+    with h5py.File(path) as file:
+        for dataset in small().datasets:
+            found = file[dataset.path]
+            names = [d[0].name.rpartition("/")[2] for d in found.dims]
+            assert all(name in found.parent for name in names)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [
+        ({}, [".", ".", "2"]),
+        ({"angle": 1}, [".", "0", "."]),
+        ({"angle": 1, "normal_force": 1}, [".", "0", "0"]),
+        ({"station": 1, "angle": 1}, ["0", "0", "."]),
+        ({"station": 1, "angle": 1, "normal_force": 1}, ["0", "0", "."]),
+    ],
+)
+def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expected):
+    assert view_slice(small(sizes=sizes)) == expected
+
+
+def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
+    axes = (axis("object.radius", 3, "m"), *small().axes)
+    layout = Layout(axes, 4, 2, False, (Derived("slope", "1", "slope", "a slope", ("object.radius",)),))
+    create(tmp_path / "s.hdf", layout, HEADER)
+    with open_result(tmp_path / "s.hdf") as read:
+        assert read.layout.shape == (3, 5, 2, 3)
+        assert read.axes[0].name == "object_radius"
+        assert read.map("e_n_error").shape == read.layout.shape
+        assert read.patch(0) == {}
+        assert read.derived("slope").shape == (3,)
+    assert view_slice(layout) == ["0", ".", ".", "2"]
+    assert "patch" not in groups(layout)
+    assert layout_from_options(axes, layout.options()) == layout
+    verify(tmp_path / "s.hdf", layout, HEADER)
+
+
+def test_damage_in_a_done_row_is_found_and_timings_do_not_count(path):
+    layout = small()
+    result = CaseResult({"maps/e_n": [1.0, 2.0, 3.0], "work/seconds_total": 2.0})
+    for row in (0, 7, 29):
+        put(path, layout, row, record(layout, result))
+    assert torn_rows(path, layout) == []
+    with h5py.File(path, "r+") as file:
+        file["study/work/seconds_total"][0, 0, 0] = 5.0
+        file["study/e_n/flat"][0, 0, 1] = 7.0  # not a done row
+        file["study/status/message"][1, 0, 1] = b"other"
+        file["study/patch/area"][29, 1, 3] = 0.0
+    assert torn_rows(path, layout) == [7, 29]
+
+
+def test_a_result_that_does_not_fit_the_tables_is_a_bug():
+    layout = small()
+    with pytest.raises(ValueError, match="maps/nonsense"):
+        record(layout, CaseResult({"maps/nonsense": 1.0}))
+    with pytest.raises(ValueError, match=r"'fingers/S' of a case has shape \(3,\)"):
+        record(layout, CaseResult({"fingers/S": [1, 2, 3]}))
+    with pytest.raises(ValueError, match="maps/e_n"):
+        record(layout, CaseResult({"maps/e_n": 1.0}))
+    with pytest.raises(ValueError, match="patch/pressure"):
+        record(layout, CaseResult({}, {"pressure": np.zeros((2, 5))}))
+
+
+def test_messages_are_cut_between_letters():
+    assert text_bytes("a\n b", 9) == b"a b"
+    assert text_bytes("ä" * 5, 5).decode() == "ää"
+    assert blank(small(), "no contact")[-1] == b"no contact"
+
+
+def test_a_full_disk_is_told_with_numbers(tmp_path, monkeypatch):
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(0, 0, 12345))
+    with pytest.raises(StudyError, match=r"needs \d\.\d MB, only 0\.0 MB are free") as caught:
+        create(tmp_path / "x.hdf", small(), HEADER)
+    assert caught.value.code == CANNOT_WRITE
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_the_file_of_this_scene_is_resumed(path):
+    verify(path, small(), HEADER)
+    with pytest.raises(StudyError, match="another scene") as caught:
+        verify(path, small(), replace(HEADER, digest="xyz"))
+    assert caught.value.code == OTHER_FILE
+    with pytest.raises(StudyError, match="other values"):
+        verify(path, small(meshes=2), HEADER)
+
+
+def spoil_root(file):
+    del file.attrs["program"]
+
+
+def spoil_version(file):
+    file.attrs["layout_version"] = 99
+
+
+def spoil_options(file):
+    file["study"].attrs["options"] = "{}"
+
+
+def spoil_axis(file):
+    file["study"].attrs["axes"] = np.array(["station", "angle", "nothing"], object)
+
+
+@pytest.mark.parametrize("spoil", [spoil_root, spoil_version, spoil_options, spoil_axis])
+def test_a_file_of_another_kind_is_refused_when_it_is_opened(path, spoil):
+    with h5py.File(path, "r+") as file:
+        spoil(file)
+    with pytest.raises(StudyError) as caught:
+        open_result(path)
+    assert caught.value.code == OTHER_FILE
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["missing", "empty", "text", "truncated", "folder"])
+def test_what_is_no_hdf5_file_is_refused(path, kind):
+    if kind == "missing":
+        path.unlink()
+    elif kind == "truncated":
+        os.truncate(path, 50_000)
+    elif kind == "folder":
+        path = path.parent
+    else:
+        path.write_text("" if kind == "empty" else "station,e_n\n1,2\n")
+    with pytest.raises(StudyError) as caught:
+        open_result(path)
+    assert caught.value.code == OTHER_FILE
+
+
+def evil_external_data(file, secret):
+    file.create_dataset("study/e_n/curved", (5, 2, 3), "<f8", external=[(str(secret), 0, 240)])
+
+
+def evil_link(file, secret):
+    file["study/e_n/curved"] = h5py.ExternalLink(str(secret), "/x")
+
+
+def evil_soft_link(file, _):
+    file["study/e_n/curved"] = h5py.SoftLink("/study/e_n/flat")
+
+
+def evil_virtual(file, secret):
+    layout = h5py.VirtualLayout((5, 2, 3), "<f8")
+    layout[...] = h5py.VirtualSource(str(secret), "x", (5, 2, 3))
+    file.create_virtual_dataset("study/e_n/curved", layout)
+
+
+def evil_shape(file, _):
+    file.create_dataset("study/e_n/curved", (50, 2, 3), "<f8")
+
+
+def evil_type(file, _):
+    file.create_dataset("study/e_n/curved", (5, 2, 3), "<f4")
+
+
+@pytest.mark.parametrize(
+    "evil", [evil_external_data, evil_link, evil_soft_link, evil_virtual, evil_shape, evil_type]
+)
+def test_data_from_elsewhere_are_not_read(path, tmp_path, evil):
+    secret = tmp_path / "secret"
+    secret.write_bytes(b"s" * 400)
+    with h5py.File(path, "r+") as file:
+        del file["study/e_n/curved"]
+        evil(file, secret)
+    with open_result(path) as read:
+        assert read.map("e_n", "flat").shape == (5, 2, 3)
+        with pytest.raises(StudyError) as caught:
+            read.map("e_n", "curved")
+    assert caught.value.code == OTHER_FILE
+
+
+def test_a_small_file_cannot_claim_terabytes(path):
+    with h5py.File(path, "r+") as file:
+        del file["study/axes/station"]
+        file.create_dataset("study/axes/station", (10**13,), "<f8", chunks=(1000,))
+    with pytest.raises(StudyError, match="not stored in this file"):
+        open_result(path)
+
+
+def test_a_lock_keeps_a_second_run_away_and_goes_with_its_holder(tmp_path):
+    first, second = Lock(tmp_path / "x.hdf", "first"), Lock(tmp_path / "x.hdf", "second")
+    first.take_first()
+    first.confirm()
+    assert holder(tmp_path / "x.hdf") == "first"
+    with pytest.raises(StudyError, match=r"in use by another run \(first\)"):
+        second.take_first()
+    first.remove()
+    first.release()
+    assert holder(tmp_path / "x.hdf") == ""
+    second.take_first()
+    second.confirm()
+    second.release()
+
+
+def test_a_run_that_was_overtaken_while_it_locked_withdraws(tmp_path):
+    lock = Lock(tmp_path / "x.hdf", "first")
+    lock.take_first()
+    lock.path.write_text("second")  # between the exclusive and the shared lock
+    with pytest.raises(StudyError, match="second"):
+        lock.confirm()
+    lock.release()
