@@ -141,7 +141,7 @@ def straight_runs(points: FloatArray) -> list[tuple[int, int, bool]]:
         j = i + 1
         while j < last and _on_a_line(points[i : j + 2]):
             j += 1
-        if j >= i + 2 or last == 1:
+        if j >= i + 2 or (last == 1 and _on_a_line(points)):
             if bent_from < i:
                 runs.append((bent_from, i, False))
             runs.append((i, j, True))
@@ -230,8 +230,9 @@ def _lid(given: Curve, rim: float, *, first: bool) -> list[Curve]:
     if p[1] < 1e-9:  # rounded: the line that ends on the axis was given by its length
         return []
     mirror = np.array([-1.0, 1.0]) if first else np.ones(2)  # the first end is a last one, seen backwards
+    speed = np.linalg.norm(d1)
+    d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2  # by arc length, so that the rim starts evenly
     t, axis = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
-    t /= np.linalg.norm(t)
     radius = min(rim, 0.25 * p[1])
     pieces, start = [], p * mirror
     if t @ axis < 1 - 1e-9:

@@ -1,5 +1,6 @@
 """Meshes as objects: what is refused and why, the frame, convergence to the analytic shapes."""
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pyvista as pv
 from fem.closest import ellipse_gap
 from fem.crossing import crossing_pairs
 from fem.mesh_check import MeshError, sound_mesh, winding_number
-from fem.mesh_object import MeshObject
+from fem.mesh_object import MeshObject, read_triangles
 from fem.objects import Sphere
 from fem.pose import Pose
 from fem.touch import NoContactError, first_touch
@@ -164,6 +165,12 @@ def test_shipped_flask_is_sound_and_stands_on_its_frame(flask):
     assert flask.axis_symmetry == 1
     points, triangles = flask.surface()
     assert winding_number(np.array([0, 0, 0.06]), points, triangles) == pytest.approx(1)
+
+
+def test_shipped_flask_is_what_its_script_draws():
+    points, triangles = runpy.run_path(str(FLASK.with_name("make_flask.py")))["flask"]()
+    corners, _ = read_triangles(FLASK)
+    assert corners.reshape(-1, 3, 3) == pytest.approx(points[triangles], abs=1e-4)
 
 
 def test_first_touch_on_the_flask(flask):

@@ -219,6 +219,24 @@ def test_gap_grows_past_an_open_end():
     assert SHAPES["open tube"].bounds[:, 2] == pytest.approx([-0.002, 0.102])
 
 
+def test_rim_continues_a_curved_end_smoothly():
+    """The vase's wall flares at its open ends; the rim takes over direction and curvature and stays about a circle."""
+    z = MM * np.linspace(0, 100, 11)
+    vase = Revolution(np.stack([z, 0.03 + 4 * (z - 0.05) ** 2], axis=1), rim=0.003)
+    assert np.abs(vase.curve.curvature(vase.curve.inner(50))).max() < 3 / 0.003
+    s = vase.curve.breaks[1:-1]
+    assert vase.curve.curvature(s) == pytest.approx(vase.curve.curvature(s - 1e-12), abs=1e-3)
+    assert vase.overshoot < 0.2e-3
+
+
+def test_end_on_the_axis_has_no_tip():
+    tip = Revolution([[0, 0], [0.05, 0.03]])
+    g, normal, H = tip.gap(np.array([[0, 0, -0.01], [1e-12, 0, -0.01]]))
+    assert g == pytest.approx([0.01, 0.01], abs=1e-15)
+    assert normal == pytest.approx(np.array([[0, 0, -1.0]] * 2), abs=1e-9)
+    assert H[0, 0, 0] == pytest.approx(H[0, 1, 1], rel=1e-9)
+
+
 def test_corner_between_straight_runs_is_rounded():
     can = Revolution([[0, 0], [0, 0.015], [0, 0.03], [0.05, 0.03], [0.1, 0.03], [0.1, 0.015], [0.1, 0]], rim=0.004)
     x = np.array([[0.03, 0, 0.1], [0.03, 0, 0.05], [0.01, 0, 0.1], [0.03 - 0.004, 0, 0.1]])
