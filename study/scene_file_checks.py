@@ -1,0 +1,52 @@
+"""What files and PETSc options named in a scene must satisfy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from study.scene_errors import Finding, shown
+from study.scene_sections import Output
+from study.scene_shapes import Mesh
+
+
+def output_file(output: Output) -> Iterator[Finding]:
+    """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
+    path, parts = ("output", "file"), PurePosixPath(output.file).parts
+    if not output.file.endswith(".hdf"):
+        remedy = f"write {shown(re.sub(r'[.][A-Za-z0-9]*$', '', output.file) + '.hdf')}"
+        yield Finding(path, shown(output.file), "a file ending in .hdf, which all viewers open", remedy)
+    if PurePosixPath(output.file).is_absolute() or PureWindowsPath(output.file).drive or ".." in parts:
+        remedy = "give any other place on the command line with `-o`"
+        yield Finding(path, shown(output.file), "a path below the working directory", remedy)
+
+
+def petsc_options(table: Mapping[str, Any]) -> Iterator[Finding]:
+    """Options of the contact solver only, and none that writes files or runs code."""
+    for key, value in table.items():
+        path, bare = ("petsc", key), re.sub(r"^-*(contact_)?", "", key)
+        if not re.fullmatch(r"contact_[a-z0-9_]+", key):
+            remedy = f"write `contact_{bare}`; other options go on the command line after `--`"
+            yield Finding(path, f"the option {shown(key)}", "an option of the contact solver, contact_...", remedy)
+        elif bare.endswith("python_type"):
+            yield Finding(path, "an option that runs Python code", "options of the solver itself", "remove it")
+        elif not isinstance(value, str | int | float):
+            yield Finding(path, shown(value), "text, a number, or true or false", "write the option's value alone")
+        elif isinstance(value, str) and not re.fullmatch(r"[A-Za-z0-9_,.+-]*", value):
+            remedy = "options that name files go on the command line after `--`"
+            yield Finding(path, shown(value), "a word, a number or a list of them", remedy)
+
+
+def mesh_file(shape: Mesh) -> Iterator[Finding]:
+    """The mesh's file exists and can be one (its content is judged when it is read)."""
+    file, path = Path(shape.mesh), ("object", "mesh")
+    remedy = "the path is relative to the scene file"
+    if file.suffix.lower() not in (".stl", ".ply", ".obj"):
+        yield Finding(path, shown(file.name), "a triangle mesh in a .stl, .ply or .obj file", "convert it to .stl")
+    elif not file.is_file():
+        found = "a directory" if file.is_dir() else "no such file"
+        yield Finding(path, f"{found} at {file}", "the file of a triangle mesh", remedy)
+    elif not file.stat().st_size:
+        yield Finding(path, f"an empty file at {file}", "the file of a triangle mesh", remedy)
