@@ -1,0 +1,140 @@
+"""Grasp candidates: where both pads stand, and which candidates are images of each other by the object's symmetry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.pose import Pose
+from study.scene import Scene
+from study.scene_sections import GraspPose
+
+FloatArray = NDArray[np.float64]
+STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch
+ALIKE = 1e-9  # differences of directions [-] and of lines of approach [m] that are only rounding
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One place to grasp: station along the object's axis [m], angle about it, roll about the approach [rad].
+
+    With explicit poses ``station`` is the candidate's number and ``angle`` and ``roll`` are 0.
+    """
+
+    station: float
+    angle: float
+    roll: float
+    poses: tuple[Pose, Pose]
+    label: str
+
+
+def candidates(scene: Scene) -> list[Candidate]:
+    """The grasp candidates in the order of their rows: stations, then angles at each."""
+    where = scene.candidates
+    if where.poses:
+        return [
+            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), pose.label or f"pose {i}")
+            for i, pose in enumerate(where.poses)
+        ]
+    return [
+        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll), f"{s:g} mm, {a:g} deg")
+        for (station, s), (angle, a) in product(
+            zip(where.station_values, where.station_values_mm, strict=True),
+            zip(where.angles, where.angles_deg, strict=True),
+        )
+    ]
+
+
+def axis_poses(station: float, angle: float, roll: float) -> tuple[Pose, Pose]:
+    """Poses of the two pads at a station along the object's axis z.
+
+    Finger 1 stands at ``angle`` and approaches along ``-(cos, sin, 0)``, finger 2 comes from the opposite side. At roll
+    0 both long sides are the object's z; ``roll`` turns the gripper about finger 1's approach.
+    """
+    approach = -np.array([math.cos(angle), math.sin(angle), 0.0])
+    # The rotation of z about the approach, which is normal to it.
+    long_side = math.cos(roll) * np.array([0.0, 0.0, 1.0]) + math.sin(roll) * np.cross(approach, [0.0, 0.0, 1.0])
+    return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
+
+
+def explicit_poses(pose: GraspPose) -> tuple[Pose, Pose]:
+    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts."""
+    approach = np.array(pose.approach) / np.linalg.norm(pose.approach)
+    across = np.array(pose.long_side) - np.dot(approach, pose.long_side) * approach
+    return opposed_poses(np.array(pose.point), approach, across / np.linalg.norm(across))
+
+
+def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> tuple[Pose, Pose]:
+    """Two pads that face each other across a point, with the same long side in the object's frame.
+
+    Parameters
+    ----------
+    point : (3,) array
+        Any point on the common line of approach [m].
+    approach, long_side : (3,) arrays
+        Orthogonal unit vectors: finger 1's approach, and the long side of both pads.
+
+    Returns
+    -------
+    (Pose, Pose)
+        Finger 1 and finger 2, each `STANDOFF` away from the point.
+    """
+    return (_pose(point, approach, long_side), _pose(point, -approach, long_side))
+
+
+def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pose:
+    rotation = np.column_stack([long_side, np.cross(approach, long_side), approach])
+    return Pose(rotation, point - STANDOFF * approach)
+
+
+def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
+    """Angle about z that turns both pads of one candidate into those of another, if the object looks the same then.
+
+    Parameters
+    ----------
+    first, second : Candidate
+    axis_symmetry : int
+        Order of the object's rotational symmetry about z; 0 is every angle.
+
+    Returns
+    -------
+    float or None
+        Angle in [0, 2 pi) [rad]. A shift along the approach does not count: the press closes the fingers.
+    """
+    turn = second.poses[0].rotation @ first.poses[0].rotation.T
+    if abs(turn[2, 2] - 1) > ALIKE or np.abs(turn[2, :2]).max() > ALIKE:
+        return None
+    angle = math.atan2(turn[1, 0], turn[0, 0])
+    step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
+    if step and abs(angle - step * round(angle / step)) > ALIKE:
+        return None
+    for one, other in zip(first.poses, second.poses, strict=True):
+        shift = other.rotation.T @ (turn @ one.origin - other.origin)  # in the pad's frame: z is along the approach
+        if np.abs(turn @ one.rotation - other.rotation).max() > ALIKE or np.abs(shift[:2]).max() > ALIKE:
+            return None
+    return 0.0 if abs(angle) <= ALIKE else angle % (2 * math.pi)
+
+
+def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:
+    """Candidates that are images of each other: lists of (number, turn from the first of the list [rad])."""
+    found: dict[tuple[float, ...], list[list[tuple[int, float]]]] = {}
+    for number, place in enumerate(places):
+        for group in (alike := found.setdefault(_invariants(place), [])):
+            if (turn := turn_between(places[group[0][0]], place, axis_symmetry)) is not None:
+                group.append((number, turn))
+                break
+        else:
+            alike.append([(number, 0.0)])
+    return sorted((group for alike in found.values() for group in alike), key=lambda group: group[0][0])
+
+
+def _invariants(place: Candidate) -> tuple[float, ...]:
+    """What no turn about z and no shift along the approach changes: only candidates alike in it need be compared."""
+    pose = place.poses[0]
+    height = pose.origin[2] - (pose.origin @ pose.rotation[:, 2]) * pose.rotation[2, 2]
+    return tuple(round(float(v), 6) + 0.0 for v in (*pose.rotation[2], height))
