@@ -1,0 +1,218 @@
+"""From scenes to axes, candidates and units of work: frames, symmetry, and every row exactly once."""
+
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study import candidates, sweep
+from study.scene import load_scene, parse_scene
+
+JOBS = Path(__file__).parents[2] / "jobs"
+Z = np.array([0.0, 0.0, 1.0])
+CYLINDER = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[candidates]
+stations_mm = [-10, 0, 30]
+angles_deg = [0, 30, 90, 180, 210, 360]
+[load]
+normal_force_n = [1, 2, 5]
+"""
+POSES = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[load]
+normal_force_n = [1]
+"""
+
+
+def poses(*given):
+    """A scene with explicit poses (point, approach, long side)."""
+    table = "\n[[candidates.poses]]\npoint_mm = {}\napproach = {}\nlong_side = {}"
+    return parse_scene(POSES + "".join(table.format(*map(list, pose)) for pose in given))
+
+
+def about_z(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("roll", [0, 25, -90, 180])
+@pytest.mark.parametrize("angle", [0, 30, 90, -120, 360])
+def test_both_pads_face_each_other_with_the_same_long_side(angle, roll):
+    scene = parse_scene(CYLINDER, overrides=[f"candidates.angles_deg=[{angle}]", f"candidates.roll_deg={roll}"])
+    for place in sweep.candidates(scene):
+        one, other = place.poses
+        theta = np.radians(angle)
+        outwards = np.array([np.cos(theta), np.sin(theta), 0])
+        assert one.rotation[:, 2] == pytest.approx(-outwards, abs=1e-15)
+        assert other.rotation[:, 2] == pytest.approx(outwards, abs=1e-15)
+        assert one.rotation[:, 0] == pytest.approx(other.rotation[:, 0], abs=0)
+        for pose in place.poses:
+            assert np.linalg.det(pose.rotation) == pytest.approx(1)
+            assert pose.rotation.T @ pose.rotation == pytest.approx(np.eye(3), abs=1e-15)
+            aimed = pose.to_object(np.array([[0, 0, candidates.STANDOFF]]))[0]
+            assert aimed == pytest.approx([0, 0, place.station], abs=1e-14)
+        assert place.roll == np.radians(roll)
+
+
+def test_roll_turns_the_gripper_about_the_approach_of_finger_1():
+    """Rodrigues: the long side z turned by 90 degrees about the approach -x of finger 1 is (-x) x z = y."""
+    flat, turned = (candidates.axis_poses(0.0, 0.0, roll) for roll in (0.0, np.pi / 2))
+    assert flat[0].rotation[:, 0] == pytest.approx(Z)
+    for pose in turned:
+        assert pose.rotation[:, 0] == pytest.approx([0, 1, 0], abs=1e-15)
+
+
+def test_an_explicit_pose_equals_the_station_that_it_describes():
+    theta = np.radians(30)
+    approach = (-np.cos(theta), -np.sin(theta), 0.0)
+    (place,) = sweep.candidates(poses(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
+    for pose, same in zip(place.poses, candidates.axis_poses(0.03, theta, 0.0), strict=True):
+        assert pose.rotation == pytest.approx(same.rotation, abs=1e-15)
+        assert pose.origin == pytest.approx(same.origin, abs=1e-14)
+    assert (place.station, place.angle, place.label) == (0.0, 0.0, "pose 0")
+
+
+def test_axes_end_with_station_angle_and_force_in_si_units():
+    over = [
+        "sweep.object.semi_axis_b_mm=[40, 10, 20]",
+        "sweep.gripper.material=['linear', 'blatz_ko']",
+        "sweep.friction.mu=[0.5]",
+    ]
+    axes = sweep.axes(parse_scene(CYLINDER, overrides=over))
+    assert [a.name for a in axes] == ["semi_axis_b", "material", "mu", "station", "angle", "normal_force"]
+    assert [a.units for a in axes] == ["m", "", "", "m", "rad", "N"]
+    assert axes[0].values.tolist() == [0.01, 0.02, 0.04]
+    assert axes[1].values.tolist() == [0, 1]
+    assert axes[1].long_name == "gripper.material (0 = linear, 1 = blatz_ko)"
+    assert axes[3].values.tolist() == [-0.01, 0, 0.03]
+    assert axes[5].values.tolist() == [1, 2, 5]
+
+
+def test_axes_of_explicit_poses_number_the_candidates():
+    axes = sweep.axes(poses(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
+    assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
+
+
+def test_swept_keys_of_one_name_keep_their_section_in_the_axis_name():
+    apart = sweep._sweep_axes({"object.length_mm": (10.0,), "score.object_length_mm": (10.0,)})
+    assert [a.name for a in apart] == ["length", "object_length"]
+    alike = sweep._sweep_axes({"effects.friction": ("auto",), "x.friction": ("a",), "x.angle_deg": (90.0,)})
+    assert [a.name for a in alike] == ["effects_friction", "x_friction", "x_angle"]
+
+
+@pytest.mark.parametrize(
+    ("order", "groups"),
+    [
+        (0, [[0, 1, 2, 3, 4, 5]]),
+        (2, [[0, 3, 5], [1, 4], [2]]),
+        (1, [[0, 5], [1], [2], [3], [4]]),
+        (4, [[0, 2, 3, 5], [1, 4]]),
+        (12, [[0, 1, 2, 3, 4, 5]]),
+    ],
+)
+def test_images_under_the_symmetry_of_the_object_are_served_together(order, groups):
+    """Angles 0, 30, 90, 180, 210, 360 degrees: alike when they differ by a multiple of 360 / order."""
+    places = sweep.candidates(parse_scene(CYLINDER))
+    found = [[n for n, _ in group] for group in candidates.groups(places, order)]
+    assert found == [[6 * station + n for n in group] for station in range(3) for group in groups]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 4])
+@pytest.mark.parametrize("roll", [0, 40])
+def test_the_turn_takes_one_pair_of_pads_into_the_other(order, roll):
+    units = sweep.units(parse_scene(CYLINDER, overrides=[f"candidates.roll_deg={roll}"]), lambda scene: order)
+    for unit in units:
+        assert unit.served[0] is unit.candidate
+        for place, turn in zip(unit.served, unit.turns, strict=True):
+            for pose, image in zip(unit.candidate.poses, place.poses, strict=True):
+                assert about_z(turn) @ pose.rotation == pytest.approx(image.rotation, abs=1e-12)
+                assert about_z(turn) @ pose.origin == pytest.approx(image.origin, abs=1e-12)
+
+
+def test_explicit_poses_are_grouped_whatever_point_of_the_line_was_given():
+    given = [
+        ((0, 0, 20), (1, 0, 0), (0, 0, 1)),
+        ((40, 0, 20), (2, 0, 0), (0, 0, 3)),  # the same line
+        ((0, -7, 20), (0, 1, 0), (0, 0, 1)),  # turned by 90 degrees
+        ((0, 0, 20), (-1, 0, 0), (0, 0, 1)),  # turned by 180 degrees: the fingers have changed places
+        ((0, 5, 20), (1, 0, 0), (0, 0, 1)),  # another line
+        ((0, 0, 20), (1, 0, 0), (0, 1, 0)),  # rolled
+        ((0, 0, 21), (1, 0, 0), (0, 0, 1)),  # higher
+        ((0, 0, 20), (1, 0, 1), (0, 1, 0)),  # tilted
+        ((0, 0, 20), (0, -1, 1), (1, 0, 0)),  # tilted and turned by -90 degrees
+    ]
+    places = sweep.candidates(poses(*given))
+    found = {order: [[n for n, _ in group] for group in candidates.groups(places, order)] for order in (0, 1, 2)}
+    assert found[0] == [[0, 1, 2, 3], [4], [5], [6], [7, 8]]
+    assert found[1] == [[0, 1], [2], [3], [4], [5], [6], [7], [8]]
+    assert found[2] == [[0, 1, 3], [2], [4], [5], [6], [7], [8]]
+
+
+def test_nothing_is_grouped_that_is_not_an_image_at_random():
+    """Candidates at random angles and rolls, each with a copy that only a symmetry of order 3 makes its image."""
+    rng = np.random.default_rng(1)
+    places = []
+    for angle, roll, station in rng.uniform(-3, 3, (40, 3)):
+        for turn in (0, 2 * np.pi / 3):
+            pair = candidates.axis_poses(station, angle + turn, roll)
+            places.append(candidates.Candidate(station, angle + turn, roll, pair, ""))
+    assert all(len(group) == 1 for group in candidates.groups(places, 1))
+    assert all(len(group) == 1 for group in candidates.groups(places, 2))
+    assert [[n for n, _ in g] for g in candidates.groups(places, 3)] == [[2 * k, 2 * k + 1] for k in range(40)]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("swept", [[], ["sweep.object.semi_axis_b_mm=[10, 20]", "sweep.friction.mu=[0.2, 0.5, 0.8]"]])
+def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(order, swept):
+    scene = parse_scene(CYLINDER, overrides=swept)
+    axes, units = sweep.axes(scene), sweep.units(scene, lambda s: order)
+    shape = [len(a.values) for a in axes]
+    assert sorted(chain.from_iterable(chain.from_iterable(u.rows for u in units))) == list(range(scene.cases))
+    assert int(np.prod(shape)) == scene.cases
+    assert [u.index for u in units] == list(range(len(units)))
+    assert [u.rows[0][0] for u in units] == sorted(u.rows[0][0] for u in units)
+    for unit in units:
+        assert not unit.scene.sweep
+        for place, rows in zip(unit.served, unit.rows, strict=True):
+            for force, row in zip(unit.scene.load.normal_force, rows, strict=True):
+                at = {a.name: a.values[i] for a, i in zip(axes, np.unravel_index(row, shape), strict=True)}
+                assert (at["station"], at["angle"], at["normal_force"]) == (place.station, place.angle, force)
+                assert at.get("mu", 0.8) == unit.scene.friction.mu
+                assert at.get("semi_axis_b", 0.02) == unit.scene.object.semi_axis_b
+
+
+def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep():
+    scene = parse_scene(CYLINDER, overrides=["sweep.object.semi_axis_b_mm=[20, 25]"])
+    round_or_not = [
+        u.scene.object.semi_axis_b for u in sweep.units(scene, lambda s: 0 if s.object.semi_axis_b == 0.025 else 2)
+    ]
+    assert (round_or_not.count(0.02), round_or_not.count(0.025)) == (9, 3)
+
+
+def test_a_swept_roll_turns_the_pads():
+    scene = parse_scene(CYLINDER, overrides=["sweep.candidates.roll_deg=[0, 90]"])
+    sides = [u.candidate.poses[0].rotation[2, 0] for u in sweep.units(scene, lambda s: 0)]
+    assert sides == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-15)
+
+
+def test_finer_meshes_more_forces_and_better_elements_cost_more():
+    base = parse_scene(CYLINDER)
+    assert sweep.ladder_cost(base) == 3 * 20 * 10 * 6
+    finer = [{"gripper.element": "hex27"}, {"accuracy.meshes": 2}]
+    assert [sweep.ladder_cost(base.with_values(v)) / sweep.ladder_cost(base) for v in finer] == [8, 1.125]
+
+
+def test_the_bottle_has_70_candidates_and_35_units():
+    scene = load_scene(JOBS / "bottle-rigid.toml")
+    assert len(sweep.candidates(scene)) == 70
+    assert len(sweep.units(scene, lambda s: 0)) == 35
