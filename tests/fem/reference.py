@@ -1,0 +1,167 @@
+"""Closed forms that the solver is measured against: energies, homogeneous states, Hertz, and rigid objects.
+
+Nothing here uses the code under test, but for ``placed``, which puts an object before the pad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.pose import Pose
+
+# -- energies per reference volume [Pa] of one deformation gradient (3, 3) --------------------------------------------
+
+
+def blatz_ko_energy(F, G):
+    """``G/2 (I2/I3 + 2 sqrt(I3) - 5)`` in the invariants of C, as Blatz and Ko wrote it."""
+    C = F.T @ F
+    I2 = 0.5 * (np.trace(C) ** 2 - np.trace(C @ C))
+    I3 = np.linalg.det(C)
+    return G / 2 * (I2 / I3 + 2 * np.sqrt(I3) - 5)
+
+
+def hyperfoam_energy(F, nu, moduli, exponents):
+    """``sum 2 mu / alpha^2 [sum l^alpha - 3 + (J^(-alpha beta) - 1) / beta]`` in the singular values of F."""
+    stretch, beta = np.linalg.svd(F, compute_uv=False), nu / (1 - 2 * nu)
+    J = stretch.prod()
+    return sum(
+        2 * mu / a**2 * ((stretch**a).sum() - 3 + (J ** (-a * beta) - 1) / beta)
+        for mu, a in zip(moduli, exponents, strict=True)
+    )
+
+
+def neo_hookean_energy(F, G, nu):
+    """``G/2 (tr C - 3 - 2 ln J) + lam/2 (ln J)^2``."""
+    log_j = np.log(np.linalg.det(F))
+    return G / 2 * (np.sum(F * F) - 3 - 2 * log_j) + lame(G, nu) / 2 * log_j**2
+
+
+def linear_energy(F, G, nu):
+    """``G e:e + lam/2 (tr e)^2`` with the small strain ``e``."""
+    e = 0.5 * (F + F.T) - np.eye(3)
+    return G * np.sum(e * e) + lame(G, nu) / 2 * np.trace(e) ** 2
+
+
+def lame(G, nu):
+    """Lame's first constant ``2 G nu / (1 - 2 nu)`` [Pa]."""
+    return 2 * G * nu / (1 - 2 * nu)
+
+
+def differences(function, F, h=1e-5):
+    """Derivative by every entry of ``F``, central differences of fourth order; trailing axes (3, 3)."""
+    out = np.empty((*np.shape(function(F)), 3, 3))
+    for i in range(3):
+        for j in range(3):
+            E = np.zeros((3, 3))
+            E[i, j] = h
+            near, far = function(F + E) - function(F - E), function(F + 2 * E) - function(F - 2 * E)
+            out[..., i, j] = (8 * near - far) / (12 * h)
+    return out
+
+
+# -- homogeneous states -----------------------------------------------------------------------------------------------
+
+
+def uniaxial_hyperfoam(stretch, nu, mu, alpha):
+    """Lateral stretch ``l^-nu`` and Cauchy stress [Pa] of a one-term hyperfoam pulled or pressed to ``stretch``."""
+    lateral = stretch**-nu
+    nominal = 2 * mu / (alpha * stretch) * (stretch**alpha - stretch ** (-alpha * nu))
+    return lateral, nominal / lateral**2
+
+
+def shear_hyperfoam(gamma, moduli, exponents):
+    """Cauchy stress ``(3, 3)`` [Pa] of hyperfoam in simple shear ``F = I + gamma e1 e2``, where J = 1.
+
+    Principal stretches are ``l, 1/l, 1`` with ``l - 1/l = gamma``, principal stresses ``t = sum 2 mu/alpha
+    (l^alpha - 1)``; then ``s12 = (t1 - t2) / sqrt(gamma^2 + 4)`` and ``s11 - s22 = gamma s12``, as for every isotropic solid.
+    """
+    stretch = gamma / 2 + np.sqrt(1 + gamma**2 / 4)
+    t1, t2 = (
+        sum(2 * mu / a * (s**a - 1) for mu, a in zip(moduli, exponents, strict=True)) for s in (stretch, 1 / stretch)
+    )
+    s12 = (t1 - t2) / np.sqrt(gamma**2 + 4)
+    s11, s22 = (t1 + t2 + gamma * s12) / 2, (t1 + t2 - gamma * s12) / 2
+    return np.array([[s11, s12, 0], [s12, s22, 0], [0, 0, 0]])
+
+
+def shear_blatz_ko(gamma, G):
+    """Cauchy stress ``G (I - b^-1)`` in simple shear: ``s12 = G gamma``, ``s22 = -G gamma^2``."""
+    return G * np.array([[0, gamma, 0], [gamma, -(gamma**2), 0], [0, 0, 0]])
+
+
+def shear_neo_hookean(gamma, G):
+    """Cauchy stress ``G (b - I)`` in simple shear: ``s12 = G gamma``, ``s11 = G gamma^2``."""
+    return G * np.array([[gamma**2, gamma, 0], [gamma, 0, 0], [0, 0, 0]])
+
+
+# -- Hertz ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hertz:
+    """Contact radius or half width [m], peak pressure [Pa] and, for a sphere, approach of a half space [m]."""
+
+    radius: float
+    peak: float
+    approach: float = float("nan")
+
+
+def hertz_sphere(force, R, E_star):
+    """Rigid sphere on a half space: ``a^3 = 3 F R / (4 E*)``, ``p = 3 F / (2 pi a^2)``, ``d = a^2 / R``."""
+    a = (3 * force * R / (4 * E_star)) ** (1 / 3)
+    return Hertz(a, 3 * force / (2 * np.pi * a**2), a**2 / R)
+
+
+def hertz_cylinder(line_force, R, E_star):
+    """Rigid cylinder on a half space, force per length: ``a^2 = 4 F R / (pi E*)``, ``p = 2 F / (pi a)``."""
+    a = np.sqrt(4 * line_force * R / (np.pi * E_star))
+    return Hertz(a, 2 * line_force / (np.pi * a))
+
+
+# -- rigid objects in the pad's frame, touching the centre of the undeformed front ------------------------------------
+
+
+def plane(x):
+    """Gap to the plane z = 0, normal and Hessian."""
+    return -x[:, 2], np.tile([0.0, 0.0, -1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
+
+
+def round_gap(R, axes):
+    """Sphere (``axes = (0, 1, 2)``) or cylinder along x (``axes = (1, 2)``) of radius ``R`` about z = R."""
+    mask = np.isin(range(3), axes).astype(float)
+
+    def gap(x):
+        d = (x - [0.0, 0.0, R]) * mask
+        r = np.linalg.norm(d, axis=1)
+        n = d / r[:, None]
+        return r - R, n, (np.diag(mask) - n[:, :, None] * n[:, None, :]) / r[:, None, None]
+
+    return gap
+
+
+def sphere(R):
+    """Gap function of a sphere."""
+    return round_gap(R, (0, 1, 2))
+
+
+def cylinder(R):
+    """Gap function of a cylinder along the pad's long side."""
+    return round_gap(R, (1, 2))
+
+
+def placed(obj, pose):
+    """Gap function of an object of ``fem.objects`` in the frame of a pad that stands at ``pose``."""
+    R = pose.rotation
+
+    def gap(x):
+        g, normal, hessian = obj.gap(pose.to_object(x))
+        return g, normal @ R, R.T @ hessian @ R
+
+    return gap
+
+
+def facing(a):
+    """Pose before an object whose axis is z: long side along the axis, approach along -x, front at ``x = a``."""
+    return Pose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([a, 0.0, 0.0]))
