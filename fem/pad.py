@@ -104,6 +104,8 @@ class Pad:
         Nodes of the faces of the front.
     face_N, face_area : (points, face nodes), (m, points) arrays
         Shape functions and reference areas [m^2] at the quadrature points of the front.
+    side_weights : (points along a side,) array
+        Weights of that quadrature along one side of a face.
     """
 
     def __init__(
@@ -142,9 +144,11 @@ class Pad:
         self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
         self.dofs[back, 2] = self.travel_dof
         front = np.abs(z) < tol
-        order = np.lexsort((y[front], x[front]))
+        # nodes inside elements carry rounding errors that would mix up the rows
+        column, row = np.round(x[front] / tol), np.round(y[front] / tol)
+        order = np.lexsort((row, column))
         self.front_nodes = np.flatnonzero(front)[order].astype(np.int32)
-        self.front_grid = (len(np.unique(np.round(x[front] / tol))), len(np.unique(np.round(y[front] / tol))))
+        self.front_grid = (len(np.unique(column)), len(np.unique(row)))
         self.pressure_index = np.full(len(x), -1, dtype=np.int32)
         self.pressure_index[self.front_nodes] = np.arange(len(order), dtype=np.int32)
         self.size = self.travel_dof + 1 + len(order)
@@ -160,8 +164,9 @@ class Pad:
             [grid[i : i + step * nx : step, j : j + step * ny : step].ravel() for i, j in local], axis=1
         )
         area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
-        self.face_N, weights = _face_rule(per_side, contact)
-        self.face_area = np.outer(area, weights)
+        self.contact = contact
+        self.face_N, self.side_weights = _face_rule(per_side, contact)
+        self.face_area = np.outer(area, np.outer(self.side_weights, self.side_weights))
         self.node_area = np.bincount(
             self.pressure_index[self.face_nodes].ravel(),
             (self.face_area @ self.face_N).ravel(),
@@ -186,7 +191,7 @@ class Pad:
 
 
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
-    """Shape functions ``(points, face nodes)`` and weights ``(points,)`` of a rule on the unit square with as many points as nodes."""
+    """Shape functions ``(points, face nodes)`` of a tensor rule with as many points as nodes, and its weights along a side."""
     if contact == "weighted":
         points, weights = np.polynomial.legendre.leggauss(per_side)
         points, weights = 0.5 * (points + 1.0), 0.5 * weights
@@ -197,7 +202,7 @@ def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
         raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
     one = np.stack([lagrange(per_side, s) for s in points])  # (points, nodes) along one side
     N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
-    return N, np.outer(weights, weights).ravel()
+    return N, weights
 
 
 def lagrange(n: int, s: float) -> FloatArray:

@@ -1,0 +1,137 @@
+"""The pad's mesh and the numbering of its unknowns."""
+
+import numpy as np
+import pytest
+
+from fem.materials import material
+from fem.pad import Pad, PadShape, lagrange
+
+FOAM = material("blatz_ko", 0.020e6)
+SIZE = (0.06, 0.03, 0.015)
+SYMMETRIES = [(False, False), (True, False), (False, True), (True, True)]
+
+
+@pytest.fixture(params=["hex8", "hex27"])
+def element(request):
+    return request.param
+
+
+@pytest.fixture(params=["weighted", "nodal"])
+def contact(request):
+    return request.param
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_volumes_and_areas_add_up(element, contact, symmetry):
+    pad = Pad(PadShape(SIZE, (4, 6, 3), (2.0, 0.5, 3.0), element), FOAM, symmetry, contact)
+    assert pad.volume.sum() == pytest.approx(pad.share * np.prod(SIZE), rel=1e-13)
+    assert pad.face_area.sum() == pytest.approx(pad.share * SIZE[0] * SIZE[1], rel=1e-13)
+    assert pad.node_area.sum() == pytest.approx(pad.share * SIZE[0] * SIZE[1], rel=1e-13)
+    assert pad.node_area.min() > 0
+    assert pad.volume.min() > 0
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_every_unknown_has_its_place(element, symmetry):
+    """Free displacements first, one travel for the bonded back, one pressure per node of the front."""
+    pad = Pad(PadShape(SIZE, (4, 6, 3), element=element), FOAM, symmetry)
+    order = pad.shape.per_side - 1
+    n = [order * (k // 2 if s else k) + 1 for k, s in zip((4, 6, 3), (*symmetry, False), strict=True)]
+    assert len(pad.nodes) == np.prod(n)
+    assert pad.front_grid == (n[0], n[1])
+    above = np.prod(n[:2]) * (n[2] - 1)
+    fixed = sum(np.prod([n[j] for j in range(2) if j != i]) * (n[2] - 1) for i in range(2) if symmetry[i])
+    assert pad.travel_dof == 3 * above - fixed
+    assert pad.size == pad.travel_dof + 1 + n[0] * n[1]
+    own = pad.dofs[(pad.dofs >= 0) & (pad.dofs < pad.travel_dof)]
+    assert (np.sort(own) == np.arange(pad.travel_dof)).all()
+    back = np.isclose(pad.nodes[:, 2], -SIZE[2])
+    assert (pad.dofs[back] == [-1, -1, pad.travel_dof]).all()
+    assert (pad.dofs == pad.travel_dof).sum() == back.sum() == n[0] * n[1]
+    for axis in range(2):
+        mirror = symmetry[axis] & np.isclose(pad.nodes[:, axis], 0)
+        assert (pad.dofs[mirror, axis] == -1).all()
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+@pytest.mark.parametrize("elements", [(4, 6, 2), (20, 10, 1)])
+def test_front_nodes_run_along_the_width_first(element, elements, symmetry):
+    pad = Pad(PadShape(SIZE, elements, (1.5, 2.0, 1.0), element), FOAM, symmetry)
+    grid = pad.nodes[pad.front_nodes].reshape(*pad.front_grid, 3)
+    assert (grid[..., 2] == 0).all()
+    assert (np.diff(grid[..., 0], axis=0) > 0).all()
+    assert (np.diff(grid[..., 1], axis=1) > 0).all()
+    assert max(np.ptp(grid[..., 0], axis=1).max(), np.ptp(grid[..., 1], axis=0).max()) < 1e-15
+    assert (pad.front_nodes[pad.pressure_index[pad.front_nodes]] == pad.front_nodes).all()
+    # a face's nodes span it in the same order as its shape functions
+    middle = np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
+    middle = middle.reshape(len(middle), pad.shape.per_side, -1, 3)
+    assert (np.diff(middle[..., 0], axis=1) > 0).all()
+    assert (np.diff(middle[..., 1], axis=2) > 0).all()
+
+
+def test_the_travel_moves_the_back_and_nothing_else(element):
+    pad = Pad(PadShape(SIZE, (2, 2, 2), element=element), FOAM)
+    x = np.zeros(pad.size)
+    x[pad.travel_dof] = 1e-3
+    u = pad.displacement(x)
+    back = np.isclose(pad.nodes[:, 2], -SIZE[2])
+    assert (u[back] == [0, 0, 1e-3]).all()
+    assert not u[~back].any()
+
+
+def test_grading():
+    shape = PadShape(SIZE, (8, 6, 5), (4.0, 1.0, 3.0))
+    x, y, z = (np.diff(shape.lines(axis, False)) for axis in range(3))
+    assert x == pytest.approx(x[::-1])
+    assert x[-1] / x[4] == pytest.approx(4)
+    assert x[5:] / x[4:-1] == pytest.approx(4 ** (1 / 3))
+    assert y == pytest.approx(SIZE[1] / 6)
+    assert z[0] / z[-1] == pytest.approx(3)  # the back over the front
+    assert z.sum() == pytest.approx(SIZE[2])
+    assert shape.lines(0, True) == pytest.approx(shape.lines(0, False)[4:])
+    assert shape.lines(2, False)[-1] == 0
+
+
+@pytest.mark.parametrize("elements", [(20, 10, 6), (24, 12, 6), (5, 4, 1), (2, 2, 2), (16, 8, 8)])
+def test_halved_keeps_the_pad_and_its_symmetry(elements):
+    shape = PadShape(SIZE, elements, (2.0, 1.5, 3.0), "hex27")
+    coarse = shape.halved()
+    assert coarse.size == shape.size
+    assert coarse.grading == shape.grading
+    assert coarse.element == shape.element
+    for fine, n in zip(elements, coarse.elements, strict=True):
+        assert fine % 2 or n % 2 == 0
+        assert abs(n - fine / 2) <= 1
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_shape_functions_of_a_side(n):
+    assert np.stack([lagrange(n, s) for s in np.linspace(0, 1, n)]) == pytest.approx(np.eye(n), abs=1e-15)
+    for power in range(n):
+        assert lagrange(n, 0.3) @ np.linspace(0, 1, n) ** power == pytest.approx(0.3**power)
+
+
+def test_modulus_per_thickness():
+    assert Pad(PadShape(SIZE, (2, 2, 1)), FOAM).modulus_per_thickness == pytest.approx(0.05e6 / 0.015)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (((0.06, 0.0, 0.015), (2, 2, 2)), "positive.*0.0"),
+        (((0.06, float("inf"), 0.015), (2, 2, 2)), "positive.*inf"),
+        ((SIZE, (2, 0, 2)), "at least one element.*0"),
+        ((SIZE, (2, 2, 2), (1.0, 1.0, 1.0), "hex20"), "hex20.*hex8, hex27"),
+    ],
+)
+def test_refusals_say_what_was_found(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        PadShape(*arguments)
+
+
+def test_a_half_needs_even_elements_and_contact_a_known_rule():
+    with pytest.raises(ValueError, match=r"even number.*\(3, 2, 2\)"):
+        Pad(PadShape(SIZE, (3, 2, 2)), FOAM, (True, False))
+    with pytest.raises(ValueError, match=r"'mortar'.*'weighted' or 'nodal'"):
+        Pad(PadShape(SIZE, (2, 2, 2)), FOAM, contact="mortar")
