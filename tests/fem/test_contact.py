@@ -1,0 +1,161 @@
+"""The complementarity problem: its tangent, its residual in states with a closed form, its sparsity."""
+
+import numpy as np
+import pytest
+
+from fem.contact import ContactProblem, Control
+from fem.materials import material
+from fem.objects import EllipticCylinder, Sphere
+from fem.pad import Pad, PadShape
+from tests.fem import reference
+
+G = 0.020e6
+SIZE = (0.02, 0.012, 0.008)
+OBJECTS = {
+    "sphere": reference.placed(Sphere(0.012), reference.facing(0.012)),
+    "elliptic cylinder": reference.placed(EllipticCylinder(0.012, 0.005, 0.1), reference.facing(0.012)),
+    "plane": reference.plane,
+}
+
+
+def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), law="blatz_ko"):
+    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material(law, G), symmetry, contact)
+    return ContactProblem(pad, gap)
+
+
+def contacting_state(problem, travel=1.2e-3):
+    """A pad pressed into the object, out of balance, with about half of its front active and no node near the switch."""
+    pad, rng = problem.pad, np.random.default_rng(4)
+    x = np.zeros(problem.size)
+    u = np.zeros_like(pad.nodes)
+    u[:, 2] = travel
+    u += 1e-4 * rng.uniform(-1, 1, u.shape)
+    own = (pad.dofs >= 0) & (pad.dofs < pad.travel_dof)
+    x[pad.dofs[own]] = u[own]
+    x[pad.travel_dof] = travel
+    x[pad.travel_dof + 1 :] = np.abs(1e-3 * rng.uniform(0.2, 1, len(pad.node_area)))
+    return x
+
+
+def dense(problem, values):
+    K = np.zeros((problem.size, problem.size))
+    keep = (problem.rows >= 0) & (problem.columns >= 0)
+    np.add.at(K, (problem.rows[keep], problem.columns[keep]), values[keep])
+    return K
+
+
+@pytest.mark.parametrize("control", [Control(force=2.0), Control(travel=1e-3)], ids=["force", "travel"])
+@pytest.mark.parametrize("complementarity", [False, True], ids=["active set", "bounds"])
+@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+@pytest.mark.parametrize("name", OBJECTS)
+def test_tangent_is_the_derivative_of_the_residual(name, contact, complementarity, control):
+    problem = problem_of(OBJECTS[name], contact)
+    problem.control, problem.complementarity = control, complementarity
+    x = contacting_state(problem)
+    active = problem._active(x, problem._contact(x, tangent=False))
+    assert active.any()
+    if name != "plane":
+        assert not active.all()
+    K, h = dense(problem, problem.tangent(x)), 1e-7
+    for direction in np.random.default_rng(6).uniform(-1, 1, (4, problem.size)):
+        by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
+        difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
+        assert np.abs(K @ direction - difference).max() < 1e-8 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("law", ["blatz_ko", "neo_hookean", "linear"])
+def test_tangent_of_triquadratic_elements(law):
+    problem = problem_of(OBJECTS["sphere"], element="hex27", law=law)
+    problem.control = Control(force=2.0)
+    x = contacting_state(problem)
+    direction = np.random.default_rng(6).uniform(-1, 1, problem.size)
+    h = 3e-8
+    by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
+    difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
+    analytic = dense(problem, problem.tangent(x)) @ direction
+    assert np.abs(analytic - difference).max() < 1e-7 * np.abs(difference).max()
+
+
+def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed():
+    problem = problem_of(OBJECTS["sphere"])
+    problem.control, problem.complementarity = Control(force=2.0), True
+    K = dense(problem, problem.tangent(contacting_state(problem)))
+    n = problem.pad.travel_dof + 1
+    assert np.abs(K[:n, :n] - K[:n, :n].T).max() < 1e-13 * np.abs(K).max()
+    assert np.abs(K[:n, n:] + K[n:, :n].T).max() < 1e-15 * np.abs(K).max()
+    assert not K[n:, n:].any()
+
+
+@pytest.mark.parametrize("symmetry", [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+def test_a_confined_pad_pressed_flat(element, symmetry):
+    """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``.
+
+    With that pressure the rows along z, of the travel and of the pressures vanish; only the sides would have to be held.
+    """
+    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material("blatz_ko", G), symmetry)
+    problem = ContactProblem(pad, reference.plane)
+    squeeze = 2e-3
+    stretch = 1 - squeeze / SIZE[2]
+    pressure = -G * (1 - stretch**-3)
+    problem.control = Control(force=pressure * SIZE[0] * SIZE[1])
+    x = np.zeros(problem.size)
+    vertical = pad.dofs[:, 2]
+    x[vertical] = -squeeze * pad.nodes[:, 2] / SIZE[2]
+    x[pad.travel_dof + 1 :] = pressure / problem.kappa
+    R = problem.residual(x)
+    scale = problem.control.force
+    assert abs(R[pad.travel_dof]) < 1e-13 * scale
+    assert np.abs(R[pad.travel_dof + 1 :]).max() < 1e-13 * scale
+    assert np.abs(R[vertical]).max() < 1e-13 * scale
+    assert problem.sheet_force(x) == pytest.approx(scale, rel=1e-13)
+    nodal, gap, points = problem.contact_state(x)
+    assert nodal == pytest.approx(pressure, rel=1e-13)
+    assert np.abs(gap).max() < 1e-15
+    assert points.force / pad.share == pytest.approx([0, 0, scale], rel=1e-13, abs=1e-12)
+    det, strain, _ = problem.strains(x, np.eye(3))
+    assert det == pytest.approx(stretch, rel=1e-13)
+    assert strain == pytest.approx(1 - stretch, rel=1e-12)
+
+
+def test_pressures_are_bounded_and_nothing_else():
+    problem = problem_of(reference.plane)
+    lower, upper = problem.bounds()
+    assert (lower[problem.pad.travel_dof + 1 :] == 0).all()
+    assert np.isneginf(lower[: problem.pad.travel_dof + 1]).all()
+    assert np.isposinf(upper).all()
+
+
+def test_active_set_row_switches_between_pressure_and_gap():
+    """``A l - max(0, A l - G)`` is ``A l`` where the pad is off the object, and the weighted gap where it presses."""
+    problem = problem_of(reference.plane)
+    pad = problem.pad
+    for travel in (-1e-3, 1e-3):
+        x = np.zeros(problem.size)
+        x[pad.dofs[:, 2]] = travel
+        pressures = slice(pad.travel_dof + 1, None)
+        x[pressures] = 0.3e-3
+        expected = pad.node_area * (0.3e-3 if travel < 0 else -travel)
+        assert problem.residual(x)[pressures] == pytest.approx(problem.kappa * expected, rel=1e-12)
+
+
+def test_an_inverted_pad_has_no_residual():
+    problem = problem_of(reference.plane)
+    x = np.zeros(problem.size)
+    x[problem.pad.dofs[problem.pad.front_nodes, 2]] = -1.5 * SIZE[2]
+    assert np.isnan(problem.residual(x)).all()
+
+
+def test_steps_are_shortened_by_travel_and_by_squeezing():
+    problem = problem_of(reference.plane)
+    pad, step = problem.pad, np.zeros(problem.size)
+    x = np.zeros(problem.size)
+    assert problem.shorten(x, step) == 1
+    step[pad.dofs[:, 2]] = -SIZE[2]  # the whole pad moves: no element is squeezed, but the travel is too long
+    assert problem.shorten(x, step) == pytest.approx(0.1)
+    step[:] = 0
+    step[pad.dofs[pad.front_nodes, 2]] = SIZE[2]  # x - step: the front is pushed back through the sheet
+    factor = problem.shorten(x, step)
+    det = problem.strains(x - factor * step, np.eye(3))[0]
+    assert 0.05 < det < 1
+    assert problem.strains(x - 2 * factor * step, np.eye(3))[0] < 0.05
