@@ -33,7 +33,7 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
     nodes = pressed.front.reshape(*pad.front_grid, 3)
     for axis in range(2):
-        nodes = _subdivide(nodes, axis, pad.shape.per_side)
+        nodes = _subdivide(nodes, axis, pad.side_weights)
     nodes = _unfold(pad, nodes, shared=True)
     corners = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
@@ -60,12 +60,12 @@ def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
     return values.reshape(nx, ny, k, k, -1).transpose(0, 2, 1, 3, 4).reshape(nx * k, ny * k, -1)
 
 
-def _subdivide(grid: FloatArray, axis: int, parts: int) -> FloatArray:
-    """Node positions along an axis replaced by the corners of the faces: every side is cut in proportion to the Gauss weights."""
+def _subdivide(grid: FloatArray, axis: int, weights: FloatArray) -> FloatArray:
+    """Node positions along an axis replaced by corners of faces: every side is cut in proportion to the quadrature weights."""
     grid = np.moveaxis(grid, axis, 0)
+    parts = len(weights)
     order = parts - 1  # of the shape functions along a side
-    cuts = np.cumsum(np.polynomial.legendre.leggauss(parts)[1] / 2.0) - np.polynomial.legendre.leggauss(parts)[1] / 2.0
-    fine = np.stack([lagrange(parts, s) for s in cuts])
+    fine = np.stack([lagrange(parts, s) for s in np.cumsum(weights) - weights])
     elements = np.stack([grid[k : len(grid) - order + k : order] for k in range(parts)], axis=1)
     inside = np.einsum("sk,nk...->ns...", fine, elements).reshape(-1, *grid.shape[1:])
     return np.moveaxis(np.concatenate([inside, grid[-1:]]), 0, axis)

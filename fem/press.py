@@ -1,7 +1,9 @@
 """Press a pad on an object along a ladder of normal forces, each force started from the one before.
 
-A force that Newton does not reach in one step is approached by halves; where that fails too, the sheet is walked by its
-travel until the force is bracketed.  Every state that is passed on has converged and has been checked.
+A force that Newton does not reach in one step is approached by halves. Where that fails and a fallback pad with nodal
+gaps is given, the ladder goes on with that one (weighted gaps couple neighbouring pressures, and a pad's rim on a steep
+slope can make their active set cycle for ever); else the sheet is walked by its travel until the force is bracketed. Every
+state that is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ FloatArray = NDArray[np.float64]
 RESIDUAL = 1e-10  # of the normal force, where a Newton solve stops
 BALANCE = 1e-8  # of the normal force
 PENETRATION = 1e-9  # of an element's size
-MIN_STEP = 1.0 / 64.0  # of the step between two forces, before the sheet is walked instead
+MIN_STEP = 1.0 / 8.0  # of the step between two forces, before another way is tried
 WALK_STEPS = 60  # of the sheet, for one force
 
 
@@ -56,6 +58,8 @@ class Pressed:
         Normal force [N] and travel of the sheet from first touch [m].
     unknowns : (n,) array
         State of the solver.
+    pad : Pad
+        The pad it was solved with: the fallback where the pad itself had no solution.
     pressure : (front nodes,) array
         Nominal contact pressure, in the order of ``Pad.front_nodes`` [Pa].
     front : (front nodes, 3) array
@@ -67,6 +71,7 @@ class Pressed:
     force: float
     travel: float
     unknowns: FloatArray
+    pad: Pad
     pressure: FloatArray
     front: FloatArray
     points: ContactPoints
@@ -97,19 +102,25 @@ class Press:
         ``(n, 3)`` points to signed distance, gradient and Hessian.
     options : dict
         PETSc options with the prefix ``contact_``.
+    fallback : Pad, optional
+        The same pad with nodal gaps, for forces at which ``pad`` has no solution.
     """
 
     pad: Pad
     gap: Gap
     options: dict[str, Any] = field(default_factory=dict)
+    fallback: Pad | None = None
 
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
-        self.problem = ContactProblem(self.pad, self.gap)
-        self.solver = NonlinearSolver(self.problem, self.options)
+        self._set_up()
         self._directions = _hemisphere(24)
         size = min(np.ptp(self.pad.nodes[self.pad.face_nodes[0]], axis=0)[:2])
         self._element_size = float(size)
+
+    def _set_up(self) -> None:
+        self.problem = ContactProblem(self.pad, self.gap)
+        self.solver = NonlinearSolver(self.problem, self.options)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on the whole pad [N].
@@ -122,9 +133,17 @@ class Press:
         x, reached = None, 0.0
         for force in forces:
             work, before, start = _Work(), _copy(self.solver.seconds), time.perf_counter()
-            if x is None:
-                x, reached = self._first(force, work)
-            x = self._climb(x, reached, force, work)
+            try:
+                if x is None:
+                    x, reached = self._first(force, work)
+                x = self._climb(x, reached, force, work)
+            except ConvergenceError:
+                if self.fallback is None:
+                    raise
+                self._fall_back()
+                if x is None:
+                    x, reached = self._first(force, work)
+                x = self._climb(x, reached, force, work)
             reached = force
             checks = self._check(x, force)
             spent = self.solver.seconds
@@ -136,9 +155,17 @@ class Press:
             front = (self.pad.nodes + self.pad.displacement(x))[self.pad.front_nodes]
             pressure, _, points = self.problem.contact_state(x)
             yield Pressed(
-                force, float(x[self.pad.travel_dof]), x.copy(), pressure, front, points, checks,
+                force, float(x[self.pad.travel_dof]), x.copy(), self.pad, pressure, front, points, checks,
                 work.iterations, work.steps, work.cuts, seconds,
             )  # fmt: skip
+
+    def _fall_back(self) -> None:
+        """Go on with the fallback pad; its unknowns are numbered alike."""
+        seconds = self.solver.seconds
+        self.solver.destroy()
+        self.pad, self.fallback = self.fallback, None
+        self._set_up()
+        self.solver.seconds = seconds
 
     def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
         """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""
@@ -176,6 +203,8 @@ class Press:
             except ConvergenceError:
                 fraction *= 0.5
                 if fraction < MIN_STEP:
+                    if self.fallback is not None:
+                        raise
                     return self._walk(x, force, work)
                 continue
             done = goal
