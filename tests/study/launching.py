@@ -66,3 +66,9 @@ def contents(path):
     with h5py.File(path, "r") as file:
         file.visititems(keep)
     return found
+
+
+def differing(path, expected):
+    """Names of the datasets that are not, byte for byte, what was expected."""
+    found = contents(path)
+    return [name for name in sorted(found.keys() | expected.keys()) if found.get(name) != expected.get(name)]
