@@ -318,7 +318,8 @@ class Press:
 
 def _nearest_column(pad: Pad) -> NDArray[np.int64]:
     """For every node the index, in ``front_nodes``, of the front's node above it (columns are straight)."""
-    x, y = np.unique(pad.nodes[pad.front_nodes][:, 0]), np.unique(pad.nodes[pad.front_nodes][:, 1])
+    front = pad.nodes[pad.front_nodes].reshape(*pad.front_grid, 3)
+    x, y = front[:, 0, 0], front[0, :, 1]
     i = np.abs(pad.nodes[:, 0, None] - x).argmin(axis=1)
     j = np.abs(pad.nodes[:, 1, None] - y).argmin(axis=1)
     return i * len(y) + j
