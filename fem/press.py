@@ -22,11 +22,21 @@ from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
-RESIDUAL = 1e-10  # of the normal force, where a Newton solve stops
 BALANCE = 1e-8  # of the normal force
 PENETRATION = 1e-9  # of an element's size
-MIN_STEP = 1.0 / 8.0  # of the step between two forces, before another way is tried
 WALK_STEPS = 60  # of the sheet, for one force
+
+
+@dataclass(frozen=True)
+class Settings:
+    """When a solve ends and when a step is given up.
+
+    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that is
+    tried before another way.
+    """
+
+    residual: float = 1e-10
+    min_step: float = 1.0 / 8.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +120,7 @@ class Press:
     gap: Gap
     options: dict[str, Any] = field(default_factory=dict)
     fallback: Pad | None = None
+    settings: Settings = field(default_factory=Settings)
 
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
@@ -185,7 +196,7 @@ class Press:
         scale = control.force if control.force is not None else self._force_scale(control.travel)
         work.steps += 1
         try:
-            x, iterations = self.solver.solve(x, RESIDUAL * scale * self.pad.share)
+            x, iterations = self.solver.solve(x, self.settings.residual * scale * self.pad.share)
         except ConvergenceError:
             work.cuts += 1
             raise
@@ -202,7 +213,7 @@ class Press:
                 x = self._solve(x, Control(force=target), work)
             except ConvergenceError:
                 fraction *= 0.5
-                if fraction < MIN_STEP:
+                if fraction < self.settings.min_step:
                     if self.fallback is not None:
                         raise
                     return self._walk(x, force, work)

@@ -91,11 +91,23 @@ class Layout:
     meshes: int = 1
     patches: bool = True
     derived: tuple[Derived, ...] = ()
+    cor_grid: int = 0
+    planar: str = "flat"
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """Length of every axis."""
         return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All per-case quantities of this file but the patch."""
+        return quantities(self.meshes, self.cor_grid)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Friction models in the order they are shown: curved, the planar one that the scene prefers, the other."""
+        return tuple(dict.fromkeys((MODELS[0], self.planar, *MODELS)))
 
     @property
     def rows(self) -> int:
@@ -111,6 +123,8 @@ class Layout:
     def counters(self) -> dict[str, int]:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "component_2": 3, "session": SESSIONS}
+        if self.cor_grid:
+            parts["cor"] = self.cor_grid**2
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
     @cached_property
@@ -132,7 +146,8 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        return json.dumps({"faces": self.faces, "meshes": self.meshes, "patches": self.patches, "derived": derived})
+        names = ("faces", "meshes", "patches", "cor_grid", "planar")
+        return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
 def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
@@ -145,14 +160,17 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         faces, meshes = int(options["faces"]), int(options["meshes"])
         if not 0 <= faces < 10**7:
             raise ValueError(f"{faces} faces")
-        return Layout(tuple(axes), faces, meshes, bool(options["patches"]), derived)
+        cor_grid, planar = int(options["cor_grid"]), options["planar"]
+        if not 0 <= cor_grid <= 1000 or planar not in MODELS[1:]:
+            raise ValueError(f"cor_grid {cor_grid}, planar {planar!r}")
+        return Layout(tuple(axes), faces, meshes, bool(options["patches"]), derived, cor_grid, planar)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 
 
 def _columns(layout: Layout):
     f8 = np.dtype("<f8")
-    for q in quantities(layout.meshes):
+    for q in layout.quantities:
         if q.group == "maps" and q.by_model:
             for model in MODELS:
                 yield Column(f"{q.key}/{model}", f"{ROOT}/{q.name}/{model}", (), f8, np.nan)
@@ -171,7 +189,7 @@ def _columns(layout: Layout):
 
 
 def _datasets(layout: Layout):
-    described = {q.key: q for q in quantities(layout.meshes) + PATCH}
+    described = {q.key: q for q in layout.quantities + PATCH}
     for c in layout.columns:
         q = described.get(c.key) or described.get(c.key.rpartition("/")[0])
         attributes = _describe(q, c.key) if q else _describe_effect(c.key)
@@ -218,7 +236,7 @@ def _labels(q, column: Column) -> tuple[str, ...]:
         return ()
     finger = ("finger",) if q.per == "finger" else ()
     face = ("face",) if q.group == "patch" else ()
-    labels = finger + face + (("model",) if q.by_model else ())
+    labels = finger + face + (("model",) if q.by_model else ()) + (("cor",) if q.name == "cor_wrench" else ())
     return labels + ("component", "component_2")[: len(column.shape) - len(labels)]
 
 
@@ -242,13 +260,13 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
         **{f"{n}_indices": i for i, (n, k) in enumerate(zip(names, shape, strict=True)) if k != 2},
     }
     found: dict[str, dict[str, Any]] = {}
-    for q in quantities(layout.meshes):
+    for q in layout.quantities:
         if q.group != "maps":
             continue
-        signal = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])} if q.by_model else {"signal": q.name}
+        signal = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])} if q.by_model else {"signal": q.name}
         found[q.name] = {**plot, **signal, "title": q.long_name, "definition": q.definition}
     found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
-    collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in quantities(layout.meshes)}]
+    collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in layout.quantities}]
     collections += ["patch"] * layout.patches + ["derived"] * bool(layout.derived)
     found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
     return found
@@ -257,4 +275,4 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
 def definitions_text(layout: Layout) -> str:
     """The definitions of all quantities of this layout, derived ones included."""
     derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in layout.derived]
-    return definitions(layout.meshes) + "".join(derived)
+    return definitions(layout.meshes, layout.cor_grid) + "".join(derived)

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +18,30 @@ from fem.errors import CheckError, ConvergenceError
 from fem.extract import extract
 from fem.extract import patch_faces as faces_of
 from fem.pose import Pose
-from fem.press import Press, Pressed
-from friction.frame import Frame, contact_frame, in_frame
+from fem.press import Press, Pressed, Settings
+from friction.frame import Frame, contact_frame, contact_length, in_frame
+from friction.motion import cor_grid
 from friction.patch import ContactPatch
-from friction.wrench import FrictionLimits, friction_limits
+from friction.wrench import FrictionLimits, friction_limits, friction_wrench
 from scoring.score import ScoreFlag, score
 from study import model
 from study.effects import effects_of
+from study.layout import Derived
 from study.quantities import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
+from study.sweep import axes
+
+if TYPE_CHECKING:
+    from study.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
 ANTIPODAL = np.radians(5.0)  # beyond this angle between the contacts the antipodal score is flagged
 NOT_ANTIPODAL, NODAL_INSTEAD = 256, 512  # flags, above those of score and contact frame
+CURVATURE_KEYS = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}
+LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
+PLANAR = (("flat", ""), ("projected", "_projected"))  # planar model, suffix of the quantities that compare with it
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 
 
@@ -78,7 +88,7 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
         ]
         values = _values(scene, obj, [fine for fine, *_ in contacts])
         if scene.accuracy.meshes == 2:
-            values |= _mesh_errors(contacts)
+            values |= _mesh_errors(*zip(*contacts, strict=True))
         seconds = time.perf_counter() - start
         yield k, _result(scene, values, contacts, [s for one in states for s in one], seconds)
 
@@ -95,6 +105,28 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
     return replace(result, values=values)
 
 
+def derived(scene: Scene) -> list[Derived]:
+    """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
+    if scene.object.shape != "elliptic_cylinder" or not CURVATURE_KEYS & set(scene.sweep):
+        return []
+    over = tuple(axis.name for axis in axes(scene)[:-3])
+    return [
+        Derived("b_over_a", "", "b / a", "Semi-axis across the contact over that along its normal.", over),
+        Derived("apex_curvature", "1/m", "apex curvature a / b^2", "Curvature of the section where the pads touch.", over),
+    ]
+
+
+def finalise(writer: ResultWriter, scene: Scene) -> None:
+    """Fill the derived datasets, by one rank, after all cases."""
+    if not derived(scene):
+        return
+    points = [scene.with_values(dict(zip(scene.sweep, v, strict=True))).object for v in product(*scene.sweep.values())]
+    shape = writer.layout.shape[:-3]
+    a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
+    writer.write_derived("b_over_a", b / a)
+    writer.write_derived("apex_curvature", a / b**2)
+
+
 def patch_faces(scene: Scene) -> int:
     """Number of faces of a patch of this scene."""
     return int(np.prod(faces_of(model.pad_shape(scene.gripper))))
@@ -108,7 +140,8 @@ def axis_symmetry(scene: Scene) -> int:
 def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
     symmetry = model.usable_symmetry(scene, finger)
     wanted, nodal = (model.pad(scene.gripper, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
-    return Press(wanted, finger.gap, dict(scene.petsc), fallback=None if nodal is wanted else nodal)
+    settings = Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
+    return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, settings)
 
 
 def _given_up(forces: tuple[float, ...], k: int, error: Exception) -> Iterator[tuple[int, CaseFailure]]:
@@ -155,12 +188,14 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         "fingers/pose_rotation": np.array([c.finger.pose.rotation for c in contacts]),
         "fingers/pose_origin": np.array([c.finger.pose.origin for c in contacts]),
     }
-    for name, key in (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max")):
+    for name, key in LIMITS:
         values[f"maps/{key}"] = limits[name].min(axis=0)
         values[f"fingers/{key}"] = limits[name]
     for key in ("e_n", "e_n_projected"):
         values[f"maps/{key}"] = limits[key].min(axis=0)
-    return values
+    if scene.friction.cor_grid:
+        values["fingers/cor_wrench"] = [_cor_wrenches(scene, c) for c in contacts]
+    return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
 
 
 def _score(scene: Scene, obj, contacts: list[Contact], name: str, distance: float):
@@ -173,14 +208,30 @@ def _score(scene: Scene, obj, contacts: list[Contact], name: str, distance: floa
     return score(one, two, distance, object_length, contact_length)
 
 
-def _mesh_errors(contacts: list[list[Contact]]) -> dict[str, float]:
-    """Relative differences of the curved model's results between the mesh and the one half as fine."""
+def _cor_wrenches(scene: Scene, contact: Contact) -> FloatArray:
+    """Friction wrenches ``(f_x, f_y, tau_z)`` for the paper's grid of centres of rotation."""
+    twists = cor_grid(scene.friction.cor_grid, contact_length(contact.local))
+    return friction_wrench(contact.local, twists, scene.friction.mu)[:, [0, 1, 5]]
+
+
+def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
+    """Share of each planar model's claim that the curved contact cannot carry, for both forces and the torque."""
+    shares = {}
+    for name, _ in LIMITS:
+        for planar, suffix in PLANAR:
+            pairs = [(getattr(c.limits["curved"], name), getattr(c.limits[planar], name)) for c in contacts]
+            shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)
+    return shares
+
+
+def _mesh_errors(fine: Sequence[Contact], coarse: Sequence[Contact]) -> dict[str, float]:
+    """Differences of the curved model's results between the mesh and the one half as fine."""
     errors = {}
-    for name, key in (("e_n", "e_n"), ("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max")):
-        fine, coarse = ([getattr(pair[i].limits["curved"], name) for pair in contacts] for i in (0, 1))
-        shares = [abs(c - f) / f if f > 0 else np.nan for f, c in zip(fine, coarse, strict=True)]
-        errors[f"maps/{key}_error"] = max(shares)
-    return errors
+    for name, key in (("e_n", "e_n"), *LIMITS):
+        pairs = [tuple(getattr(c.limits["curved"], name) for c in pair) for pair in zip(fine, coarse, strict=True)]
+        errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
+    shares, rough = _overestimates(fine), _overestimates(coarse)
+    return errors | {f"maps/{key}_error": abs(value - rough[key]) for key, value in shares.items()}
 
 
 def _result(

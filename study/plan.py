@@ -53,7 +53,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
     )
-    layout = Layout(tuple(sweep.axes(scene)), faces, scene.accuracy.meshes, patches, derived)
+    layout = Layout(tuple(sweep.axes(scene)), faces, scene.accuracy.meshes, patches, derived, scene.friction.cor_grid,
+                    scene.friction.model)
     return Plan(layout, header, tuple(sweep.units(scene, pipeline.axis_symmetry)))
 
 

@@ -85,11 +85,22 @@ MAPS = (
              " an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no corners,"
              " 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
              " 512 solved with nodal gaps, because weighted ones had no solution."),
+    *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model", f"1 - curved / {model} of {name}_max:"
+               f" the share of the planar model's claim that the curved contact cannot carry ({note}); of the finger"
+               " where it is largest.")
+      for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
+      for suffix, model, note in (("", "flat", "both scaled by S, the paper's normalisation"),
+                                  ("_projected", "projected", "both scaled by the physical normal force F_N; not"
+                                   " positive, for a planar model with that force claims too little"))),
     Quantity("e_n_error", "", "relative error of e_n", "Difference of e_n (curved) between the mesh and one with half"
              " as many elements per direction, over its value.", only_with_two_meshes=True),
     Quantity("f_x_max_error", "", "relative error of f_x_max", "As e_n_error.", only_with_two_meshes=True),
     Quantity("f_y_max_error", "", "relative error of f_y_max", "As e_n_error.", only_with_two_meshes=True),
     Quantity("tau_z_max_error", "", "relative error of tau_z_max", "As e_n_error.", only_with_two_meshes=True),
+    *(Quantity(f"{name}_overestimate{suffix}_error", "", f"error of {name}_overestimate{suffix}",
+               "Absolute difference between the mesh and one with half as many elements per direction.",
+               only_with_two_meshes=True)
+      for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_projected")),
 )
 
 
@@ -164,13 +175,24 @@ REASONS = (
 )
 
 
-def quantities(meshes: int = 1) -> tuple[Quantity, ...]:
-    """All per-case quantities but the patch; the error maps exist when every case is solved on two meshes."""
-    everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE
+def cor_wrench(n: int) -> Quantity:
+    """Friction wrenches of an ``n x n`` grid of centres of rotation."""
+    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction (f_x, f_y,"
+                   " tau_z) of the curved model in the contact frame for turns about the points of a square grid of ten"
+                   f" contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
+
+
+def quantities(meshes: int = 1, cor_grid: int = 0) -> tuple[Quantity, ...]:
+    """All per-case quantities but the patch.
+
+    The error maps exist when every case is solved on two meshes, the wrenches of the paper's grid of centres of rotation
+    when the scene asks for a grid of ``cor_grid`` points a side.
+    """
+    everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE + ((cor_wrench(cor_grid),) if cor_grid else ())
     return tuple(q for q in everything if meshes > 1 or not q.only_with_two_meshes)
 
 
-def definitions(meshes: int = 1) -> str:
+def definitions(meshes: int = 1, cor_grid: int = 0) -> str:
     """One text that says what every quantity is; stored in each result file."""
     lines = [
         "Friction models: 'curved' lets every face resist in its own plane (curved contact model, Xu, Alt, Zhang,",
@@ -180,7 +202,7 @@ def definitions(meshes: int = 1) -> str:
         "NaN: not there; status/code and status/message say why. All values are SI.",
         "",
     ]
-    for q in quantities(meshes) + PATCH:
+    for q in quantities(meshes, cor_grid) + PATCH:
         models = " [curved, flat, projected]" if q.by_model else ""
         lines.append(f"{q.key} [{q.units or '-'}]{models}: {q.long_name}. {q.definition}")
     return "\n".join(lines) + "\n"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from study.layout import MESSAGE, Layout
-from study.quantities import EFFECTS, MODELS, quantities
+from study.quantities import EFFECTS, MODELS
 from study.result import CaseResult
 
 
@@ -49,7 +49,7 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
 
 def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
     given = dict(result.values)
-    for q in quantities(layout.meshes):
+    for q in layout.quantities:
         if q.group == "maps" and q.by_model and q.key in given:
             values = np.asarray(given.pop(q.key), float)
             if values.shape != (len(MODELS),):

@@ -175,14 +175,10 @@ class Accuracy(Section):
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
     contact: Literal["weighted", "nodal"] = Field("weighted", description="how gaps are collocated")
-    residual_tolerance: float = Field(1e-8, ge=1e-13, le=1e-3, description="residual over load at which a solve ends")
-    max_travel_step_mm: Annotated[float, Field(gt=0, le=100)] | Literal["auto"] = Field(
-        "auto", description="longest step of the pads' travel"
-    )
+    residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(
-        1 / 64, gt=0, le=1, description="shortest part of a step that is tried before a case fails"
+        1 / 8, gt=0, le=1, description="shortest part of a step between two forces that is tried before another way"
     )
-    max_travel_step = si("max_travel_step_mm")
 
 
 class Output(Section):

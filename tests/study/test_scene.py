@@ -80,8 +80,6 @@ WRONG_LINES = [
     ("[effects]\nwrench = '6-D'", 12, "effects.wrench", '"6-D"', '"3-D"', "does not simulate"),
     ("[accuracy]\nmeshes = 3", 12, "accuracy.meshes", "3", "<= 2", "default is 1"),
     ("[accuracy]\nmeshes = true", 12, "accuracy.meshes", "true", "whole number", "default is 1"),
-    ("[accuracy]\nmax_travel_step_mm = 0", 12, "accuracy.max_travel_step_mm", "0", '> 0 and <= 100 or "auto" [mm]',
-     "auto"),
     ("[output]\nfile = 'a.h5'", 12, "output.file", '"a.h5"', ".hdf", '"a.hdf"'),
     ("[output]\nfile = '../a.hdf'", 12, "output.file", '"../a.hdf"', "below the working directory", "`-o`"),
     ("[output]\nfile = '/a.hdf'", 12, "output.file", '"/a.hdf"', "below the working directory", "`-o`"),
@@ -290,7 +288,6 @@ def test_values_are_in_si_units_and_lists_rise():
     assert scene.object.profile == ((0, 0.03), (0.05, 0.03), (0.1, 0.02), (0.15, 0.012))
     assert scene.object.extent == 0.15
     assert scene.score.object_length is None
-    assert scene.accuracy.max_travel_step is None
 
 
 def test_hyperfoam_fills_in_its_terms_and_its_modulus():
