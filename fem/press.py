@@ -241,12 +241,12 @@ class Press:
 
     def _first(self, force: float, work: _Work) -> tuple[FloatArray, float]:
         """First state in contact: travel control from the bed-of-springs estimate, because force control has no start."""
-        travel = self._spring_travel(force)
+        travel, failure = self._spring_travel(force), "no force yet"
         for _ in range(12):
             try:
                 x = self._solve(self._guess(travel), Control(travel=travel), work)
-            except ConvergenceError:
-                travel *= 0.6
+            except ConvergenceError as error:
+                travel, failure = 0.6 * travel, str(error)
                 continue
             reached = self.problem.sheet_force(x)
             if reached > 1e-3 * force:
@@ -254,7 +254,7 @@ class Press:
             travel *= 1.5
         raise ConvergenceError(
             f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on less "
-            f"than an element of its front: refine the pad's mesh or move the candidate"
+            f"than an element of its front: refine the pad's mesh or move the candidate. The last attempt: {failure}"
         )
 
     def _height(self) -> FloatArray:
@@ -306,6 +306,7 @@ class Press:
         det, strain, acoustic = self.problem.strains(x, self._directions)
         size, largest = self._element_size, float(pressure.max(initial=0.0))
         product = float(np.max(np.abs(pressure * gap), initial=0.0))
+        left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
         checks = Checks(
             force_balance=abs(points.force[2] / self.pad.share - force) / force,
             tension=max(0.0, -float(pressure.min())) / max(largest, 1e-300),
@@ -321,6 +322,10 @@ class Press:
             (not checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
             (not checks.complementarity <= 1e-8, "pressure and gap are both positive at a node"),
             (not det > 0.0, f"an element is inverted: det F = {det:.3g}"),
+            (
+                not left_over <= max(BALANCE, self.settings.residual) * force,
+                f"a node of the foam is out of balance by {left_over:.3g} N",
+            ),
         ):
             if broken:
                 raise CheckError(f"the state at {force:.4g} N converged but is wrong: {law}")
