@@ -75,7 +75,7 @@ def shear_hyperfoam(gamma, moduli, exponents):
     """Cauchy stress ``(3, 3)`` [Pa] of hyperfoam in simple shear ``F = I + gamma e1 e2``, where J = 1.
 
     Principal stretches are ``l, 1/l, 1`` with ``l - 1/l = gamma``, principal stresses ``t = sum 2 mu/alpha
-    (l^alpha - 1)``; then ``s12 = (t1 - t2) / sqrt(gamma^2 + 4)`` and ``s11 - s22 = gamma s12``, as in all isotropic solids.
+    (l^alpha - 1)``, stresses ``s12 = (t1 - t2) / sqrt(gamma^2 + 4)`` and ``s11 - s22 = gamma s12``.
     """
     stretch = gamma / 2 + np.sqrt(1 + gamma**2 / 4)
     t1, t2 = (

@@ -24,7 +24,7 @@ def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), 
 
 
 def contacting_state(problem, travel=1.2e-3):
-    """A pad pressed into the object, out of balance, with about half of its front active and no node near the switch."""
+    """A pad pressed into the object, out of balance, with about half of its front active, no node near the switch."""
     pad, rng = problem.pad, np.random.default_rng(4)
     x = np.zeros(problem.size)
     u = np.zeros_like(pad.nodes)
@@ -91,7 +91,7 @@ def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed
 def test_a_confined_pad_pressed_flat(element, symmetry):
     """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``.
 
-    With that pressure the rows along z, of the travel and of the pressures vanish; only the sides would have to be held.
+    With that pressure the rows along z, of the travel and of the pressures vanish; only the sides had to be held.
     """
     pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material("blatz_ko", G), symmetry)
     problem = ContactProblem(pad, reference.plane)

@@ -1,0 +1,262 @@
+"""Pressing: two solvers, symmetry, path, units and repeats give one answer, and wrong answers are refused."""
+
+import numpy as np
+import pytest
+
+from fem.errors import CheckError, ConvergenceError
+from fem.materials import material
+from fem.objects import EllipticCylinder, Sphere
+from fem.pad import Pad, PadShape
+from fem.press import Press
+from tests.fem import reference
+
+G = 0.040e6
+SIZE = (0.050, 0.022, 0.015)
+FOAM = material("blatz_ko", G)
+OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
+BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
+FORCES = [1.0, 3.0, 10.0, 20.0]
+VI = {"contact_snes_type": "vinewtonrsls"}
+
+
+def pad_of(elements=(12, 6, 4), symmetry=(True, True), contact="weighted", element="hex8", law=FOAM, size=SIZE):
+    return Pad(PadShape(size, elements, element=element), law, symmetry, contact)
+
+
+def relative(a, b):
+    return np.abs(a - b).max() / np.abs(b).max()
+
+
+@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+def test_active_set_and_bounds_agree(gap, element, contact):
+    pad = pad_of((8, 4, 2) if element == "hex27" else (12, 6, 4), contact=contact, element=element)
+    for one, other in zip(Press(pad, gap).ladder(FORCES), Press(pad, gap, VI).ladder(FORCES), strict=True):
+        assert one.travel == pytest.approx(other.travel, rel=3e-9)
+        assert relative(one.pressure, other.pressure) < 3e-9
+        assert relative(one.unknowns, other.unknowns) < 3e-9
+
+
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+def test_quarter_half_and_full_pads_are_the_same(gap, element):
+    elements, forces = ((12, 6, 4), FORCES) if element == "hex8" else ((4, 4, 2), FORCES[:2])
+    full = pad_of(elements, (False, False), element=element)
+    where = {tuple(np.round(x * 1e9).astype(int)): i for i, x in enumerate(full.nodes[full.front_nodes])}
+    whole = list(Press(full, gap).ladder(forces))
+    for symmetry in ((True, False), (False, True), (True, True)):
+        part = pad_of(elements, symmetry, element=element)
+        same = [where[tuple(np.round(x * 1e9).astype(int))] for x in part.nodes[part.front_nodes]]
+        for one, other in zip(Press(part, gap).ladder(forces), whole, strict=True):
+            assert one.travel == pytest.approx(other.travel, rel=1e-10)
+            assert relative(one.pressure, other.pressure[same]) < 1e-10
+            assert relative(one.front, other.front[same]) < 1e-10
+            assert one.points.force[2] / part.share == pytest.approx(other.points.force[2], rel=1e-12)
+
+
+def test_the_path_does_not_matter():
+    """To 20 N at once, in four steps and in twelve; and back down again."""
+    pad = pad_of()
+    (at_once,) = Press(pad, OVAL).ladder([20.0])
+    for forces in (FORCES, np.linspace(0.5, 20, 12), [5.0, 35.0, 20.0]):
+        *_, last = Press(pad, OVAL).ladder(forces)
+        assert last.travel == pytest.approx(at_once.travel, rel=1e-9)
+        assert relative(last.pressure, at_once.pressure) < 1e-9
+        assert relative(last.unknowns, at_once.unknowns) < 1e-9
+
+
+def bits(pressed):
+    return [part.tobytes() for s in pressed for part in (s.unknowns, s.pressure, s.front, s.points.load)]
+
+
+def test_the_same_ladder_twice_gives_the_same_bits():
+    """Also after another problem, and from the same solver a second time."""
+    first = Press(pad_of(), OVAL)
+    once = bits(first.ladder(FORCES))
+    other = Press(pad_of((8, 4, 2), (False, False), law=material("neo_hookean", G, 0.4)), BALL)
+    list(other.ladder([2.0]))
+    other.destroy()
+    assert bits(Press(pad_of(), OVAL).ladder(FORCES)) == once
+    assert bits(first.ladder(FORCES)) == once
+
+
+def test_force_and_travel_control_are_inverse():
+    press = Press(pad_of(), OVAL)
+    for pressed in press.ladder(FORCES):
+        for start in (None, pressed.unknowns):
+            x, force = press.at_travel(pressed.travel, start)
+            assert force == pytest.approx(pressed.force, rel=1e-8)
+            assert relative(x, pressed.unknowns) < 1e-8
+
+
+def test_force_grows_with_travel():
+    press = Press(pad_of(), BALL)
+    forces = [press.at_travel(d)[1] for d in np.linspace(0.5e-3, 4e-3, 5)]
+    assert (np.diff(forces) > 0).all()
+    assert (np.diff(forces, 2) > 0).all()  # the contact area grows
+
+
+def test_units_do_not_matter():
+    """The same pad in mm, N and MPa."""
+    mm = pad_of(size=tuple(1e3 * s for s in SIZE), law=material("blatz_ko", G * 1e-6))
+    gap = reference.placed(EllipticCylinder(25.0, 20.0, 100.0), reference.facing(25.0))
+    for si, other in zip(Press(pad_of(), OVAL).ladder(FORCES), Press(mm, gap).ladder(FORCES), strict=True):
+        assert other.travel * 1e-3 == pytest.approx(si.travel, rel=1e-9)
+        assert relative(other.pressure * 1e6, si.pressure) < 1e-9
+        assert other.iterations == si.iterations
+
+
+@pytest.mark.parametrize("factor", [0.1, 7.0])
+def test_a_stiffer_foam_under_a_greater_force_deforms_the_same(factor):
+    stiff = pad_of(law=material("blatz_ko", factor * G))
+    scaled = Press(stiff, OVAL).ladder(factor * np.array(FORCES))
+    for one, other in zip(Press(pad_of(), OVAL).ladder(FORCES), scaled, strict=True):
+        assert other.travel == pytest.approx(one.travel, rel=1e-9)
+        assert relative(other.pressure, factor * one.pressure) < 1e-9
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        material("hyperfoam", poisson_ratio=0.25, shear_moduli=[G], exponents=[-2.0]),
+        material("neo_hookean", G, 0.49),
+        material("linear", G, 0.25),
+    ],
+    ids=lambda law: law.law,
+)
+def test_other_materials_press_too(law):
+    """One-term hyperfoam is Blatz-Ko; all laws agree with it at small forces but for their Poisson's ratio."""
+    soft = list(Press(pad_of(), OVAL).ladder([0.05, 10.0]))
+    own = list(Press(pad_of(law=law), OVAL).ladder([0.05, 10.0]))
+    if law.law == "hyperfoam":
+        assert own[1].travel == pytest.approx(soft[1].travel, rel=1e-9)
+        assert relative(own[1].pressure, soft[1].pressure) < 1e-8
+    elif law.law == "linear":
+        assert own[0].travel == pytest.approx(soft[0].travel, rel=0.02)
+        assert abs(own[1].travel / soft[1].travel - 1) > 0.02
+    else:
+        assert own[1].travel < soft[1].travel
+        assert own[1].checks.min_det_f > 0.95  # it hardly yields in volume
+
+
+def test_a_confined_layer_pressed_by_a_plane():
+    """A pad 40 times as wide as thick is confined but for its rim: ``F = G (l^-3 - 1)`` per area in the middle."""
+    size = (0.4, 0.4, 0.01)
+    pad = Pad(PadShape(size, (16, 16, 4), (0.1, 0.1, 1.0)), FOAM, (True, True))
+    x, force = (press := Press(pad, reference.plane)).at_travel(2e-3)
+    pressure, _, _ = press.problem.contact_state(x)
+    exact = G * (0.8**-3 - 1)
+    middle = np.linalg.norm(pad.nodes[pad.front_nodes][:, :2], axis=1) < 0.1
+    assert pressure[middle] == pytest.approx(exact, rel=1e-4)
+    assert 0.9 * exact * 0.16 < force < exact * 0.16
+
+
+# -- states that must be refused --------------------------------------------------------------------------------------
+
+
+def pulls(press, x):
+    """A node pulls, its neighbours press more: the forces still balance."""
+    p, area = x[press.pad.travel_dof + 1 :], press.pad.node_area
+    i, j = np.argsort(p)[-2:]
+    p[j] += 1.1 * p[i] * area[i] / area[j]
+    p[i] *= -0.1
+
+
+def penetrates(press, x):
+    x[press.pad.dofs[press.pad.front_nodes[0], 2]] += 1e-7
+
+
+def lifts(press, x):
+    x[press.pad.dofs[press.pad.front_nodes[0], 2]] -= 1e-6
+
+
+def is_unbalanced(press, x):
+    x[press.pad.travel_dof + 1 :] *= 1 + 1e-7
+
+
+def inner_dof(pad):
+    inside = (pad.nodes[:, 2] < -1e-6) & (pad.dofs[:, 2] < pad.travel_dof)
+    return pad.dofs[np.flatnonzero(inside)[0], 2]
+
+
+def is_unbalanced_inside(press, x):
+    x[inner_dof(press.pad)] += 1e-8
+
+
+def is_inverted(press, x):
+    x[inner_dof(press.pad)] += 0.02
+
+
+@pytest.mark.parametrize(
+    ("tamper", "words"),
+    [
+        (pulls, "the contact pulls: lowest pressure -"),
+        (penetrates, "the pad penetrates the object by"),
+        (lifts, "pressure and gap are both positive"),
+        (is_unbalanced, "force balance is off by 1.0e-07"),
+        (is_inverted, "an element is inverted: det F = -"),
+        (is_unbalanced_inside, "a node of the foam is out of balance by"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_wrong_states_are_refused_whatever_the_solver_says(tamper, words):
+    press = Press(pad_of(), reference.plane)
+    solve = press.solver.solve
+
+    def wrong(x, tolerance, iterations=None):
+        x, done = solve(x, tolerance, iterations)
+        if press.problem.control.force is not None:
+            tamper(press, x)
+        return x, done
+
+    press.solver.solve = wrong
+    with pytest.raises(CheckError, match=f"at 5 N converged but is wrong: .*{words}"):
+        list(press.ladder([5.0]))
+
+
+def test_checks_of_a_right_state_are_small():
+    for pressed in Press(pad_of(), OVAL).ladder(FORCES):
+        checks = pressed.checks
+        assert max(checks.force_balance, checks.tension, checks.penetration, checks.complementarity) < 1e-11
+        assert 0 < checks.min_det_f < 1
+        assert 0 < checks.max_strain < 0.5
+        assert 0 < checks.acoustic < 1
+
+
+def test_failure_says_why_and_how_to_see_it():
+    press = Press(pad_of(), OVAL, {"contact_snes_max_it": 1})
+    with pytest.raises(
+        ConvergenceError, match=r"DIVERGED_MAX_IT after 1 iterations at residual \d.*N; .*-contact_snes_monitor"
+    ):
+        press.at_travel(2e-3)
+    with pytest.raises(ConvergenceError, match=r"no first contact for 5 N.*DIVERGED_MAX_IT"):
+        list(press.ladder([5.0]))
+
+
+def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
+    """Three iterations per step do not reach 20 N at once."""
+    pad = pad_of()
+    (free,) = Press(pad, OVAL).ladder([20.0])
+    press = Press(pad, OVAL)
+    first, last = press.ladder([1.0, 20.0])
+    short = Press(pad, OVAL)
+    ladder = short.ladder([1.0, 20.0])
+    next(ladder)
+    solve = short.solver.solve
+    short.solver.solve = lambda x, tolerance, iterations=None: solve(x, tolerance, 3)
+    pressed = next(ladder)
+    assert pressed.cuts > 0
+    assert pressed.steps > last.steps
+    for state in (last, pressed):
+        assert state.travel == pytest.approx(free.travel, rel=1e-9)
+        assert relative(state.pressure, free.pressure) < 1e-9
+    assert first.cuts == last.cuts == 0
+
+
+def test_petsc_options_are_taken_back():
+    from petsc4py import PETSc
+
+    before = dict(PETSc.Options().getAll())
+    Press(pad_of((4, 2, 2)), OVAL, VI | {"contact_snes_max_it": 7})
+    assert dict(PETSc.Options().getAll()) == before
