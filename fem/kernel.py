@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fem.materials import FAST, principal, stress
+from fem.materials import FAST, stress
 
 
 @njit(cache=True, fastmath=FAST)
@@ -121,7 +121,21 @@ def smallest_det(u, dN):
     return smallest
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FAST)
+def extreme_eigenvalues(M):
+    """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
+    mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
+    a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
+    d, e, f = M[0, 1], M[0, 2], M[1, 2]
+    radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    if radius <= 1e-12 * abs(mean):
+        return mean, mean
+    half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
+    angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
+    return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
+
+
+@njit(cache=True, fastmath=FAST)
 def strain_measures(law, par, shear_modulus, u, dN, directions):
     """Largest ``|principal stretch - 1|`` over all points, and the smallest eigenvalue of the acoustic tensor.
 
@@ -129,13 +143,16 @@ def strain_measures(law, par, shear_modulus, u, dN, directions):
     unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no localisation).
     """
     F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
-    Q = np.empty((3, 3))
+    C, Q = np.empty((3, 3)), np.empty((3, 3))
     strain, acoustic = 0.0, np.inf
     for e in range(dN.shape[0]):
         for q in range(dN.shape[1]):
             J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
-            c, _ = principal(F.T @ F)
-            strain = max(strain, np.max(np.abs(np.sqrt(c) - 1.0)))
+            for i in range(3):
+                for k in range(3):
+                    C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
+            low, high = extreme_eigenvalues(C)
+            strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
             if q > 0:
                 continue
             stress(law, F, B, J, par, P, A)
@@ -146,7 +163,7 @@ def strain_measures(law, par, shear_modulus, u, dN, directions):
                         for j in range(3):
                             value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
                         Q[i, k] = value
-                acoustic = min(acoustic, np.min(principal(Q)[0]))
+                acoustic = min(acoustic, extreme_eigenvalues(Q)[0])
     return strain, acoustic / shear_modulus
 
 

@@ -38,7 +38,8 @@ def _find_petsc4py() -> None:
 _find_petsc4py()
 import petsc4py  # noqa: E402  (only importable once the path is known)
 
-petsc4py.init(["softjaw", "-skip_petscrc"])  # no options from files in the working directory
+# no options from files in the working directory; Python, not PETSc, answers signals
+petsc4py.init(["softjaw", "-skip_petscrc", "-no_signal_handler"])
 from petsc4py import PETSc  # noqa: E402  (after init, as petsc4py requires)
 
 PETSc.Log.begin()
@@ -187,7 +188,8 @@ class NonlinearSolver:
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
         try:
-            snes.solve(None, self._x)
+            with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
+                snes.solve(None, self._x)
         finally:
             snes.setTolerances(max_it=limit)
             self.seconds.total += time.perf_counter() - start
