@@ -211,18 +211,24 @@ def material(
     Raises
     ------
     ValueError
-        For an unknown law, a modulus that is not positive, or a Poisson's ratio outside ``(-1, 0.5)``.
+        For an unknown law, a modulus that is not positive, a Poisson's ratio outside ``(-1, 0.5)``, or exponents that
+        are 0 or do not match the moduli.
     """
     if law not in LAWS:
         raise ValueError(f"material '{law}' is unknown; choose one of {', '.join(LAWS)}")
     if law == "hyperfoam":
+        if len(shear_moduli) != len(exponents) or not np.all(exponents):
+            raise ValueError(
+                f"hyperfoam needs one exponent, not 0, for every shear modulus; found {len(shear_moduli)} moduli and "
+                f"the exponents {list(exponents)}"
+            )
         shear_modulus = float(np.sum(shear_moduli))
     if not shear_modulus > 0:
         raise ValueError(f"material '{law}' needs a positive shear modulus, found {shear_modulus} Pa")
     if law == "blatz_ko" and poisson_ratio != 0.25:
         raise ValueError(f"Blatz-Ko foam has Poisson's ratio 0.25, found {poisson_ratio}; use hyperfoam for other values")
     if not -1.0 < poisson_ratio < 0.5:
-        raise ValueError(f"material '{law}' needs a Poisson's ratio below 0.5, found {poisson_ratio}")
+        raise ValueError(f"material '{law}' needs a Poisson's ratio between -1 and 0.5, found {poisson_ratio}")
     if law == "blatz_ko":
         par = [shear_modulus]
     elif law == "hyperfoam":
