@@ -1,0 +1,139 @@
+"""The patch of a pressed pad: symmetry, sums, order and geometry of its faces."""
+
+import numpy as np
+import pytest
+
+from fem.extract import extract, patch_faces
+from fem.materials import material
+from fem.objects import EllipticCylinder
+from fem.pad import Pad, PadShape
+from fem.press import Press
+from friction.frame import FrameFlag, contact_frame, in_frame
+from friction.wrench import friction_limits
+from tests.fem import reference
+
+FOAM = material("blatz_ko", 0.040e6)
+SIZE = (0.050, 0.022, 0.015)
+OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
+WHOLE = (False, False)
+PARTS = [(True, False), (False, True), (True, True)]
+
+
+def patch_of(symmetry=(True, True), element="hex8", gap=OVAL, elements=(8, 4, 2), force=10.0, contact="weighted"):
+    shape = PadShape(SIZE, elements, (1.5, 0.7, 1.0), element)
+    pad = Pad(shape, FOAM, symmetry, contact)
+    (pressed,) = Press(pad, gap).ladder([force])
+    return pad, pressed, extract(pad, pressed)
+
+
+@pytest.fixture(scope="module", params=["hex8", "hex27"])
+def whole(request):
+    return (request.param, *patch_of(WHOLE, request.param))
+
+
+@pytest.mark.parametrize("symmetry", PARTS)
+def test_patch_of_a_part_is_that_of_the_whole_pad(whole, symmetry):
+    element, *_, full = whole
+    *_, part = patch_of(symmetry, element)
+    for name in ("centroid", "area", "normal", "pressure", "corners", "load"):
+        one, other = getattr(part, name), getattr(full, name)
+        assert one.shape == other.shape
+        assert np.abs(one - other).max() < 1e-12 * np.abs(other).max(), name
+
+
+def test_a_half_of_a_pad_on_a_lopsided_object():
+    """Only y = 0 is a plane of symmetry of a cylinder that is tilted along x; the patch must not be mirrored in x."""
+    tilt = 0.05
+    R = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+
+    def gap(x):
+        g, n, H = OVAL(x @ R.T)
+        return g, n @ R, R.T @ H @ R
+
+    *_, half = patch_of((False, True), gap=gap)
+    *_, full = patch_of(WHOLE, gap=gap)
+    assert np.abs(half.centroid - full.centroid).max() < 1e-12
+    assert np.abs(half.load - full.load).max() < 1e-12 * full.load.max()
+    assert abs((full.load * full.centroid[:, 0]).sum() / full.load.sum()) > 1e-3
+
+
+def test_number_and_order_of_the_faces(whole):
+    """``per_side`` times the elements along length and width; numbered along the width first."""
+    element, pad, _, patch = whole
+    nx, ny = patch_faces(pad.shape)
+    per_side = {"hex8": 2, "hex27": 3}[element]
+    assert (nx, ny) == (per_side * 8, per_side * 4)
+    centroid = patch.centroid.reshape(nx, ny, 3)
+    assert (np.diff(centroid[..., 0], axis=0) > 0).all()
+    assert (np.diff(centroid[..., 1], axis=1) > 0).all()
+    assert patch.corners.shape == (nx * ny, 4, 3)
+
+
+def test_loads_are_those_of_the_solution(whole):
+    """``S`` is the integral of the pressure, the forces add up to the normal force, and nothing pulls aside."""
+    element, pad, pressed, patch = whole
+    S = pressed.pressure @ pad.node_area
+    assert patch.load.sum() == pytest.approx(S, rel=1e-12)
+    force = (patch.load[:, None] * patch.normal).sum(axis=0)
+    # clipping quadratic pressures moves load within an element, between normals that differ a little
+    assert force[2] == pytest.approx(10.0, rel=1e-12 if element == "hex8" else 1e-3)
+    assert np.abs(force[:2]).max() < 1e-10
+    assert (patch.pressure >= 0).all()
+
+
+def test_faces_tile_the_deformed_front(whole):
+    """Neighbours share corners, the faces cover the deformed front, and each holds its centre."""
+    _, pad, pressed, patch = whole
+    nx, ny = patch_faces(pad.shape)
+    corners = patch.corners.reshape(nx, ny, 4, 3)
+    assert np.abs(corners[1:, :, 0] - corners[:-1, :, 1]).max() == 0
+    assert np.abs(corners[1:, :, 3] - corners[:-1, :, 2]).max() == 0
+    assert np.abs(corners[:, 1:, 0] - corners[:, :-1, 3]).max() == 0
+    ends = np.array([corners[0, 0, 0], corners[-1, -1, 2]])
+    front = pressed.front.reshape(*pad.front_grid, 3)
+    assert np.abs(ends - [front[0, 0], front[-1, -1]]).max() < 1e-15
+    e, f = patch.corners[:, 1] - patch.corners[:, 0], patch.corners[:, 3] - patch.corners[:, 0]
+    r = patch.centroid - patch.corners[:, 0]
+    for one in (np.einsum("ij,ij->i", r, e) / (e**2).sum(1), np.einsum("ij,ij->i", r, f) / (f**2).sum(1)):
+        assert ((one > 0) & (one < 1)).all()
+
+
+def test_flat_patch_has_the_areas_of_the_front():
+    """On a plane the confined middle only moves along z, and the faces' areas add up to the widened front."""
+    pad, pressed, patch = patch_of(gap=reference.plane, force=30.0)
+    assert np.abs(patch.normal - [0, 0, 1]).max() < 1e-15
+    assert np.abs(patch.centroid[:, 2]).max() < 1e-12
+    assert patch.load.sum() == pytest.approx(30, rel=1e-12)
+    x, y, _ = pressed.front.reshape(*pad.front_grid, 3).transpose(2, 0, 1)  # quarter: area by the shoelace formula
+    rim = np.concatenate([[0], x[-1], x[::-1, -1]]), np.concatenate([[0], y[-1], y[::-1, -1]])
+    area = 0.5 * np.abs(np.dot(rim[0], np.roll(rim[1], -1)) - np.dot(rim[1], np.roll(rim[0], -1)))
+    assert patch.area.sum() == pytest.approx(4 * area, rel=1e-12)
+    assert patch.area.sum() > SIZE[0] * SIZE[1]
+
+
+def test_normals_are_the_objects(whole):
+    _, _, _, patch = whole
+    _, normal, _ = OVAL(patch.centroid)
+    assert np.abs(patch.normal + normal).max() < 1e-12
+    assert (patch.normal[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+def test_nodal_contact_keeps_force_and_centre(element):
+    _, _, patch = patch_of(element=element, contact="nodal")
+    force = (patch.load[:, None] * patch.normal).sum(axis=0)
+    assert force == pytest.approx([0, 0, 10], rel=1e-9, abs=1e-9)
+    assert np.abs((patch.load[:, None] * patch.centroid).sum(axis=0)[:2]).max() < 1e-12
+
+
+def test_the_contact_frame_of_a_symmetric_patch(whole):
+    """Its origin lies on the approach, its normal along it, whatever the mesh, and nothing is flagged."""
+    _, _, _, patch = whole
+    frame = contact_frame(patch, [1, 0, 0])
+    assert frame.flag == FrameFlag.CLEAN
+    assert np.abs(frame.axes - np.eye(3)).max() < 1e-9
+    assert np.abs(frame.origin[:2]).max() < 1e-12
+    limits = friction_limits(in_frame(patch, frame), 0.8)
+    assert limits.F_N == pytest.approx(10, rel=1e-3)
+    assert limits.f_x >= 0.8 * limits.F_N
+    assert limits.f_y <= 0.8 * limits.S
