@@ -189,6 +189,8 @@ def test_constants():
         ({"law": "blatz_ko", "shear_modulus": G, "poisson_ratio": 0.3}, ["0.25", "0.3", "hyperfoam"]),
         ({"law": "neo_hookean", "shear_modulus": G, "poisson_ratio": 0.5}, ["neo_hookean", "Poisson", "0.5"]),
         ({"law": "linear", "shear_modulus": G, "poisson_ratio": -1.0}, ["linear", "Poisson", "-1.0"]),
+        ({"law": "hyperfoam", "shear_moduli": [G, G], "exponents": [2.0]}, ["hyperfoam", "one exponent", "2 moduli"]),
+        ({"law": "hyperfoam", "shear_moduli": [G], "exponents": [0.0]}, ["hyperfoam", "not 0", "[0.0]"]),
     ],
 )
 def test_refusals_say_what_was_found(arguments, words):

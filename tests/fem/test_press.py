@@ -260,3 +260,22 @@ def test_petsc_options_are_taken_back():
     before = dict(PETSc.Options().getAll())
     Press(pad_of((4, 2, 2)), OVAL, VI | {"contact_snes_max_it": 7})
     assert dict(PETSc.Options().getAll()) == before
+
+
+def test_the_ladder_goes_on_with_the_fallback_where_the_pad_has_no_solution():
+    pad, nodal = pad_of(), pad_of(contact="nodal")
+    press = Press(pad, OVAL, fallback=nodal)
+    ladder = press.ladder(FORCES)
+    assert next(ladder).pad is pad
+
+    def fails(*_):
+        raise ConvergenceError("cycles")
+
+    press.solver.solve = fails
+    rest = list(ladder)
+    alone = list(Press(nodal, OVAL).ladder(FORCES))[1:]
+    for pressed, expected in zip(rest, alone, strict=True):
+        assert pressed.pad is nodal
+        assert pressed.travel == pytest.approx(expected.travel, rel=1e-9)
+        assert relative(pressed.pressure, expected.pressure) < 1e-9
+    assert rest[0].cuts > 0
