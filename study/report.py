@@ -1,0 +1,114 @@
+"""One self-contained page about a result file, and a picture of its maps: for mails, slides and printing.
+
+The page answers first: where to grasp, how sure that is, what failed. It needs no network and runs no script.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from study import (
+    pictures,
+    report_background,
+    report_curvature,
+    report_curves,
+    report_maps,
+    report_patch,
+    report_side,
+    report_words,
+)
+from study.exits import CANNOT_WRITE, StudyError
+from study.report_data import Data
+from study.report_outline import read_scene
+from study.report_page import Picture, heading, page, paragraph, picture
+from study.store import open_result
+
+Sections = list[tuple[str, str, str]]
+
+
+def write_report(file: Path, out: Path) -> list[Path]:
+    """Write the page ``out`` and, beside it, the maps as a PNG; the paths that were written.
+
+    Raises
+    ------
+    StudyError
+        If ``file`` is no result file, or ``out`` cannot be written.
+    """
+    file, out = Path(file), Path(out)
+    picture_path = out.with_suffix(".png")
+    if file.resolve() in (out.resolve(), picture_path.resolve()) or out == picture_path:
+        raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
+    with open_result(file) as result, pictures.style():
+        html, png = build(result)
+    return [_write(out, html.encode()), _write(picture_path, png)]
+
+
+def build(result: Any) -> tuple[str, bytes]:
+    """The page and the picture of the maps of an open result file."""
+    data, scene = Data(result), read_scene(result.scene)
+    mu = scene.friction.mu if scene else None
+    best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
+    maps, png = report_maps.force_maps(data, best)
+    shapes = [report_side.side_view(data, scene, best), maps, report_maps.angle_maps(data, best)]
+    sections: Sections = [
+        ("verdict", "", report_words.verdict(data, mu) + report_words.best_tables(data)),
+        ("maps", "Maps", _pictures(shapes) + paragraph(report_words.CAVEAT, "note")),
+    ]
+    if curves := report_curvature.difference_pictures(data, scene, best):
+        sections.append(("curvature", "What curvature costs", _pictures(curves)))
+    if data.best is not None:
+        sections.append(("models", "Friction models compared", _models(data, data.best, mu)))
+        if patch := report_patch.patch_picture(data, data.best):
+            sections.append(("patch", "Contact patch of the best case", _pictures([patch])))
+    sections += [
+        ("cases", "Cases and checks", report_words.cases(data) + report_words.checks(data)),
+        ("effects", "What was simulated", report_background.effects(data)),
+        ("definitions", "Definitions", report_background.definitions(data)),
+        ("provenance", "Provenance and time", report_background.provenance(data) + report_background.time_split(data)),
+        ("scene", "Scene in effect", report_background.scene_text(data)),
+    ]
+    title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
+    return page(title, report_words.subtitle(data), sections), png
+
+
+def _pictures(shown: Iterable[Picture | None]) -> str:
+    return "".join(picture(p) for p in shown if p)
+
+
+def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:
+    """Force curves of the best case and one other, and curves over the stations and every sweep."""
+    force, html = len(best) - 1, ""
+    other, why = data.other
+    roles = [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]
+    common = report_curves.limits(data, force, *(index for index, _ in roles))
+    for index, role in roles:
+        html += heading(f"{role}, over the force: {data.place(index)}")
+        html += picture(report_curves.model_curves(data, force, index, mu, common))
+    for position in _worth_a_curve(data):
+        own = report_curves.limits(data, position, best)
+        html += heading(f"Over the {data.name(data.axes[position])}, all else as in the best case")
+        html += picture(report_curves.model_curves(data, position, best, mu, own))
+    return html
+
+
+def _worth_a_curve(data: Data) -> list[int]:
+    """Axes of enough values to be drawn as curves: the sweeps, and stations that lie along an object."""
+    station = len(data.shape) - 3
+    stations = [station] if data.shape[station] >= 4 and not data.by_poses else []
+    return [p for p in range(station) if data.shape[p] > 1] + stations
+
+
+def _write(path: Path, content: bytes) -> Path:
+    """Write beside ``path`` and rename: a reader never sees half a page."""
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        text = f"{path}: cannot be written: {error.strerror}; choose another place with -o"
+        raise StudyError(CANNOT_WRITE, text) from error
+    return path

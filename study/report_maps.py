@@ -1,0 +1,191 @@
+"""Maps of a report: scores over station, angle and force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+
+from study import pictures
+from study.layout import FAILED
+from study.report_data import Data, number, shown
+from study.report_page import Picture
+
+MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
+SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]"}
+MAPS = tuple(SHORT)
+HOW_TO_READ = "Crossed out: failed. White: not done."
+
+
+def main_axis(data: Data) -> int:
+    """Position of the axis that maps are drawn over: the stations, or a sweep where there is only one station."""
+    lengths = data.shape[:-3]
+    place = len(lengths)
+    return int(np.argmax(lengths)) if data.shape[place] == 1 and max(lengths, default=1) > 1 else place
+
+
+def _plane(data: Data, array: np.ndarray, x: int, y: int, index: Sequence[int]) -> np.ndarray:
+    """Two-dimensional cut ``(y, x)`` through an array over all cases, all other axes at ``index``."""
+    cut = array[tuple(slice(None) if i in (x, y) else index[i] for i in range(array.ndim))]
+    return cut if y < x else cut.T
+
+
+def scaled(data: Data, name: str) -> np.ndarray:
+    """A map in the unit people read; NaN everywhere if the file has no value of it."""
+    found = data.map(name)
+    return np.full(data.shape, np.nan) if found is None else found * data.units(name)[2]
+
+
+def _scale(data: Data, position: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Cell borders, tick places and tick texts of an axis; few levels get rows of equal width."""
+    axis = data.axes[position]
+    factor = shown(axis.units)[1]
+    values = axis.values * factor
+    poses = position == len(data.shape) - 3 and data.by_poses
+    if texts := data.texts(axis):
+        return np.arange(len(values) + 1) - 0.5, np.arange(len(values)), texts
+    if poses or (position >= len(data.shape) - 2 and len(values) <= MOST_TICKS):
+        texts = _pose_texts(data) if poses else [f"{v:.5g}" for v in values]
+        step = -(-len(values) // (3 * MOST_TICKS))
+        return np.arange(len(values) + 1) - 0.5, np.arange(len(values))[::step], texts[::step]
+    return pictures.edges(values, 1.0), np.empty(0), []
+
+
+def _pose_texts(data: Data) -> list[str]:
+    """Names of explicit poses: wrapped where there are few, cut short and upright where there are many."""
+    names = [str(name) or str(i) for i, name in enumerate(data.result.labels[:, 0])]
+    if len(names) <= FEW:
+        return [fill(name, 60 // len(names)) for name in names]
+    return [name if len(name) < 25 else f"{name[:23]}…" for name in names]
+
+
+def different_angles(data: Data) -> list[int]:
+    """Angles whose maps are not those of an earlier angle (images by symmetry)."""
+    found: list[int] = []
+    arrays = [np.moveaxis(scaled(data, name), -2, 0) for name in MAPS]
+    states = np.moveaxis(data.status, -2, 0)
+    for j in range(data.shape[-2]):
+        same = any(
+            np.array_equal(states[i], states[j])
+            and all(np.allclose(a[i], a[j], rtol=1e-9, atol=0, equal_nan=True) for a in arrays)
+            for i in found
+        )
+        found += [] if same else [j]
+    return found
+
+
+def chosen_angles(data: Data, index: Sequence[int]) -> list[int]:
+    """At most `MOST_ANGLES` of the different angles, that of the best case among them."""
+    angles = different_angles(data)
+    if len(angles) <= MOST_ANGLES:
+        return angles
+    spread = {angles[int(i)] for i in np.linspace(0, len(angles) - 1, MOST_ANGLES)}
+    best = index[-2] if index[-2] in angles else angles[0]
+    return sorted(spread if best in spread else {best, *sorted(spread)[1:]})
+
+
+def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], limits: tuple[float, float]) -> Any:
+    (xe, xt, xl), (ye, yt, yl) = _scale(data, x), _scale(data, y)
+    values, failed = _plane(data, scaled(data, name), x, y, index), _plane(data, data.status == FAILED, x, y, index)
+    drawn = pictures.heat(
+        axes, xe, ye, values, failed, cmap=pictures.COLOURS[name], vmin=limits[0], vmax=limits[1]
+    )  # fmt: skip
+    axes.set(xlim=(xe[0], xe[-1]), ylim=(ye[0], ye[-1]))
+    if xl:
+        axes.set_xticks(xt, xl, rotation=90 if len(xl) > FEW and max(map(len, xl)) > 6 else 0)
+    if yl:
+        axes.set_yticks(yt, yl)
+    if np.isfinite(values).any():
+        i, j = np.unravel_index(np.nanargmax(values), values.shape)
+        place = (0.5 * (xe[j] + xe[j + 1]), 0.5 * (ye[i] + ye[i + 1]))
+        for colour, width in (("white", 2.6), (pictures.INK, 1.1)):
+            axes.plot(*place, "o", ms=7, mfc="none", mec=colour, mew=width)
+    return drawn
+
+
+def elsewhere(data: Data, index: Sequence[int], *drawn: int) -> str:
+    """Where the axes stand that a picture does not show."""
+    words = []
+    for i, axis in enumerate(data.axes):
+        if i not in drawn and data.shape[i] > 1:
+            unit, factor = shown(axis.units)
+            if texts := data.texts(axis):
+                words.append(f"{data.name(axis)} {texts[index[i]]}")
+                continue
+            text = f"{data.name(axis)} {number(axis.values[index[i]] * factor, 4)} {unit}"
+            words.append(text.rstrip().replace(" °", "°"))
+    return ", ".join(words)
+
+
+def force_maps(data: Data, index: tuple[int, ...]) -> tuple[Picture, bytes]:
+    """Quality and e_n over the main axis and the force, one row for each angle; and the same as PNG."""
+    x, y, angle = main_axis(data), len(data.shape) - 1, len(data.shape) - 2
+    rows = chosen_angles(data, index)
+    height = min(max(1.2 + 0.22 * data.shape[y], 1.7), 2.8)
+    names = _scale(data, x)[2]
+    upright = 0.07 * max(map(len, names), default=0) if len(names) > FEW else 0.0
+    drawn, axes = pictures.figure(10, height * len(rows) + 0.7 + upright, len(rows), 2, sharex=True, sharey=True)
+    at = shown(data.axes[angle].units)[1]
+    for column, name in enumerate(MAPS):
+        values = scaled(data, name)
+        limits, last = pictures.span(np.take(values, rows, angle)), None
+        for row, j in enumerate(rows):
+            here = (*index[:angle], j, index[-1])
+            last = _draw(data, axes[row, column], name, x, y, here, limits)
+            title = f"angle {data.axes[angle].values[j] * at:.4g}°" if data.shape[angle] > 1 else ""
+            axes[row, column].set_title(title)
+        if np.isfinite(values).any():
+            pictures.colour_bar(drawn, last, list(axes[:, column]), SHORT[name])
+        else:
+            axes[0, column].set_title(f"{data.units(name)[0]}: no values")
+        axes[-1, column].set_xlabel(data.axis_label(data.axes[x]))
+    for row in range(len(rows)):
+        axes[row, 0].set_ylabel("force per finger [N]")
+    png_title = f"{data.title}: grasp quality and eccentricity parameter"
+    caption = f"The circle marks the largest value of each panel. {HOW_TO_READ}"
+    if where := elsewhere(data, index, x, y, angle):
+        caption = f"At {where}. {caption}"
+    hidden = data.shape[angle] - len(rows)
+    if hidden:
+        images = len(different_angles(data)) == len(rows)
+        why = "symmetry gives the same map" if images else "see the next picture or the file"
+        caption += f" {hidden} more angle{'s' * (hidden > 1)} not drawn here: {why}."
+    alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and normal force. {extremes(data, index)}"
+    shown_ = Picture(pictures.as_svg(drawn), alt, caption)
+    drawn.suptitle(png_title, fontsize=10, x=0.01, ha="left")
+    return shown_, pictures.as_png(drawn)
+
+
+def extremes(data: Data, index: tuple[int, ...]) -> str:
+    """Ranges of both maps at the force shown, in words."""
+    words = []
+    for name in MAPS:
+        values = scaled(data, name)[..., index[-1]]
+        if np.isfinite(values).any():
+            low, high = (np.unravel_index(f(values), values.shape) for f in (np.nanargmin, np.nanargmax))
+            label, unit, _ = data.units(name)
+            words.append(
+                f"{label} runs from {number(values[low])} ({data.place((*low, index[-1]))}) to "
+                f"{number(values[high])} {unit} ({data.place((*high, index[-1]))})".replace("  ", " ")
+            )
+    return f"At {number(data.forces[index[-1]])} N " + "; ".join(words) + "." if words else "No values."
+
+
+def angle_maps(data: Data, index: tuple[int, ...]) -> Picture | None:
+    """Quality and e_n over the main axis and the angle at the force shown; None where all angles give the same."""
+    if len(different_angles(data)) < 2:
+        return None
+    x, y = main_axis(data), len(data.shape) - 2
+    drawn, axes = pictures.figure(10, min(max(1.1 + 0.25 * data.shape[y], 1.8), 4.5) + 0.5, 1, 2, sharey=True)
+    for column, name in enumerate(MAPS):
+        values = scaled(data, name)[..., index[-1]]
+        last = _draw(data, axes[0, column], name, x, y, index, pictures.span(values))
+        if np.isfinite(values).any():
+            pictures.colour_bar(drawn, last, axes[0, column], SHORT[name])
+        axes[0, column].set_xlabel(data.axis_label(data.axes[x]))
+    axes[0, 0].set_ylabel("angle [°]")
+    caption = f"At {elsewhere(data, index, x, y) or number(data.forces[index[-1]]) + ' N'}. {HOW_TO_READ}"
+    alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and angle. {extremes(data, index)}"
+    return Picture(pictures.as_svg(drawn), alt, caption)

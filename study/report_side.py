@@ -1,0 +1,73 @@
+"""The object from the side, in the colours of the maps, with the pads of the best grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from study import pictures
+from study.layout import FAILED
+from study.report_data import Data
+from study.report_maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
+from study.report_outline import outline, pad_extent, slice_polygon
+from study.report_page import Picture
+
+
+def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
+    """The object from the side in the colours of both maps, with the best grasp's pads; None if it cannot be drawn."""
+    found = None if data.by_poses else outline(data, scene, index)
+    if found is None:
+        return None
+    z, radius, exact = found
+    stations = data.axes[-3].values
+    length, thickness = pad_extent(scene, data.axes[-3]) if scene else (0.0, 0.0)
+    borders = pictures.edges(stations, length or float(np.ptp(z)) or 0.01)
+    top, wide = radius.max() + 1.25 * thickness, max(np.ptp(z), np.ptp(borders))
+    names = MAPS if len(stations) > 1 else MAPS[:0]
+    size = (10, min(max(3.9 * 2 * top / wide + 0.7, 2.0), 4.8)) if names else (5.5, 3.4)
+    drawn, axes = pictures.figure(*size, 1, len(names) or 1, sharey=True)
+    for axis, name in zip(axes[0], names or ("",), strict=True):
+        if name:
+            _slices(data, drawn, axis, name, index, (z, radius), borders)
+        axis.plot(1e3 * np.concatenate([z, z[::-1], z[:1]]), 1e3 * np.concatenate([radius, -radius[::-1], radius[:1]]),
+                  color=pictures.INK, lw=0.9)  # fmt: skip
+        axis.plot(1e3 * stations, np.zeros(len(stations)), "|", color=pictures.INK, ms=5, mew=0.6)
+        _pads(axis, float(data.axes[-3].values[index[-3]]), z, radius, length, thickness)
+        axis.set(aspect="equal", xlabel="station [mm]")
+        axis.autoscale_view()
+    axes[0, 0].set_ylabel("along the approach [mm]")
+    how = "" if exact else " The outline is drawn from the measured distance of the contacts."
+    pads = " Grey: the pads of the best grasp before they press, to scale." if length else ""
+    where = elsewhere(data, index, len(data.shape) - 3)
+    read = f" {HOW_TO_READ}" if names else ""
+    caption = f"Seen across the approach{f', at {where}' if where else ''}. Ticks: stations.{pads}{read}{how}"
+    coloured = " in the colours of grasp quality and e_n" if names else ""
+    alt = f"Side view of {data.title}{coloured}. {extremes(data, index)}"
+    return Picture(pictures.as_svg(drawn), alt, caption, narrow=not names)
+
+
+def _slices(data: Data, drawn: Any, axis: Any, name: str, index: Sequence[int], line: Any, borders: np.ndarray) -> None:
+    cut = (*index[:-3], slice(None), *index[-2:])
+    values, failed = scaled(data, name)[cut], (data.status == FAILED)[cut]
+    corners = [slice_polygon(*line, low, high) for low, high in pairwise(borders)]
+    there = np.array([c is not None for c in corners])
+    limits = pictures.span(values)
+    done = np.flatnonzero(there & np.isfinite(values))
+    style = {"cmap": pictures.COLOURS[name], "vmin": limits[0], "vmax": limits[1]}
+    mapped = pictures.polygons(axis, [corners[i] for i in done], values[done], **style)
+    pictures.crossed_out(axis, [corners[i] for i in np.flatnonzero(there & failed)])
+    if done.size:
+        pictures.colour_bar(drawn, mapped, axis, SHORT[name], beside=True)
+
+
+def _pads(axis: Any, station: float, z: np.ndarray, radius: np.ndarray, length: float, thickness: float) -> None:
+    near = np.abs(z - station) <= length / 2
+    ends = np.interp([station - length / 2, station + length / 2], z, radius)
+    touch = max([*radius[near], *ends])
+    for side in (1.0, -1.0) if length else ():
+        low = touch if side > 0 else -touch - thickness
+        corner = np.array([[-length / 2, 0], [length / 2, 0], [length / 2, thickness], [-length / 2, thickness]])
+        axis.fill(*(1e3 * (corner + np.array([station, low]))).T, facecolor="#c4cacf", edgecolor=pictures.SOFT, lw=0.7)

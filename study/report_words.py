@@ -1,0 +1,224 @@
+"""Words and tables of a report: the verdict and the best grasps, what failed and why, and the checks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from study.layout import DONE, FAILED, MISSING
+from study.report_data import ABOVE, LIMITS, Data, number, passes, shown
+from study.report_page import box, paragraph, table
+from study.show import FLAGS
+
+BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
+CAVEAT = (
+    "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
+    "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
+    "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
+)
+COLUMNS = ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max")
+HEADS = {
+    "quality": "quality", "e_n": "e_n [mm]", "f_x_max": "max f_x [N]", "f_y_max": "max f_y [N]",
+    "tau_z_max": "max tau_z [N mm]",
+}  # fmt: skip
+
+
+def subtitle(data: Data) -> str:
+    """File and axes in one line."""
+    words = []
+    for axis in data.axes:
+        unit, factor = shown(axis.units)
+        n, low, high = len(axis.values), axis.values.min() * factor, axis.values.max() * factor
+        reach = f"{number(low, 4)}" if n == 1 else f"{number(low, 4)} to {number(high, 4)}"
+        space = "" if unit in ("", "°") else " "
+        plain = axis is data.axes[-3] or axis is data.axes[-2] or axis is data.axes[-1]
+        name = f"{data.name(axis)}{'s' * (n > 1)}" if plain else f"value{'s' * (n > 1)} of {data.name(axis)}"
+        if axis is data.axes[-3] and data.by_poses:
+            words.append(f"{n} candidate{'s' * (n > 1)}")
+        elif not (axis is data.axes[-2] and data.by_poses):
+            words.append(f"{n} {name} ({reach}{space}{unit})")
+    return f"{data.result.path.name}: {' × '.join(words)}"
+
+
+# --- verdict ---------------------------------------------------------------------------------------------------------
+
+
+def verdict(data: Data, mu: float | None) -> str:
+    """The answer in three sentences, and what stands against trusting it."""
+    done, failed, missing = (data.count(state) for state in (DONE, FAILED, MISSING))
+    total = data.status.size
+    cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing."
+    if data.best is None:
+        return box([f"No grasp is solved. {cases}"], "verdict")
+    return box([*_best_sentences(data, data.best, mu), cases], "verdict") + _warnings(data, data.best)
+
+
+def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list[str]:
+    value = {name: number(data.at(name, best) * data.units(name)[2]) for name in COLUMNS}
+    what = f"quality {value['quality']}" if data.score == "quality" else "no quality is stored, ranked by e_n"
+    alike = data.images(best)
+    same = f" The same score at {_listed([data.place(i) for i in alike])}." if alike else ""
+    best_of = "Best grasp" if data.grasps > 1 else "Best point of the sweep" if data.sweeps else "The grasp"
+    first = (
+        f"{best_of} at {number(data.forces[best[-1]])} N per finger: {data.place(best)}, {what}, "
+        f"e_n {value['e_n']} mm{_error(data, best)}.{same}"
+    )
+    friction = f", mu = {mu:g}" if mu is not None else ""
+    second = (
+        f"There a contact holds up to {value['f_x_max']} N along the pad, {value['f_y_max']} N across it and "
+        f"{value['tau_z_max']} N mm of torque about its normal (curved model{friction}; weaker finger)."
+    )
+    return [first, second, *_planar(data, best), *_other_force(data, best)]
+
+
+def _error(data: Data, index: tuple[int, ...]) -> str:
+    error = data.at("e_n_error", index)
+    return f" ± {number(100 * error, 2)} % (difference to a mesh half as fine)" if np.isfinite(error) else ""
+
+
+def _planar(data: Data, index: tuple[int, ...]) -> list[str]:
+    """What the planar model that the scene prefers would claim."""
+    model, words = data.planar, []
+    for name, label in (("quality", "quality"), ("e_n", "e_n")):
+        curved, planar = data.at(name, index), data.at(name, index, model)
+        if np.isfinite(curved) and np.isfinite(planar) and curved:
+            change = 100 * (planar / curved - 1)
+            words.append(f"{number(abs(change), 2)} % {'more' if change > 0 else 'less'} {label}" if abs(change) >= 0.05
+                         else f"the same {label}")  # fmt: skip
+    return [f"A planar contact model ({model}) would claim {' and '.join(words)}."] if words else []
+
+
+def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
+    """Where the score per unit of normal force is largest, if that is at another force."""
+    tops = [i for k in range(len(data.forces)) for i in data.order(k)[:1]]
+    top = max(tops, key=lambda i: np.nan_to_num(data.at(data.score, i), nan=-np.inf))
+    if top[-1] == best[-1] or not data.at(data.score, top) > data.at(data.score, best) * (1 + 1e-3):
+        return []
+    value = number(data.at(data.score, top) * data.units(data.score)[2])
+    unit = data.units(data.score)[1]
+    what = "quality, a score per unit of normal force," if data.score == "quality" else data.score
+    return [f"Over all forces {what} is largest at {data.place(top, force=True)}: {value} {unit}".rstrip() + "."]
+
+
+def _warnings(data: Data, best: tuple[int, ...]) -> str:
+    found = []
+    if data.unfinished:
+        missing = data.count(MISSING)
+        found.append(f"This study is unfinished: {missing} cases are missing, so a better grasp may be found.")
+    if best[-1] < len(data.forces) - 1:
+        found.append(f"No case is solved above {number(data.forces[best[-1]])} N; all comparisons are made there.")
+    if flagged := data.flagged(best):
+        found.append(f"The best case does not pass its checks: {', '.join(flagged)}.")
+    if note := str(data.result.messages[best]):
+        found.append(f"Note on the best case: {note}.")
+    stations = data.axes[-3].values
+    if len(stations) > 2 and not data.by_poses and best[-3] in (int(stations.argmin()), int(stations.argmax())):
+        found.append("The best station is the first or last one that was tried; a better one may lie beyond.")
+    html = box(found, "warn") if found else ""
+    if not np.isfinite(data.at("e_n_error", best)):
+        text = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
+        html += paragraph(text, "note")
+    return html
+
+
+def _listed(words: list[str], most: int = 4) -> str:
+    return "; ".join(words[:most]) + (f"; and {len(words) - most} more" if len(words) > most else "")
+
+
+def best_tables(data: Data) -> str:
+    """The best grasps at the force shown, and the best one at each force."""
+    order = data.order(data.k)
+    if not order:
+        return ""
+    head = ["grasp", *(HEADS[name] for name in COLUMNS), f"e_n {data.planar} [mm]", "checks and remarks"]
+    chosen: list[tuple[int, ...]] = []
+    merged: set[tuple[int, ...]] = set()
+    for index in order:
+        if index not in merged and len(chosen) < BEST:
+            chosen.append(index)
+            merged |= set(_turned(data, index))
+    rows = [[_with_angles(data, index), *_row(data, index)] for index in chosen]
+    force = number(data.forces[data.k])
+    caption = f"Best grasps at {force} N per finger, {len(order)} candidates solved (curved model)"
+    html = table(caption, head, rows, texts=(0,), wide=(len(head) - 1,), first=True)
+    if len(data.forces) > 1:
+        rows = []
+        for k, force in enumerate(data.forces):
+            found = data.order(k)[:1]
+            values = _row(data, found[0]) if found else ["–"] * (len(head) - 2) + ["not solved"]
+            rows.append([number(force), data.place(found[0]) if found else "–", *values])
+        head = ["force [N]", *head]
+        html += table("Best grasp at each force", head, rows, texts=(1,), wide=(len(head) - 1,))
+    tops = [index for k in range(len(data.forces)) for index in data.order(k)[:1]]
+    words = {word: meaning for index in (*chosen, *tops) for _, word, meaning in _flags(data, index)}
+    return html + "".join(paragraph(f"{word}: {meaning}.", "note") for word, meaning in words.items())
+
+
+def _turned(data: Data, index: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """The same place under other angles, with the same score."""
+    return [i for i in data.images(index) if i[:-2] == index[:-2]]
+
+
+def _with_angles(data: Data, index: tuple[int, ...]) -> str:
+    angles = [number(np.degrees(data.axes[-2].values[i[-2]]), 4) + "°" for i in _turned(data, index)]
+    return data.place(index) + (f" (and {_listed(angles)})" if angles else "")
+
+
+def _flags(data: Data, index: tuple[int, ...]) -> list[tuple[int, str, str]]:
+    value = data.at("flags", index)
+    return [flag for flag in FLAGS if np.isfinite(value) and int(value) & flag[0]]
+
+
+def _row(data: Data, index: tuple[int, ...]) -> list[str]:
+    values = [number(data.at(name, index) * data.units(name)[2], 4) for name in COLUMNS]
+    known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
+    checks = data.flagged(index) or ["passed" if known else "not stored"]
+    remarks = ", ".join([*checks, *(word for _, word, _ in _flags(data, index))])
+    return [*values, number(data.at("e_n", index, data.planar) * 1e3, 4), remarks]
+
+
+# --- cases -----------------------------------------------------------------------------------------------------------
+
+
+def cases(data: Data) -> str:
+    """Counts, reasons of failures and notes on solved cases, alike messages together."""
+    states = (("solved", DONE), ("failed", FAILED), ("missing", MISSING))
+    counts = [[name, str(data.count(state))] for name, state in states]
+    html = table("State of the cases", ["state", "cases"], counts, texts=(0,))
+    for state, caption in ((FAILED, "Why cases failed"), (DONE, "Notes on solved cases")):
+        groups = data.grouped(state)
+        rows = [[str(count), text, _places(data, where)] for count, text, where in groups[:MOST_REASONS]]
+        if rows:
+            html += table(caption, ["cases", "message (one example)", "where"], rows, wide=(1, 2))
+        if len(groups) > MOST_REASONS:
+            more = len(groups) - MOST_REASONS
+            html += paragraph(f"{more} more kinds of messages are in status/message of the file.", "note")
+    return html
+
+
+def _places(data: Data, where: list[tuple[int, ...]]) -> str:
+    words = [data.place(index, force=True) for index in where[:MOST_PLACES]]
+    return "; ".join([*words, *["…"] * (len(where) > MOST_PLACES)])
+
+
+def checks(data: Data) -> str:
+    """The worst value of each check over all solved cases, and where it was found."""
+    rows = []
+    for name in (*LIMITS, "max_strain"):
+        found = data.values(f"checks/{name}")
+        if found is None:
+            continue
+        pick = np.nanargmin if name in ABOVE else np.nanargmax
+        index = np.unravel_index(pick(found), found.shape)
+        value = float(found[index])
+        limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
+        state = "–" if name not in LIMITS else "passed" if passes(name, value) else "not passed"
+        rows.append([_path(data, f"checks/{name}"), number(value), limit, state, data.place(index[:-1], force=True)])
+    if not rows:
+        return paragraph("No checks are stored.", "note")
+    head = ["check", "worst value", "should be", "", "worst case"]
+    return table("Checks of the contact solutions, worst of all solved cases and fingers", head, rows, texts=(0, 3, 4))
+
+
+def _path(data: Data, path: str) -> str:
+    found = next((d for d in data.result.layout.datasets if d.path.endswith(f"/{path}")), None)
+    return str(found.attributes.get("long_name", path)) if found else path
