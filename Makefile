@@ -59,7 +59,7 @@ test-long: setup
 	$(BIN)/python -m pytest -q -m long --durations 10
 
 bench: setup
-	$(BIN)/python tests/benchmark/run.py
+	$(BIN)/python -m tests.benchmark.run
 
 lint: setup
 	$(BIN)/ruff check .

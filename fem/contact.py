@@ -1,14 +1,15 @@
 """Frictionless contact of a pad with a rigid object as a mixed complementarity problem.
 
-Unknowns ``x = [q | delta | l]``: free displacements, travel of the sheet, and one pressure ``p_i = kappa l_i`` per node of
-the front, with ``kappa = E / thickness`` so that all unknowns are lengths.  The residual is::
+Unknowns ``x = [q | delta | l]``: free displacements, travel of the sheet, and one pressure ``p_i = kappa l_i`` per
+node of the front, with ``kappa = E / thickness`` so that all unknowns are lengths.  The residual is::
 
     R_q     = r_int(u) - int N_a p n dA                       u = u(q, delta), p = sum N_i p_i, n = grad g
     R_delta = sum of r_int over the bonded back - F           (force)  or  s (delta - travel)   (travel)
     R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
               kappa G_i   with   l_i >= 0                     (complementarity)
 
-All rows are forces [N].  ``A_i = int N_i dA`` and all integrals are over the reference area; ``p`` is the nominal pressure.
+All rows are forces [N].  ``A_i = int N_i dA``, all integrals are over the reference area, and ``p`` is the nominal
+pressure.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ class ContactProblem:
         self._face_pressures = pad.pressure_index[pad.face_nodes]
 
     def _parts(self) -> list[FloatArray]:
-        """Views of the entries' values: elements, face stiffness, force by pressure, gap by displacement, own diagonal."""
+        """Views of the values: elements, face stiffness, force by pressure, gap by displacement, own diagonal."""
         return np.split(self._values, self._ends[:-1])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""The contact patch of a pressed pad: the deformed front in small faces with their pressures, unfolded to the whole pad.
+"""The contact patch of a pressed pad: the deformed front in small faces, with pressures, unfolded to the whole pad.
 
 Every hexahedron of the front gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
 triquadratic ones).  A face takes point, normal and load from its quadrature point, so that sums over the patch are
@@ -10,23 +10,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.pad import Pad, PadShape, lagrange
+from fem.pad import Pad, lagrange
 from fem.press import Pressed
 from friction.patch import ContactPatch
 
 FloatArray = NDArray[np.float64]
 
 
-def patch_faces(shape: PadShape) -> tuple[int, int]:
-    """Number of patch faces along the pad's length and width."""
-    return tuple(shape.per_side * n for n in shape.elements[:2])
-
-
 def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     """Patch of the whole pad at this state, in the pad's frame at first touch.
 
-    ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area`` that of the
-    deformed face and ``pressure`` the load over that area.  Faces are numbered along the width first, and their number
+    ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area``
+    that of the deformed face and ``pressure`` the load over that area.  Faces are numbered along the width first, and their number
     does not depend on symmetry.
     """
     points = pressed.points
@@ -61,7 +56,7 @@ def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
 
 
 def _subdivide(grid: FloatArray, axis: int, weights: FloatArray) -> FloatArray:
-    """Node positions along an axis replaced by corners of faces: every side is cut in proportion to the quadrature weights."""
+    """Node positions along an axis replaced by corners of faces: sides are cut in proportion to the weights."""
     grid = np.moveaxis(grid, axis, 0)
     parts = len(weights)
     order = parts - 1  # of the shape functions along a side
@@ -72,7 +67,7 @@ def _subdivide(grid: FloatArray, axis: int, weights: FloatArray) -> FloatArray:
 
 
 def _unfold(pad: Pad, grid: FloatArray, shared: bool) -> FloatArray:
-    """Mirror a grid ``(i, j, c)`` to the whole pad, vectors with their sign; ``shared`` where the first row lies on the mirror."""
+    """Mirror a grid ``(i, j, c)`` to the whole pad, vectors with sign; ``shared``: the first row is on the mirror."""
     for axis in range(2):
         if pad.symmetry[axis]:
             mirrored = np.flip(grid, axis).copy()

@@ -1,8 +1,9 @@
 """Pad materials: stress and tangent of each law at one material point.
 
 Every law is one function ``law(F, B, J, par, P, A)``: from the deformation gradient ``F``, its inverse ``B`` and its
-determinant ``J`` it writes the first Piola-Kirchhoff stress ``P = dW/dF`` [Pa] and, where ``A`` has entries, the tangent
-``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa].  A new material is one more such function, a line in ``stress`` and in ``LAWS``.
+determinant ``J`` it writes the first Piola-Kirchhoff stress ``P = dW/dF`` [Pa] and, where ``A`` has entries, the
+tangent ``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa].  A new material is one more such function, a line in ``stress``
+and one in ``LAWS``.
 """
 
 from __future__ import annotations
@@ -159,7 +160,7 @@ def hyperfoam(F, B, J, par, P, A):
 
 @njit(cache=True, fastmath=FAST)
 def stress(law, F, B, J, par, P, A):
-    """Write stress and tangent of the law with this number; numbers instead of functions, so that compiled code is cached."""
+    """Write stress and tangent of the law with this number; numbers, not functions, let compiled code be cached."""
     if law == 0:
         blatz_ko(F, B, J, par, P, A)
     elif law == 1:
@@ -206,7 +207,7 @@ class Material:
 def material(
     law: str, shear_modulus: float = 0.0, poisson_ratio: float = 0.25, shear_moduli=(), exponents=()
 ) -> Material:
-    """Material by name; hyperfoam takes ``shear_moduli`` (mu_i [Pa]) and ``exponents`` (alpha_i), the others ``shear_modulus``.
+    """Material by name; hyperfoam takes ``shear_moduli`` (mu_i [Pa]) and ``exponents`` (alpha_i).
 
     Raises
     ------
@@ -226,7 +227,9 @@ def material(
     if not shear_modulus > 0:
         raise ValueError(f"material '{law}' needs a positive shear modulus, found {shear_modulus} Pa")
     if law == "blatz_ko" and poisson_ratio != 0.25:
-        raise ValueError(f"Blatz-Ko foam has Poisson's ratio 0.25, found {poisson_ratio}; use hyperfoam for other values")
+        raise ValueError(
+            f"Blatz-Ko foam has Poisson's ratio 0.25, found {poisson_ratio}; use hyperfoam for other values"
+        )
     if not -1.0 < poisson_ratio < 0.5:
         raise ValueError(f"material '{law}' needs a Poisson's ratio between -1 and 0.5, found {poisson_ratio}")
     if law == "blatz_ko":

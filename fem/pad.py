@@ -7,7 +7,6 @@ travel, so that the force on the sheet is the residual of that unknown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,67 +14,11 @@ from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementHex2, MeshHex
 
 from fem.materials import Material
+from fem.pad_shape import PadShape
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-ELEMENTS = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
-
-
-@dataclass(frozen=True)
-class PadShape:
-    """Dimensions and mesh of a pad.
-
-    Parameters
-    ----------
-    size : tuple of 3 floats
-        Length (x), width (y), thickness (z) [m].
-    elements : tuple of 3 ints
-        Of the whole pad along x, y, z.
-    grading : tuple of 3 floats
-        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the front [-].
-    element : str
-        ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
-    """
-
-    size: tuple[float, float, float]
-    elements: tuple[int, int, int]
-    grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    element: str = "hex8"
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be meshed."""
-        if min(self.size) <= 0 or not np.all(np.isfinite(self.size)):
-            raise ValueError(f"pad size must be positive, found {self.size} m")
-        if min(self.elements) < 1:
-            raise ValueError(f"a pad needs at least one element in every direction, found {self.elements}")
-        if self.element not in ELEMENTS:
-            raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(ELEMENTS)}")
-
-    @property
-    def per_side(self) -> int:
-        """Nodes along a side of an element, and quadrature points along a side of its face."""
-        return 2 if self.element == "hex8" else 3
-
-    def halved(self) -> PadShape:
-        """The same pad with half as many elements in every direction (at least one; kept even where it was even)."""
-        fewer = tuple(max(2, 2 * round(n / 4)) if n % 2 == 0 and n > 1 else max(1, n // 2) for n in self.elements)
-        return PadShape(self.size, fewer, self.grading, self.element)
-
-    def lines(self, axis: int, half: bool) -> FloatArray:
-        """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
-        n, length, ratio = self.elements[axis], self.size[axis], self.grading[axis]
-        if axis == 2:
-            return -length * _graded(n, ratio)[::-1]
-        if n % 2:
-            return np.linspace(-length / 2, length / 2, n + 1)
-        positive = length / 2 * _graded(n // 2, ratio)
-        return positive if half else np.concatenate([-positive[:0:-1], positive])
-
-
-def _graded(n: int, ratio: float) -> FloatArray:
-    """Lines ``0..1`` whose intervals grow geometrically so that the last is ``ratio`` times the first."""
-    steps = ratio ** np.linspace(0.0, 1.0, n) if n > 1 else np.ones(1)
-    return np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
 
 
 class Pad:
@@ -118,7 +61,7 @@ class Pad:
         if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
             raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
         self.shape, self.material, self.symmetry = shape, material, tuple(symmetry)
-        element, order = ELEMENTS[shape.element]
+        element, order = BASES[shape.element]
         lines = [shape.lines(0, symmetry[0]), shape.lines(1, symmetry[1]), shape.lines(2, False)]
         basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
         self.nodes = np.ascontiguousarray(basis.doflocs.T)
@@ -191,7 +134,7 @@ class Pad:
 
 
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
-    """Shape functions ``(points, face nodes)`` of a tensor rule with as many points as nodes, and its weights along a side."""
+    """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
     if contact == "weighted":
         points, weights = np.polynomial.legendre.leggauss(per_side)
         points, weights = 0.5 * (points + 1.0), 0.5 * weights

@@ -28,7 +28,9 @@ class Pose:
     def __post_init__(self) -> None:
         """Refuse anything but a right-handed rotation."""
         if not np.allclose(self.rotation.T @ self.rotation, np.eye(3), atol=1e-9) or np.linalg.det(self.rotation) < 0:
-            raise ValueError(f"rotation must be orthonormal and right-handed, found {np.asarray(self.rotation).tolist()}")
+            raise ValueError(
+                f"rotation must be orthonormal and right-handed, found {np.asarray(self.rotation).tolist()}"
+            )
 
     def to_object(self, x: FloatArray) -> FloatArray:
         """Points of the pad's frame in the object's frame, ``(n, 3)`` [m]."""

@@ -1,9 +1,9 @@
 """Press a pad on an object along a ladder of normal forces, each force started from the one before.
 
 A force that Newton does not reach in one step is approached by halves. Where that fails and a fallback pad with nodal
-gaps is given, the ladder goes on with that one (weighted gaps couple neighbouring pressures, and a pad's rim on a steep
-slope can make their active set cycle for ever); else the sheet is walked by its travel until the force is bracketed. Every
-state that is passed on has converged and has been checked.
+gaps is given, the ladder goes on with that one (weighted gaps couple neighbouring pressures, and a pad's rim on a
+steep slope can make their active set cycle for ever); else the sheet is walked by its travel until the force is
+bracketed. Every state that is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ WALK_STEPS = 60  # of the sheet, for one force
 class Settings:
     """When a solve ends and when a step is given up.
 
-    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that is
-    tried before another way.
+    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that
+    is tried before another way.
     """
 
     residual: float = 1e-10
@@ -240,7 +240,7 @@ class Press:
         raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
 
     def _first(self, force: float, work: _Work) -> tuple[FloatArray, float]:
-        """First state in contact: travel control from the bed-of-springs estimate, because force control has no start."""
+        """First state in contact, by travel control from the bed-of-springs estimate: force control has no start."""
         travel, failure = self._spring_travel(force), "no force yet"
         for _ in range(12):
             try:
@@ -253,8 +253,8 @@ class Press:
                 return x, reached
             travel *= 1.5
         raise ConvergenceError(
-            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on less "
-            f"than an element of its front: refine the pad's mesh or move the candidate. The last attempt: {failure}"
+            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
+            f"less than an element of its front: refine the pad's mesh or move the candidate. The last attempt: {failure}"
         )
 
     def _height(self) -> FloatArray:

@@ -58,9 +58,12 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
 
 def check(options: Namespace) -> int:
     """Find every error of a scene, or say what would be run."""
+    from study.build import check_mesh
     from study.overview import scene_text
 
-    print(scene_text(_scene(options), options.scene))
+    scene = _scene(options)
+    check_mesh(scene)
+    print(scene_text(scene, options.scene))
     return DONE
 
 
@@ -141,7 +144,7 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from study import pipeline
+    from study import curvature, pipeline
     from study.plan import make_plan
     from study.run import Work, on_rank0, run_study
     from study.status import summary
@@ -152,11 +155,10 @@ def _run_on(comm: Any, options: Namespace) -> int:
         return scene, make_plan(scene, options.scene, overrides)
 
     scene, plan = on_rank0(comm, prepare)
-    finalise = getattr(pipeline, "finalise", None)
     work = Work(
         solve_unit=pipeline.solve_unit,
-        image=getattr(pipeline, "image", None),
-        finalise=(lambda writer: finalise(writer, scene)) if finalise else None,
+        image=pipeline.image,
+        finalise=lambda writer: curvature.finalise(writer, scene),
         summary=summary,
     )
     path = Path(options.output or scene.output.file)

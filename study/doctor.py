@@ -97,7 +97,8 @@ def check_blas() -> Finding:
     link = Path("/etc/alternatives").glob("libblas.so.3-*")
     chosen = next((str(path.resolve()) for path in link), "")
     if "/blas/libblas" in chosen:
-        return Finding("the reference BLAS makes factorisations four times slower", "apt-get install libopenblas0-serial")
+        text = "the reference BLAS makes factorisations four times slower"
+        return Finding(text, "apt-get install libopenblas0-serial")
     return Finding(Path(chosen).parent.name if chosen else "not chosen by Debian's alternatives")
 
 

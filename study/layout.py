@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from study.quantities import EFFECTS, FINGERS, MODELS, PATCH, REASONS, definitions, quantities
+from study.quantities import EFFECTS, FINGERS, MODELS, PATCH, REASONS, Quantity, definitions, quantities
 
 PROGRAM, VERSION = "softjaw", 1
 MISSING, DONE, FAILED = 0, 1, 2
@@ -263,7 +263,8 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     for q in layout.quantities:
         if q.group != "maps":
             continue
-        signal = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])} if q.by_model else {"signal": q.name}
+        several = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])}
+        signal = several if q.by_model else {"signal": q.name}
         found[q.name] = {**plot, **signal, "title": q.long_name, "definition": q.definition}
     found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
     collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in layout.quantities}]

@@ -9,50 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.contact import Gap
-from fem.materials import Material, material
-from fem.mesh_object import MeshObject
-from fem.objects import Box, EllipticCylinder, Plane, Sphere
-from fem.pad import Pad, PadShape
+from fem.pad import Pad
 from fem.pose import Pose
-from fem.revolution import Revolution
 from fem.shape import GapFunction, GapObject
 from fem.touch import first_touch
+from study.build import pad_material, pad_shape
 from study.scene import Scene
 from study.scene_sections import Gripper
-from study.scene_shapes import Shape
 
 FloatArray = NDArray[np.float64]
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known
-
-
-@lru_cache(maxsize=8)
-def build_object(shape: Shape) -> GapObject:
-    """Object of a scene's section ``[object]``."""
-    match shape.shape:
-        case "revolution":
-            return Revolution(np.array(shape.profile))
-        case "elliptic_cylinder":
-            return EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
-        case "sphere":
-            return Sphere(shape.radius)
-        case "box":
-            return Box(np.array(shape.size), shape.edge_radius)
-        case "plane":
-            return Plane(shape.thickness)
-        case _:
-            return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
-
-
-def pad_material(gripper: Gripper) -> Material:
-    """Foam of the pads."""
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
-
-
-def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
-    """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
-    shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)
-    return shape.halved() if coarser else shape
 
 
 @lru_cache(maxsize=8)
@@ -108,7 +74,7 @@ def _front(size: tuple[float, float, float]) -> FloatArray:
 
 
 def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, bool]:
-    """Whether the object is its own mirror image in the pad's planes ``x = 0`` and ``y = 0``, as far as the pad sees it."""
+    """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
     u = np.linspace(0.03, 0.55, 12)
     x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, DEEP, 7) * size[2], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
@@ -150,14 +116,12 @@ def usable_symmetry(scene: Scene, finger: Finger) -> tuple[bool, bool]:
         return False, False
     found = mirror_planes(finger.gap, gripper.pad_size)
     coarse = pad_shape(gripper, coarser=True).elements if scene.accuracy.meshes == 2 else gripper.elements
-    usable = tuple(
-        f and n % 2 == 0 and m % 2 == 0 for f, n, m in zip(found, gripper.elements, coarse, strict=False)
-    )
+    usable = tuple(f and n % 2 == 0 and m % 2 == 0 for f, n, m in zip(found, gripper.elements, coarse, strict=False))
     need = {"auto": 0, "half": 1, "quarter": 2}[wanted]
     if sum(usable) < need:
         raise ValueError(
-            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have {sum(usable)} "
-            f"here; use 'auto'"
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have "
+            f"{sum(usable)} here; use 'auto'"
         )
     if wanted == "half" and all(usable):
         return False, True

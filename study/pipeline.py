@@ -8,8 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +24,16 @@ from friction.patch import ContactPatch
 from friction.wrench import FrictionLimits, friction_limits, friction_wrench
 from scoring.score import ScoreFlag, score
 from study import model
+from study.build import build_object
 from study.effects import effects_of
-from study.layout import Derived
 from study.quantities import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
-from study.sweep import axes
-
-if TYPE_CHECKING:
-    from study.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
 ANTIPODAL = np.radians(5.0)  # beyond this angle between the contacts the antipodal score is flagged
 NOT_ANTIPODAL, NODAL_INSTEAD = 256, 512  # flags, above those of score and contact frame
-CURVATURE_KEYS = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 PLANAR = (("flat", ""), ("projected", "_projected"))  # planar model, suffix of the quantities that compare with it
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
@@ -66,10 +60,10 @@ class Contact:
 def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     """Cases of one candidate, force by force upward; each force starts from the state at the one before."""
     scene, forces = unit.scene, unit.scene.load.normal_force
-    obj = model.build_object(scene.object)
+    obj = build_object(scene.object)
     size = scene.gripper.pad_size
     fingers = [model.approach(obj, pose, size) for pose in unit.candidate.poses]
-    shared = model.image_of(*unit.candidate.poses, obj.axis_symmetry)
+    shared = model.image_of(*unit.candidate.poses, scene.object.axis_symmetry)
     ladders = [
         [_press(scene, finger, coarser).ladder(forces) for coarser in (False, True)[: scene.accuracy.meshes]]
         for finger in (fingers[:1] if shared else fingers)
@@ -103,38 +97,6 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
     values["fingers/pose_rotation"] = turn @ values["fingers/pose_rotation"]
     values["fingers/pose_origin"] = values["fingers/pose_origin"] @ turn.T
     return replace(result, values=values)
-
-
-def derived(scene: Scene) -> list[Derived]:
-    """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
-    if scene.object.shape != "elliptic_cylinder" or not CURVATURE_KEYS & set(scene.sweep):
-        return []
-    over = tuple(axis.name for axis in axes(scene)[:-3])
-    return [
-        Derived("b_over_a", "", "b / a", "Semi-axis across the contact over that along its normal.", over),
-        Derived("apex_curvature", "1/m", "apex curvature a / b^2", "Curvature of the section where the pads touch.", over),
-    ]
-
-
-def finalise(writer: ResultWriter, scene: Scene) -> None:
-    """Fill the derived datasets, by one rank, after all cases."""
-    if not derived(scene):
-        return
-    points = [scene.with_values(dict(zip(scene.sweep, v, strict=True))).object for v in product(*scene.sweep.values())]
-    shape = writer.layout.shape[:-3]
-    a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
-    writer.write_derived("b_over_a", b / a)
-    writer.write_derived("apex_curvature", a / b**2)
-
-
-def patch_faces(scene: Scene) -> int:
-    """Number of faces of a patch of this scene."""
-    return int(np.prod(faces_of(model.pad_shape(scene.gripper))))
-
-
-def axis_symmetry(scene: Scene) -> int:
-    """Order of the object's rotational symmetry about its axis; 0 is every angle."""
-    return model.build_object(scene.object).axis_symmetry
 
 
 def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
@@ -252,7 +214,7 @@ def _result(
 
 
 def _remark(values: dict[str, Any], contacts: list[Contact]) -> str:
-    """What the reader should know about a valid result; the same words for the same remark, so that they can be counted."""
+    """What the reader should know about a valid result, always in the same words, so that remarks can be counted."""
     score_flags = ScoreFlag.NO_TORQUE | ScoreFlag.NO_FORCE
     remarks = {
         "contacts more than 5 deg from antipodal, the score is approximate": values["maps/flags"] & NOT_ANTIPODAL,

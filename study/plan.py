@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,11 +40,13 @@ class Plan:
 
 def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
     """The plan of a scene; builds its objects, so a mesh is read here."""
-    from study import pipeline, sweep
+    from study import sweep
+    from study.build import check_mesh, pad_shape
+    from study.curvature import derived
 
+    check_mesh(scene)
     patches = scene.output.patches != "none"
-    faces = pipeline.patch_faces(scene) if patches else 0
-    derived = tuple(pipeline.derived(scene)) if hasattr(pipeline, "derived") else ()
+    faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     header = Header(
         digest=scene.digest,
         scene=scene.effective_toml(),
@@ -53,9 +56,16 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
     )
-    layout = Layout(tuple(sweep.axes(scene)), faces, scene.accuracy.meshes, patches, derived, scene.friction.cor_grid,
-                    scene.friction.model)
-    return Plan(layout, header, tuple(sweep.units(scene, pipeline.axis_symmetry)))
+    layout = Layout(
+        tuple(sweep.axes(scene)),
+        faces,
+        scene.accuracy.meshes,
+        patches,
+        tuple(derived(scene)),
+        scene.friction.cor_grid,
+        scene.friction.model,
+    )
+    return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.object.axis_symmetry)))
 
 
 def by_cost(costs: Sequence[float]) -> list[int]:

@@ -76,17 +76,17 @@ MAPS = (
              " mean of both fingers."),
     Quantity("contact_area", "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
     Quantity("p_max", "Pa", "largest pressure", "Largest contact pressure on either finger."),
-    Quantity("contact_distance", "m", "distance of the contacts", "Distance between the origins of the contact frames."),
-    Quantity("curvature_loss", "", "force lost to curvature", "1 - F_N / S: zero for a flat contact, what the tilt of the"
-             " loaded normals takes off the normal force otherwise; both fingers together."),
+    Quantity("contact_distance", "m", "distance of the contacts", "Distance between the contact frames' origins."),
+    Quantity("curvature_loss", "", "force lost to curvature", "1 - F_N / S: zero for a flat contact, what the tilt of"
+             " the loaded normals takes off the normal force otherwise; both fingers together."),
     Quantity("misalignment", "rad", "misalignment of the contacts", "Angle between one contact normal and the other"
              " reversed; the score's closed form is exact at 0 and off by about 1 % at 0.09 rad."),
-    Quantity("flags", "", "flags of the case", "Sum of: 1 a contact carries no torque, 2 a contact carries no force along"
-             " an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no corners,"
+    Quantity("flags", "", "flags of the case", "Sum of: 1 a contact carries no torque, 2 a contact carries no force"
+             " along an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no corners,"
              " 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
              " 512 solved with nodal gaps, because weighted ones had no solution."),
-    *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model", f"1 - curved / {model} of {name}_max:"
-               f" the share of the planar model's claim that the curved contact cannot carry ({note}); of the finger"
+    *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
+               f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved contact cannot carry ({note}); of the finger"
                " where it is largest.")
       for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
       for suffix, model, note in (("", "flat", "both scaled by S, the paper's normalisation"),
@@ -128,9 +128,9 @@ FINGER = (
 CHECKS = (
     _finger("checks", "force_balance", "", "force balance", "Difference of contact force and load, over the load."),
     _finger("checks", "tension", "", "largest tension", "Largest negative nodal pressure over the largest pressure."),
-    _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over the element size."),
-    _finger("checks", "complementarity", "", "complementarity", "Largest product of pressure and gap at a node, over the"
-            " largest pressure and the element size."),
+    _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over an element's size."),
+    _finger("checks", "complementarity", "", "complementarity", "Largest product of pressure and gap at a node, over"
+            " the largest pressure and the element size."),
     _finger("checks", "min_det_f", "", "smallest det F", "Smallest ratio of deformed to undeformed volume."),
     _finger("checks", "max_strain", "", "largest strain", "Largest difference of a principal stretch from 1."),
     _finger("checks", "acoustic", "", "smallest acoustic eigenvalue", "Over the shear modulus, in 24 directions at one"
@@ -177,16 +177,16 @@ REASONS = (
 
 def cor_wrench(n: int) -> Quantity:
     """Friction wrenches of an ``n x n`` grid of centres of rotation."""
-    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction (f_x, f_y,"
-                   " tau_z) of the curved model in the contact frame for turns about the points of a square grid of ten"
+    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction (f_x,"
+                   " f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of ten"
                    f" contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
 
 
 def quantities(meshes: int = 1, cor_grid: int = 0) -> tuple[Quantity, ...]:
     """All per-case quantities but the patch.
 
-    The error maps exist when every case is solved on two meshes, the wrenches of the paper's grid of centres of rotation
-    when the scene asks for a grid of ``cor_grid`` points a side.
+    The error maps exist when every case is solved on two meshes, the wrenches of the paper's grid of centres of
+    rotation when the scene asks for a grid of ``cor_grid`` points a side.
     """
     everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE + ((cor_wrench(cor_grid),) if cor_grid else ())
     return tuple(q for q in everything if meshes > 1 or not q.only_with_two_meshes)

@@ -26,6 +26,11 @@ class Shape(Section):
     name: str = Field("", max_length=100, description="name for titles and tables")
 
     @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z: 0 is every angle, 1 none."""
+        return 1
+
+    @property
     def spans_mm(self) -> dict[str, Span]:
         """Extent along each axis where the scene alone tells it [mm]."""
         return {}
@@ -44,6 +49,11 @@ class Sphere(Shape):
     radius = si("radius_mm")
 
     @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        return 0
+
+    @property
     def spans_mm(self) -> dict[str, Span]:
         """Extent along each axis [mm]."""
         return dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
@@ -57,6 +67,11 @@ class EllipticCylinder(Shape):
     semi_axis_b_mm: Length = Field(description="semi-axis along y, across the approach at angle 0")
     length_mm: Length = Field(description="length along z")
     semi_axis_a, semi_axis_b, length = si("semi_axis_a_mm"), si("semi_axis_b_mm"), si("length_mm")
+
+    @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        return 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
 
     @property
     def spans_mm(self) -> dict[str, Span]:
@@ -74,6 +89,11 @@ class Box(Shape):
     size, edge_radius = si("size_mm"), si("edge_radius_mm")
 
     @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        return 4 if self.size_mm[0] == self.size_mm[1] else 2
+
+    @property
     def spans_mm(self) -> dict[str, Span]:
         """Extent along each axis [mm]."""
         return {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
@@ -85,6 +105,11 @@ class Plate(Shape):
     shape: Literal["plane"]
     thickness_mm: Length = Field(description="distance of the two planes, which the fingers press along x")
     thickness = si("thickness_mm")
+
+    @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        return 2
 
     @property
     def spans_mm(self) -> dict[str, Span]:
@@ -100,6 +125,11 @@ class Revolution(Shape):
         strict=False, min_length=4, max_length=2000, description="outline as points [z, radius] with rising z"
     )
     profile = si("profile_mm")
+
+    @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        return 0
 
     @property
     def spans_mm(self) -> dict[str, Span]:

@@ -89,7 +89,9 @@ def as_text(table: Table) -> str:
             body.append(cells)
     widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [head, *body]]
-    legend = [f"{word}: {meaning}" for _, word, meaning in FLAGS if any(word in row[-1 - ("label" in names)] for row in body)]
+    legend = [
+        f"{word}: {meaning}" for _, word, meaning in FLAGS if any(word in row[-1 - ("label" in names)] for row in body)
+    ]
     return "\n".join([table.title, *lines, *legend])
 
 

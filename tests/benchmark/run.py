@@ -1,4 +1,4 @@
-"""Print what the program costs where: ``make bench``. Ratios of one run on one machine; nothing here is a timed test."""
+"""Print what the program costs where (``make bench``): figures of one run on one machine, not timed tests."""
 
 from __future__ import annotations
 
@@ -65,6 +65,7 @@ def element_routine() -> None:
         u = 1e-4 * np.random.default_rng(0).standard_normal((n, 3, nodes))
         r, K = np.empty((n, 3, nodes)), np.empty((n, 3, nodes, 3, nodes))
         for foam in FOAMS:
+
             def both(foam=foam, u=u, pad=pad, r=r, K=K) -> None:
                 kernel.elements(foam.number, foam.parameters, u, pad.dN, pad.volume, r, K)
 
@@ -80,10 +81,14 @@ def contact_solve() -> None:
     for elements, forces, goal in (((24, 12, 6), (3.0, 10.0, 30.0), 40), ((48, 24, 12), (3.0,), 25)):
         press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), finger.gap)
         states = list(press.ladder(forces))
-        total, factor, assembly = (sum(getattr(s.seconds, k) for s in states) for k in ("total", "factorisation", "assembly"))
+        total, factor, assembly = (
+            sum(getattr(s.seconds, k) for s in states) for k in ("total", "factorisation", "assembly")
+        )
         name = "x".join(map(str, elements))
-        line(f"contact solve {name}, {press.problem.size} unknowns, {sum(s.iterations for s in states)} iterations",
-             f"{total:.2f} s")
+        line(
+            f"contact solve {name}, {press.problem.size} unknowns, {sum(s.iterations for s in states)} iterations",
+            f"{total:.2f} s",
+        )
         line("  assembly", f"{100 * assembly / total:.1f} %")
         line("  everything that is not factorisation", f"{100 * (1 - factor / total):.1f} %", f"goal: at most {goal} %")
         press.destroy()
@@ -99,8 +104,11 @@ def friction() -> None:
     line("three exact maxima", f"{fastest(lambda: friction_limits(patch, 0.8)) * 1e3:.2f} ms")
     line("contact frame", f"{fastest(lambda: contact_frame(patch, [1.0, 0, 0])) * 1e3:.2f} ms")
     one, two = (0.8, 0.7, 0.012), (0.8, 0.75, 0.011)
-    line("antipodal score with both epsilons",
-         f"{fastest(lambda: score(one, two, 0.06, 0.2, 0.05), 0.2) * 1e6:.1f} us", "goal: at most 50")
+    line(
+        "antipodal score with both epsilons",
+        f"{fastest(lambda: score(one, two, 0.06, 0.2, 0.05), 0.2) * 1e6:.1f} us",
+        "goal: at most 50",
+    )
 
 
 def whole_map(scene: Path, folder: Path) -> None:
@@ -110,8 +118,13 @@ def whole_map(scene: Path, folder: Path) -> None:
     for ranks in (1, 2):
         command, environment = mpirun(ranks)
         start = time.perf_counter()
-        subprocess.run([*command, *softjaw, str(folder / f"{ranks}.hdf")], check=True, cwd=ROOT, env=environment,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [*command, *softjaw, str(folder / f"{ranks}.hdf")],
+            check=True,
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+        )
         seconds[ranks] = time.perf_counter() - start
         line(f"{scene.stem} on {ranks} rank{'s' * (ranks > 1)}", f"{seconds[ranks]:.1f} s")
     line("time on 2 ranks over time on 1", f"{seconds[2] / seconds[1]:.3f}", "goal: at most 0.55")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem.extract import extract, patch_faces
+from fem.extract import extract
 from fem.materials import material
 from fem.objects import EllipticCylinder
 from fem.pad import Pad, PadShape
@@ -60,7 +60,7 @@ def test_a_half_of_a_pad_on_a_lopsided_object():
 def test_number_and_order_of_the_faces(whole):
     """``per_side`` times the elements along length and width; numbered along the width first."""
     element, pad, _, patch = whole
-    nx, ny = patch_faces(pad.shape)
+    nx, ny = pad.shape.patch_faces
     per_side = {"hex8": 2, "hex27": 3}[element]
     assert (nx, ny) == (per_side * 8, per_side * 4)
     centroid = patch.centroid.reshape(nx, ny, 3)
@@ -84,7 +84,7 @@ def test_loads_are_those_of_the_solution(whole):
 def test_faces_tile_the_deformed_front(whole):
     """Neighbours share corners, the faces cover the deformed front, and each holds its centre."""
     _, pad, pressed, patch = whole
-    nx, ny = patch_faces(pad.shape)
+    nx, ny = pad.shape.patch_faces
     corners = patch.corners.reshape(nx, ny, 4, 3)
     assert np.abs(corners[1:, :, 0] - corners[:-1, :, 1]).max() == 0
     assert np.abs(corners[1:, :, 3] - corners[:-1, :, 2]).max() == 0
