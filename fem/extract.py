@@ -21,8 +21,8 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     """Patch of the whole pad at this state, in the pad's frame at first touch.
 
     ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area``
-    that of the deformed face and ``pressure`` the load over that area.  Faces are numbered along the width first, and their number
-    does not depend on symmetry.
+    that of the deformed face and ``pressure`` the load over that area.  Faces are numbered along the width
+    first, and their number does not depend on symmetry.
     """
     points = pressed.points
     load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()

@@ -1,8 +1,8 @@
 """The door to PETSc: one nonlinear problem with a fixed sparsity, solved on this rank alone.
 
 ``newtonls`` with full steps on the semismooth (primal-dual active set) form is the default; the option
-``-contact_snes_type vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every linear
-system is factorised by MUMPS; its symbolic analysis is done once and kept, because the pattern never changes.
+``-contact_snes_type vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every
+linear system is factorised by MUMPS; its symbolic analysis is done once and kept: the pattern never changes.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class NonlinearSolver:
 
     @contextmanager
     def _options_in_effect(self) -> Iterator[None]:
-        """Our defaults and the caller's options in PETSc's database, and out again; PETSC_OPTIONS wins over defaults."""
+        """Our defaults and the caller's options in its database, then out again; PETSC_OPTIONS wins over defaults."""
         database = PETSc.Options()
         given = database.getAll()
         # thin structures jump by orders of magnitude in the first iteration; a line search on the residual stalls there

@@ -254,7 +254,7 @@ class Press:
             travel *= 1.5
         raise ConvergenceError(
             f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
-            f"less than an element of its front: refine the pad's mesh or move the candidate. The last attempt: {failure}"
+            f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
         )
 
     def _height(self) -> FloatArray:

@@ -66,7 +66,7 @@ def check_mesh(scene: Scene) -> None:
         raise StudyError(
             USAGE,
             f"candidates: found stations off the object, {', '.join(f'{s:g}' for s in beside[:5])} mm; expected {low:g}"
-            f" to {high:g} mm, the mesh's extent along its axis {scene.object.axis}; change the stations, or object.unit",
+            f" to {high:g} mm, the mesh along its axis {scene.object.axis}; change the stations or object.unit",
         )
 
 

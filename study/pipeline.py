@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from fem.errors import CheckError, ConvergenceError
 from fem.extract import extract
-from fem.extract import patch_faces as faces_of
 from fem.pose import Pose
 from fem.press import Press, Pressed, Settings
 from friction.frame import Frame, contact_frame, contact_length, in_frame

@@ -82,12 +82,12 @@ MAPS = (
     Quantity("misalignment", "rad", "misalignment of the contacts", "Angle between one contact normal and the other"
              " reversed; the score's closed form is exact at 0 and off by about 1 % at 0.09 rad."),
     Quantity("flags", "", "flags of the case", "Sum of: 1 a contact carries no torque, 2 a contact carries no force"
-             " along an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no corners,"
-             " 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
+             " along an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no"
+             " corners, 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
              " 512 solved with nodal gaps, because weighted ones had no solution."),
     *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
-               f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved contact cannot carry ({note}); of the finger"
-               " where it is largest.")
+               f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved"
+               f" contact cannot carry ({note}); of the finger where it is largest.")
       for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
       for suffix, model, note in (("", "flat", "both scaled by S, the paper's normalisation"),
                                   ("_projected", "projected", "both scaled by the physical normal force F_N; not"
@@ -128,7 +128,7 @@ FINGER = (
 CHECKS = (
     _finger("checks", "force_balance", "", "force balance", "Difference of contact force and load, over the load."),
     _finger("checks", "tension", "", "largest tension", "Largest negative nodal pressure over the largest pressure."),
-    _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over an element's size."),
+    _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over an element."),
     _finger("checks", "complementarity", "", "complementarity", "Largest product of pressure and gap at a node, over"
             " the largest pressure and the element size."),
     _finger("checks", "min_det_f", "", "smallest det F", "Smallest ratio of deformed to undeformed volume."),
@@ -178,8 +178,8 @@ REASONS = (
 def cor_wrench(n: int) -> Quantity:
     """Friction wrenches of an ``n x n`` grid of centres of rotation."""
     return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction (f_x,"
-                   " f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of ten"
-                   f" contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
+                   " f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of"
+                   f" ten contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
 
 
 def quantities(meshes: int = 1, cor_grid: int = 0) -> tuple[Quantity, ...]:

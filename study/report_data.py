@@ -190,12 +190,12 @@ class Data:
             if axis is self.axes[-3] and self.by_poses:
                 words.append(self.candidate(index) or f"pose {i}")
             elif axis is self.axes[-1]:
-                words += [f"{number(axis.values[i], 4)} N"] * force
+                words += [f"{number(axis.values[i], 4)}\u00a0N"] * force
             elif length > 1 and self.texts(axis):
                 words.append(f"{self.name(axis)} {self.texts(axis)[i]}")
             elif length > 1 or axis.name == "station":
                 text = f"{self.name(axis)} {number(axis.values[i] * factor, 4)}"
-                words.append(text + (unit if unit == "°" else f" {unit}" if unit else ""))
+                words.append(text + (unit if unit == "°" else f"\u00a0{unit}" if unit else ""))
         return ", ".join(words)
 
     def candidate(self, index: Sequence[int]) -> str:

@@ -47,6 +47,7 @@ def verdict(data: Data, mu: float | None) -> str:
     done, failed, missing = (data.count(state) for state in (DONE, FAILED, MISSING))
     total = data.status.size
     cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing."
+    cases = f"All {total} cases are solved." if done == total > 1 else cases
     if data.best is None:
         return box([f"No grasp is solved. {cases}"], "verdict")
     return box([*_best_sentences(data, data.best, mu), cases], "verdict") + _warnings(data, data.best)
