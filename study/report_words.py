@@ -55,7 +55,9 @@ def verdict(data: Data, mu: float | None) -> str:
 
 def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list[str]:
     value = {name: number(data.at(name, best) * data.units(name)[2]) for name in COLUMNS}
-    what = f"quality {value['quality']}" if data.score == "quality" else "no quality is stored, ranked by e_n"
+    what = f"quality {value['quality']}" if data.score == "quality" else "ranked by e_n, for no quality is stored"
+    if not np.isfinite(data.at(data.score, best)):
+        what = "which has no score"
     alike = data.images(best)
     same = f" The same score at {_listed([data.place(i) for i in alike])}." if alike else ""
     best_of = "Best grasp" if data.grasps > 1 else "Best point of the sweep" if data.sweeps else "The grasp"

@@ -1,0 +1,344 @@
+"""The report: what it says about synthetic studies, that it needs nothing from outside, and what odd files do to it."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from study import pictures
+from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.layout import Derived, Header, Layout
+from study.reading import StoredAxis
+from study.record import blank, crc32, record
+from study.report import build, write_report
+from study.report_curvature import difference_pictures
+from study.report_data import Data, number
+from study.report_outline import read_scene, shape_outline, slice_polygon
+from study.report_patch import cells
+from study.result import CaseResult
+from study.scene_shapes import EllipticCylinder, Sphere
+from study.show import best
+from study.store import create, open_result
+
+ROOT = Path(__file__).parent.parent.parent
+FACES = (6, 4)
+SCENE = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[candidates]
+stations_mm = [0, 10, 20, 30]
+[load]
+normal_force_n = [1, 5]
+"""
+SWEEP = SCENE + '[sweep]\n"object.semi_axis_b_mm" = [10, 25, 50]\n'
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+def axis(name, values, units, long_name=""):
+    return StoredAxis(name, np.asarray(values, float), units, long_name or f"the {name}")
+
+
+def axes(stations=(0, 0.01, 0.02, 0.03), angles=(0, 0.5, 1.0), forces=(1.0, 5.0), sweep=(), station_units="m"):
+    place = [axis("station", stations, station_units), axis("angle", angles, "rad"), axis("normal_force", forces, "N")]
+    return (*sweep, *place)
+
+
+def patch():
+    """A grid of faces that are loaded in the middle."""
+    x, y = (a.ravel() for a in np.meshgrid(*(np.linspace(-0.01, 0.01, n) for n in FACES), indexing="ij"))
+    centroid = np.stack([x, y, 0.1 * y**2], axis=-1)
+    pressure = np.maximum(0.0, 1e4 * (1 - (y / 0.009) ** 2))
+    normal = np.broadcast_to([0.0, 0.0, 1.0], centroid.shape)
+    one = {"pressure": pressure, "area": np.full(len(x), 2e-5), "centroid": centroid, "normal": normal}
+    return {name: np.stack([values, values]) for name, values in one.items()}
+
+
+def solved(layout, index, message="", **changes):
+    """A case whose quality is largest at station 2 and angle 1, and grows with the force."""
+    force = layout.axes[-1].values[index[-1]]
+    peak = 1.0 / (1 + abs(index[-3] - 2) + 2 * abs(index[-2] - 1))
+    by_model = peak * np.array([1.0, 1.1, 0.9])
+    values = {f"maps/{name}": by_model * factor for name, factor in (("quality", force), ("e_n", 0.01))}
+    values |= {f"maps/{name}": by_model * 0.8 * force for name in ("f_x_max", "f_y_max")}
+    values |= {"maps/tau_z_max": by_model * 1e-2 * force, "maps/contact_distance": 0.04, "maps/flags": 0.0}
+    values |= {"checks/force_balance": [1e-12, 2e-12], "checks/min_det_f": [0.5, 0.6], "work/seconds_total": 1.5}
+    values |= {"work/seconds_assembly": 1.0, "fingers/frame_origin": np.zeros((2, 3))}
+    values |= {"fingers/frame_axes": np.stack([np.eye(3)] * 2)} | changes
+    values = {key: value for key, value in values.items() if value is not None}
+    faces = patch() if layout.patches else None
+    return CaseResult(values, faces, message, {"pad": ("hyperelastic", 0.2, 0)})
+
+
+def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", message="", labels=(), **changes):
+    """A result file whose cases are done, missing, or failed with the text that ``state`` gives."""
+    create(path, layout, Header("d" * 64, scene, title, "scene.toml", labels=labels))
+    with h5py.File(path, "r+") as file:
+        for row, index in enumerate(np.ndindex(layout.shape)):
+            if (what := state(index)) == "missing":
+                continue
+            done = what == "done"
+            values = record(layout, solved(layout, index, message, **changes)) if done else blank(layout, what)
+            for column, value in zip(layout.columns, values, strict=True):
+                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
+            file["study/status/crc"][index] = crc32(layout, values)
+            file["study/status/code"][index] = 1 if done else 2
+    return path
+
+
+class Page(HTMLParser):
+    """Elements of a page, whether they are closed in order, and its text."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.open, self.found, self.text, self.balanced = [], [], "", True
+        self.feed(html)
+        self.balanced &= not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        self.balanced &= bool(self.open) and self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text += data.replace("\u00a0", " ")
+
+    def tags(self, name):
+        return [attributes for tag, attributes in self.found if tag == name]
+
+
+def page_of(path):
+    with open_result(path) as result, pictures.style():
+        return Page(build(result)[0])
+
+
+@pytest.fixture(scope="module")
+def ordinary(tmp_path_factory):
+    """Most cases done, one missing, two failed alike; its page and what was written."""
+    folder = tmp_path_factory.mktemp("report")
+
+    def state(index):
+        if index == (0, 0, 0):
+            return "missing"
+        return f"ConvergenceError: residual {index[1]}.5e-03 at station <b>{index[0]}" if index[0] == 3 else "done"
+
+    texts = {"title": "<script>alert('x')</script> & co", "message": "a <i>note</i>"}
+    path = make(folder / "study.hdf", Layout(axes(), 24), state, **texts)
+    written = write_report(path, folder / "study.html")
+    return path, written, Page(written[0].read_text())
+
+
+def test_a_page_and_a_picture_are_written(ordinary):
+    _, written, _ = ordinary
+    assert [p.name for p in written] == ["study.html", "study.png"]
+    assert written[1].read_bytes().startswith(b"\x89PNG")
+    assert sum(p.stat().st_size for p in written) < 2e6
+    assert {p.suffix for p in written[0].parent.iterdir()} == {".hdf", ".html", ".png"}
+
+
+def test_the_page_needs_nothing_from_outside_and_runs_nothing(ordinary):
+    _, written, page = ordinary
+    assert not page.tags("script")
+    assert not page.tags("link")
+    assert not page.tags("iframe")
+    assert all(image["src"].startswith("data:image/svg+xml;base64,") for image in page.tags("img"))
+    assert all(link["href"].startswith("#") for link in page.tags("a"))
+    assert not any(key.startswith("on") for _, attributes in page.found for key in attributes)
+    assert not re.search(r"https?://", written[0].read_text())
+    assert any("default-src 'none'" in m.get("content", "") for m in page.tags("meta"))
+
+
+def test_the_page_is_well_formed_and_accessible(ordinary):
+    _, _, page = ordinary
+    assert page.balanced
+    assert page.tags("html")[0]["lang"] == "en"
+    assert len(page.tags("h1")) == 1
+    assert len(page.tags("main")) == 1
+    levels = [int(tag[1]) for tag, _ in page.found if re.fullmatch("h[1-6]", tag)]
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    assert all(len(image["alt"]) > 20 for image in page.tags("img"))
+    assert len(page.tags("caption")) == len(page.tags("table")) > 5
+    anchors = {section["id"] for section in page.tags("section")}
+    assert {link["href"][1:] for link in page.tags("a")} <= anchors
+
+
+def test_texts_of_the_file_are_escaped(ordinary):
+    _, written, page = ordinary
+    html = written[0].read_text()
+    assert "<script>alert" not in html
+    assert "<b>" not in html
+    assert "<i>note" not in html
+    assert "<script>alert('x')</script> & co" in page.text
+    assert "a <i>note</i>" in page.text
+
+
+def test_the_verdict_names_the_best_grasp_and_what_is_missing(ordinary):
+    path, _, page = ordinary
+    assert "Best grasp at 5 N per finger: station 20 mm, angle 28.65°, quality 5, e_n 10 mm" in page.text
+    assert "4 N along the pad, 4 N across it and 50 N mm of torque" in page.text
+    assert "A planar contact model (flat) would claim 10 % more quality and 10 % more e_n." in page.text
+    assert "17 of 24 cases are solved, 6 failed, 1 are missing." in page.text
+    assert "This study is unfinished" in page.text
+    with open_result(path) as result:
+        data = Data(result)
+        first = best(result).rows[0]
+        assert (first[1], first[2]) == (data.axes[0].values[data.best[0]], data.axes[1].values[data.best[1]])
+
+
+def test_failures_that_differ_in_numbers_alone_are_one_kind(ordinary):
+    path, _, page = ordinary
+    with open_result(path) as result:
+        ((count, text, where),) = Data(result).grouped(2)
+    assert count == 6 == len(where)
+    assert "ConvergenceError" in text
+    assert page.text.count("ConvergenceError: residual") == 1
+
+
+def test_definitions_scene_checks_and_time_are_told(ordinary):
+    _, _, page = ordinary
+    assert "Volume of the grasp wrench space" in page.text
+    assert "semi_axis_a_mm = 25" in page.text
+    assert "2.0 × 10⁻¹²" in page.text
+    assert "pad dimensions" in page.text
+    assert "only trends" in page.text
+    assert "hyperelastic" in page.text
+    assert "Time of 17 solved cases" in page.text
+
+
+SMALL = axes(stations=(0.01,), angles=(0.0,), forces=(3.0,))
+POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), station_units="")
+TEXTS = (axis("material", (0, 1), "", "gripper.material (0 = blatz_ko, 1 = neo_hookean)"),)
+
+
+@pytest.mark.parametrize(
+    ("layout", "options", "expected"),
+    [
+        (Layout(SMALL, 0, patches=False), {}, "The grasp at 3 N per finger: station 10 mm"),
+        (Layout(SMALL, 24), {"state": lambda i: "it failed"}, "No grasp is solved. 0 of 1 cases are solved, 1 failed"),
+        (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "No grasp is solved."),
+        (Layout(SMALL, 24), {"maps/quality": None, "maps/e_n": None}, "which has no score"),
+        (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "does not pass its checks: min det f -0.1"),
+        (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "Best grasp at 2 N per finger: right"),
+        (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "material blatz_ko"),
+    ],
+    ids=["one case", "all failed", "nothing done", "no scores", "bad check", "poses", "sweep of texts"],
+)  # fmt: skip
+def test_odd_files_give_a_page(tmp_path, layout, options, expected):
+    page = page_of(make(tmp_path / "odd.hdf", layout, **options))
+    assert page.balanced
+    assert expected in page.text
+
+
+def test_the_same_file_gives_the_same_bytes(tmp_path):
+    path = make(tmp_path / "small.hdf", Layout(SMALL, 24))
+    one, two = (write_report(path, tmp_path / name) for name in ("one.html", "two.html"))
+    assert [p.read_bytes() for p in one] == [p.read_bytes() for p in two]
+
+
+def test_a_score_that_fails_at_the_highest_force_is_looked_for_below(tmp_path):
+    path = make(tmp_path / "f.hdf", Layout(axes(), 24), lambda i: "done" if i[-1] == 0 else "missing")
+    with open_result(path) as result:
+        data = Data(result)
+        assert data.k == 0
+        assert data.best == (2, 1, 0)
+
+
+def test_images_of_a_grasp_are_not_listed_twice(tmp_path):
+    path = make(tmp_path / "f.hdf", Layout(axes(angles=(0.0, 1.0, 2.0)), 0, patches=False))
+    with open_result(path) as result:
+        data = Data(result)
+        assert data.images((2, 0, 1)) == [(0, 1, 1), (2, 2, 1)]  # 1 / (1 + 2) in all of them
+        assert data.other == ((0, 2, 1), "the lowest score")
+
+
+def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):
+    """Pressed along a = 25 mm: a / b = 2.5, 1, 0.5 and a / b^2 = 250, 40, 10 per metre."""
+    sweep = (axis("semi_axis_b", (0.01, 0.025, 0.05), "m", "object.semi_axis_b_mm"),)
+    derived = (Derived("other", "", "another difference", "made up", ("semi_axis_b",)),)
+    layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0, patches=False, derived=derived)
+    path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
+    with open_result(path) as result, pictures.style():
+        data, scene = Data(result), read_scene(result.scene)
+        ratio, curvature = difference_pictures(data, scene, data.best)
+    assert "a / b" in ratio.alt
+    assert "curvature at the apex" in curvature.alt
+    assert "across, f_y, flat: 4 to 4 %" in ratio.alt
+    assert "other" not in ratio.alt  # it was never filled
+
+
+def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
+    path = make(tmp_path / "study.hdf", Layout(SMALL, 0, patches=False))
+    for out in (path, tmp_path / "study.png"):
+        with pytest.raises(StudyError, match="html") as error:
+            write_report(path, out)
+        assert error.value.code == CANNOT_WRITE
+    with pytest.raises(StudyError, match="cannot be written") as error:
+        write_report(path, tmp_path / "nowhere" / "r.html")
+    assert error.value.code == CANNOT_WRITE
+    with pytest.raises(StudyError) as error:
+        write_report(tmp_path / "none.hdf", tmp_path / "r.html")
+    assert error.value.code == OTHER_FILE
+    assert [p.name for p in tmp_path.iterdir()] == ["study.hdf"]
+
+
+def area(x, y):
+    """Of a polygon, by the shoelace formula."""
+    return 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1))
+
+
+def test_outlines_are_those_of_the_shapes():
+    """Extent of an ellipse along a direction: sqrt((a cos)^2 + (b sin)^2); a slice's area: 2 r h."""
+    tube = EllipticCylinder(shape="elliptic_cylinder", semi_axis_a_mm=30, semi_axis_b_mm=40, length_mm=100)
+    z, r = shape_outline(tube, np.pi / 4)
+    assert r == pytest.approx(np.hypot(0.03, 0.04) / np.sqrt(2))
+    assert area(*slice_polygon(z, r, 0.01, 0.03).T) == pytest.approx(2 * 1e3 * r[0] * 20)
+    assert slice_polygon(z, r, 0.06, 0.07) is None
+    z, r = shape_outline(Sphere(shape="sphere", radius_mm=7.0), 0.3)
+    assert np.hypot(z, r) == pytest.approx(0.007)
+
+
+def test_faces_fill_the_patch_without_gaps():
+    points = np.random.default_rng(1).random((40, 2)) * [3, 1]
+    corners = cells(points)
+    low, high = np.concatenate(corners).min(axis=0), np.concatenate(corners).max(axis=0)
+    assert sum(area(*c.T) for c in corners) == pytest.approx(np.prod(high - low))
+    assert np.all(low < points.min(axis=0))
+    assert np.all(high > points.max(axis=0))
+    for line in (points[:3], np.stack([points[:, 0], points[:, 0]], axis=1) * [1, 0]):
+        with pytest.raises(ValueError, match="make no patch"):
+            cells(line)
+
+
+def test_labels_are_pushed_apart_and_stay_inside():
+    places = np.sort(np.random.default_rng(2).random(6))
+    apart = pictures.spread(places, 0.12, (0.0, 1.0))
+    assert np.all(np.diff(apart) >= 0.12 - 1e-12)
+    assert 0 <= min(apart)
+    assert max(apart) <= 1 + 1e-12
+    assert pictures.spread([1.0, 2.0], 0.5) == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "0"), (-3.14159, "-3.14"), (12345.6, "12300"), (2e7, "2.0 × 10⁷"), (np.inf, "–")]
+)
+def test_numbers_for_people(value, text):
+    assert number(value) == text
+
+
+def test_nothing_is_imported_before_a_picture_is_drawn():
+    code = "import sys, study.report; sys.exit(any(m.startswith('matplotlib') for m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0
