@@ -52,9 +52,8 @@ class PadShape:
         return self.per_side * self.elements[0], self.per_side * self.elements[1]
 
     def halved(self) -> PadShape:
-        """The same pad with half as many elements in every direction (at least one; kept even where it was even)."""
-        fewer = tuple(max(2, 2 * round(n / 4)) if n % 2 == 0 and n > 1 else max(1, n // 2) for n in self.elements)
-        return PadShape(self.size, fewer, self.grading, self.element)
+        """The same pad with half as many elements in every direction, rounded up."""
+        return PadShape(self.size, tuple(-(-n // 2) for n in self.elements), self.grading, self.element)
 
     def lines(self, axis: int, half: bool) -> FloatArray:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""

@@ -103,21 +103,21 @@ def image_of(first: Pose, second: Pose, axis_symmetry: int) -> bool:
     return bool(np.abs(aside[:2]).max() <= 1e-9)
 
 
-def usable_symmetry(scene: Scene, finger: Finger) -> tuple[bool, bool]:
-    """Planes of symmetry that this scene uses: those that exist, halve the mesh evenly and are allowed by its effects.
+def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
+    """Planes of symmetry that are used with this mesh: those that exist, halve it evenly and are allowed by the effects.
 
     Raises
     ------
     ValueError
         If the scene forces a symmetry that this candidate does not have.
     """
-    gripper, wanted = scene.gripper, scene.effects.model_size
+    wanted = scene.effects.model_size
     if wanted == "full":
         return False, False
-    found = mirror_planes(finger.gap, gripper.pad_size)
-    coarse = pad_shape(gripper, coarser=True).elements if scene.accuracy.meshes == 2 else gripper.elements
-    usable = tuple(f and n % 2 == 0 and m % 2 == 0 for f, n, m in zip(found, gripper.elements, coarse, strict=False))
-    need = {"auto": 0, "half": 1, "quarter": 2}[wanted]
+    found = mirror_planes(finger.gap, scene.gripper.pad_size)
+    usable = tuple(plane and n % 2 == 0 for plane, n in zip(found, elements, strict=False))
+    # a coarser mesh for error estimates takes what it can use
+    need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0
     if sum(usable) < need:
         raise ValueError(
             f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have "

@@ -23,7 +23,7 @@ from friction.patch import ContactPatch
 from friction.wrench import FrictionLimits, friction_limits, friction_wrench
 from scoring.score import ScoreFlag, score
 from study import model
-from study.build import build_object
+from study.build import build_object, pad_shape
 from study.effects import effects_of
 from study.quantities import MODELS
 from study.result import CaseFailure, CaseResult
@@ -58,32 +58,43 @@ class Contact:
 
 def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     """Cases of one candidate, force by force upward; each force starts from the state at the one before."""
-    scene, forces = unit.scene, unit.scene.load.normal_force
+    scene = unit.scene
     obj = build_object(scene.object)
-    size = scene.gripper.pad_size
-    fingers = [model.approach(obj, pose, size) for pose in unit.candidate.poses]
+    fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in unit.candidate.poses]
     shared = model.image_of(*unit.candidate.poses, scene.object.axis_symmetry)
-    ladders = [
-        [_press(scene, finger, coarser).ladder(forces) for coarser in (False, True)[: scene.accuracy.meshes]]
-        for finger in (fingers[:1] if shared else fingers)
-    ]
-    for k in range(len(forces)):
+    meshes = (False, True)[: scene.accuracy.meshes]
+    presses = [[_press(scene, f, coarser) for coarser in meshes] for f in (fingers[:1] if shared else fingers)]
+    try:
+        for k, outcome in enumerate(_states(presses, scene.load.normal_force)):
+            if isinstance(outcome, CaseFailure):
+                yield k, outcome
+                continue
+            start = time.perf_counter()
+            # an image finger has its partner's states; only its place differs
+            states = [outcome[0], outcome[0] if shared else outcome[1]]
+            contacts = [[Contact(scene, f, state) for state in own] for f, own in zip(fingers, states, strict=True)]
+            values = _values(scene, obj, [fine for fine, *_ in contacts])
+            if scene.accuracy.meshes == 2:
+                values |= _mesh_errors(*zip(*contacts, strict=True))
+            seconds = time.perf_counter() - start
+            yield k, _result(scene, values, contacts, [s for own in outcome for s in own], seconds)
+    finally:
+        for press in (p for own in presses for p in own):
+            press.destroy()
+
+
+def _states(presses: list[list[Press]], forces: Sequence[float]) -> Iterator[list[list[Pressed]] | CaseFailure]:
+    """For every force the states of all fingers on all meshes, or why there are none."""
+    ladders = [[press.ladder(forces) for press in own] for own in presses]
+    for k, force in enumerate(forces):
         try:
-            states = [[next(ladder) for ladder in ladders_of] for ladders_of in ladders]
+            yield [[next(ladder) for ladder in own] for own in ladders]
         except (ConvergenceError, CheckError) as error:
-            yield from _given_up(forces, k, error)
+            good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
+            yield CaseFailure(f"{type(error).__name__}: {error}; {good}")
+            for _ in forces[k + 1 :]:
+                yield CaseFailure(f"not tried, because the ladder of forces ended at {force:g} N: {error}")
             return
-        start = time.perf_counter()
-        # an image finger has its partner's states; only its place differs
-        contacts = [
-            [Contact(scene, finger, state) for state in states[i]]
-            for i, finger in ((0, fingers[0]), (0 if shared else 1, fingers[1]))
-        ]
-        values = _values(scene, obj, [fine for fine, *_ in contacts])
-        if scene.accuracy.meshes == 2:
-            values |= _mesh_errors(*zip(*contacts, strict=True))
-        seconds = time.perf_counter() - start
-        yield k, _result(scene, values, contacts, [s for one in states for s in one], seconds)
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
@@ -99,18 +110,11 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
 
 
 def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
-    symmetry = model.usable_symmetry(scene, finger)
+    elements = pad_shape(scene.gripper, coarser).elements
+    symmetry = model.usable_symmetry(scene, finger, elements)
     wanted, nodal = (model.pad(scene.gripper, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
     settings = Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
     return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, settings)
-
-
-def _given_up(forces: tuple[float, ...], k: int, error: Exception) -> Iterator[tuple[int, CaseFailure]]:
-    """The failed force and those above it, which had no state to start from."""
-    good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
-    yield k, CaseFailure(f"{type(error).__name__}: {error}; {good}")
-    for j in range(k + 1, len(forces)):
-        yield j, CaseFailure(f"not tried, because the ladder of forces ended at {forces[k]:g} N: {error}")
 
 
 def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
