@@ -37,7 +37,6 @@ _STYLE = {
     "lines.linewidth": 1.6,
     "lines.markersize": 4,
     "hatch.linewidth": 0.7,
-    "hatch.color": INK,
     "svg.hashsalt": "softjaw",  # the same file gives the same page, byte for byte
     "svg.fonttype": "path",
     "figure.dpi": 100,
@@ -108,8 +107,9 @@ def span(values: Any) -> tuple[float, float]:
 def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np.ndarray, **look: Any) -> Any:
     """Cells ``values (len(y), len(x))`` as colours, between borders ``x`` and ``y``.
 
-    Failed cells are grey and crossed out; cells without a value stay white.
+    Failed cells are grey and crossed out; cells without a value are dotted.
     """
+    dotted(axes, [np.array([[x[0], y[0]], [x[-1], y[0]], [x[-1], y[-1]], [x[0], y[-1]]])])
     crossed_out(axes, _cells(x, y, failed))
     many = values.size > RASTER
     shown = np.ma.masked_invalid(np.where(failed, np.nan, values))
@@ -131,6 +131,12 @@ def crossed_out(axes: Any, corners: Sequence[Any]) -> None:
         axes.add_collection(PolyCollection(corners, rasterized=len(corners) > RASTER, **look), autolim=False)
 
 
+def dotted(axes: Any, corners: Sequence[Any]) -> None:
+    """Polygons in the way cases without a value are drawn everywhere."""
+    for polygon in corners:
+        axes.fill(*np.transpose(polygon), facecolor="white", edgecolor="#c3cad0", linewidth=0, hatch="...", zorder=0)
+
+
 def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any) -> Any:
     """Polygons in the colours of ``values``."""
     from matplotlib.collections import PolyCollection
@@ -145,7 +151,7 @@ def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any)
 
 def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = False) -> None:
     """A colour bar with its quantity and unit; ``beside`` keeps it as high as axes that have an aspect of their own."""
-    place = {"cax": axes.inset_axes([1.03, 0.0, 0.035, 1.0])} if beside else {"ax": axes, "aspect": 25, "pad": 0.015}
+    place = {"cax": axes.inset_axes([1.03, 0.0, 0.035, 1.0])} if beside else {"ax": axes, "aspect": 10 * drawn.get_figheight(), "pad": 0.015}
     bar = drawn.colorbar(mappable, label=label, **place)
     bar.outline.set_visible(False)
 

@@ -52,7 +52,8 @@ def build(result: Any) -> tuple[str, bytes]:
     mu = scene.friction.mu if scene else None
     best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
     maps, png = report_maps.force_maps(data, best)
-    shapes = [report_side.side_view(data, scene, best), maps, report_maps.angle_maps(data, best)]
+    several = maps if data.status.size > 1 else None
+    shapes = [report_side.side_view(data, scene, best), several, report_maps.angle_maps(data, best)]
     sections: Sections = [
         ("verdict", "", report_words.verdict(data, mu) + report_words.best_tables(data)),
         ("maps", "Maps", _pictures(shapes) + paragraph(report_words.CAVEAT, "note")),

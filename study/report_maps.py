@@ -16,7 +16,7 @@ from study.report_page import Picture
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
 SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]"}
 MAPS = tuple(SHORT)
-HOW_TO_READ = "Crossed out: failed. White: not done."
+HOW_TO_READ = "Crossed out: failed. Dotted: no value yet."
 
 
 def main_axis(data: Data) -> int:
@@ -150,7 +150,7 @@ def force_maps(data: Data, index: tuple[int, ...]) -> tuple[Picture, bytes]:
     hidden = data.shape[angle] - len(rows)
     if hidden:
         images = len(different_angles(data)) == len(rows)
-        why = "symmetry gives the same map" if images else "see the next picture or the file"
+        why = "the same map" if images else "see the next picture or the file"
         caption += f" {hidden} more angle{'s' * (hidden > 1)} not drawn here: {why}."
     alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and normal force. {extremes(data, index)}"
     shown_ = Picture(pictures.as_svg(drawn), alt, caption)

@@ -34,7 +34,7 @@ caption { text-align: left; padding-bottom: .35rem }
 th, td { padding: .28rem .75rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line) }
 thead th { border-bottom: 1.5px solid var(--soft); vertical-align: bottom; line-height: 1.3 }
 .n { text-align: right } tbody th { font-weight: 600 } tr.first td, tr.first th { background: var(--tint) }
-th.text[scope=row] { min-width: 9rem } td.text { min-width: 6rem } td.wide { min-width: 17rem; overflow-wrap: anywhere }
+th.text[scope=row] { min-width: 9rem } td.text { min-width: 9rem } td.wide { min-width: 17rem; overflow-wrap: anywhere }
 pre { background: var(--tint); padding: .8rem 1rem; overflow-x: auto; font-size: .82rem; line-height: 1.45;
   white-space: pre-wrap; overflow-wrap: anywhere }
 @media (max-width: 40rem) { body { padding: .5rem .75rem 2rem } h1 { font-size: 1.4rem }

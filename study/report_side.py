@@ -26,8 +26,11 @@ def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
     length, thickness = pad_extent(scene, data.axes[-3]) if scene else (0.0, 0.0)
     borders = pictures.edges(stations, length or float(np.ptp(z)) or 0.01)
     top, wide = radius.max() + 1.25 * thickness, max(np.ptp(z), np.ptp(borders))
-    names = MAPS if len(stations) > 1 else MAPS[:0]
+    names = [name for name in MAPS if len(stations) > 1 and np.isfinite(scaled(data, name)).any()]
+    if len(stations) > 1 and not names:
+        names = list(MAPS[:1])
     size = (10, min(max(3.9 * 2 * top / wide + 0.7, 2.0), 4.8)) if names else (5.5, 3.4)
+    size = (6.5, size[1]) if len(names) == 1 else size
     drawn, axes = pictures.figure(*size, 1, len(names) or 1, sharey=True)
     for axis, name in zip(axes[0], names or ("",), strict=True):
         if name:
@@ -35,18 +38,19 @@ def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
         axis.plot(1e3 * np.concatenate([z, z[::-1], z[:1]]), 1e3 * np.concatenate([radius, -radius[::-1], radius[:1]]),
                   color=pictures.INK, lw=0.9)  # fmt: skip
         axis.plot(1e3 * stations, np.zeros(len(stations)), "|", color=pictures.INK, ms=5, mew=0.6)
-        _pads(axis, float(data.axes[-3].values[index[-3]]), z, radius, length, thickness)
+        if data.best is not None:
+            _pads(axis, float(data.axes[-3].values[index[-3]]), z, radius, length, thickness)
         axis.set(aspect="equal", xlabel="station [mm]")
         axis.autoscale_view()
     axes[0, 0].set_ylabel("along the approach [mm]")
     how = "" if exact else " The outline is drawn from the measured distance of the contacts."
-    pads = " Grey: the pads of the best grasp before they press, to scale." if length else ""
+    pads = " Grey: the pads of the best grasp before they press, to scale." if length and data.best else ""
     where = elsewhere(data, index, len(data.shape) - 3)
     read = f" {HOW_TO_READ}" if names else ""
     caption = f"Seen across the approach{f', at {where}' if where else ''}. Ticks: stations.{pads}{read}{how}"
     coloured = " in the colours of grasp quality and e_n" if names else ""
     alt = f"Side view of {data.title}{coloured}. {extremes(data, index)}"
-    return Picture(pictures.as_svg(drawn), alt, caption, narrow=not names)
+    return Picture(pictures.as_svg(drawn), alt, caption, narrow=len(names) < 2)
 
 
 def _slices(data: Data, drawn: Any, axis: Any, name: str, index: Sequence[int], line: Any, borders: np.ndarray) -> None:
@@ -58,6 +62,7 @@ def _slices(data: Data, drawn: Any, axis: Any, name: str, index: Sequence[int], 
     done = np.flatnonzero(there & np.isfinite(values))
     style = {"cmap": pictures.COLOURS[name], "vmin": limits[0], "vmax": limits[1]}
     mapped = pictures.polygons(axis, [corners[i] for i in done], values[done], **style)
+    pictures.dotted(axis, [corners[i] for i in np.flatnonzero(there & ~failed & np.isnan(values))])
     pictures.crossed_out(axis, [corners[i] for i in np.flatnonzero(there & failed)])
     if done.size:
         pictures.colour_bar(drawn, mapped, axis, SHORT[name], beside=True)

@@ -47,7 +47,8 @@ def verdict(data: Data, mu: float | None) -> str:
     done, failed, missing = (data.count(state) for state in (DONE, FAILED, MISSING))
     total = data.status.size
     cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing."
-    cases = f"All {total} cases are solved." if done == total > 1 else cases
+    if done == total:
+        cases = f"All {total} cases are solved." if total > 1 else "It is the only case of this study."
     if data.best is None:
         return box([f"No grasp is solved. {cases}"], "verdict")
     return box([*_best_sentences(data, data.best, mu), cases], "verdict") + _warnings(data, data.best)
@@ -141,7 +142,7 @@ def best_tables(data: Data) -> str:
             merged |= set(_turned(data, index))
     rows = [[_with_angles(data, index), *_row(data, index)] for index in chosen]
     force = number(data.forces[data.k])
-    caption = f"Best grasps at {force} N per finger, {len(order)} candidates solved (curved model)"
+    caption = f"Best grasps at {force} N per finger, candidates solved: {len(order)} (curved model)"
     html = table(caption, head, rows, texts=(0,), wide=(len(head) - 1,), first=True)
     if len(data.forces) > 1:
         rows = []
