@@ -109,7 +109,8 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
 
     Failed cells are grey and crossed out; cells without a value are dotted.
     """
-    dotted(axes, [np.array([[x[0], y[0]], [x[-1], y[0]], [x[-1], y[-1]], [x[0], y[-1]]])])
+    if np.any(np.isnan(values) & ~failed):
+        dotted(axes, [np.array([[x[0], y[0]], [x[-1], y[0]], [x[-1], y[-1]], [x[0], y[-1]]])])
     crossed_out(axes, _cells(x, y, failed))
     many = values.size > RASTER
     shown = np.ma.masked_invalid(np.where(failed, np.nan, values))
@@ -151,7 +152,10 @@ def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any)
 
 def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = False) -> None:
     """A colour bar with its quantity and unit; ``beside`` keeps it as high as axes that have an aspect of their own."""
-    place = {"cax": axes.inset_axes([1.03, 0.0, 0.035, 1.0])} if beside else {"ax": axes, "aspect": 10 * drawn.get_figheight(), "pad": 0.015}
+    if beside:
+        place = {"cax": axes.inset_axes([1.03, 0.0, 0.035, 1.0])}
+    else:
+        place = {"ax": axes, "aspect": 10 * drawn.get_figheight(), "pad": 0.015}
     bar = drawn.colorbar(mappable, label=label, **place)
     bar.outline.set_visible(False)
 

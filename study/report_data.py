@@ -194,7 +194,7 @@ class Data:
             elif length > 1 and self.texts(axis):
                 words.append(f"{self.name(axis)} {self.texts(axis)[i]}")
             elif length > 1 or axis.name == "station":
-                text = f"{self.name(axis)} {number(axis.values[i] * factor, 4)}"
+                text = f"{self.name(axis)}\u00a0{number(axis.values[i] * factor, 4)}"
                 words.append(text + (unit if unit == "°" else f"\u00a0{unit}" if unit else ""))
         return ", ".join(words)
 

@@ -34,14 +34,15 @@ caption { text-align: left; padding-bottom: .35rem }
 th, td { padding: .28rem .75rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line) }
 thead th { border-bottom: 1.5px solid var(--soft); vertical-align: bottom; line-height: 1.3 }
 .n { text-align: right } tbody th { font-weight: 600 } tr.first td, tr.first th { background: var(--tint) }
-th.text[scope=row] { min-width: 9rem } td.text { min-width: 9rem } td.wide { min-width: 17rem; overflow-wrap: anywhere }
+th.text[scope=row] { min-width: 10.5rem } td.wide { min-width: 11rem; overflow-wrap: anywhere }
 pre { background: var(--tint); padding: .8rem 1rem; overflow-x: auto; font-size: .82rem; line-height: 1.45;
   white-space: pre-wrap; overflow-wrap: anywhere }
 @media (max-width: 40rem) { body { padding: .5rem .75rem 2rem } h1 { font-size: 1.4rem }
   .verdict { font-size: 1.02rem } .scroll.wide img { width: 46rem; max-width: none } table { font-size: .86rem } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt } nav { display: none }
-  figure, tr, .verdict { break-inside: avoid } h2, h3, caption { break-after: avoid } a { color: inherit }
-  .scroll { overflow: visible } pre { white-space: pre-wrap } }
+  figure, tr, .verdict { break-inside: avoid } h2, h3, caption, thead { break-after: avoid }
+  table { font-size: 8.5pt } td.wide { min-width: 7rem } tbody tr:first-child { break-before: avoid }
+  a { color: inherit } .scroll { overflow: visible } pre { white-space: pre-wrap } }
 """
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 

@@ -151,7 +151,7 @@ def best_tables(data: Data) -> str:
             values = _row(data, found[0]) if found else ["–"] * (len(head) - 2) + ["not solved"]
             rows.append([number(force), data.place(found[0]) if found else "–", *values])
         head = ["force [N]", *head]
-        html += table("Best grasp at each force", head, rows, texts=(1,), wide=(len(head) - 1,))
+        html += table("Best grasp at each force", head, rows, wide=(1, len(head) - 1))
     tops = [index for k in range(len(data.forces)) for index in data.order(k)[:1]]
     words = {word: meaning for index in (*chosen, *tops) for _, word, meaning in _flags(data, index)}
     return html + "".join(paragraph(f"{word}: {meaning}.", "note") for word, meaning in words.items())

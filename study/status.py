@@ -45,15 +45,18 @@ def reasons(result: Any) -> list[str]:
     status, messages = result.status.ravel(), result.messages.ravel()
     lines = []
     for state, title in ((FAILED, "failed"), (DONE, "note")):
-        rows = np.flatnonzero((status == state) & (messages != ""))
-        texts, numbers = np.unique(messages[rows], return_counts=True)
-        order = np.argsort(-numbers, kind="stable")
-        for i in order[:MOST_REASONS]:
-            where = rows[messages[rows] == texts[i]]
-            places = "; ".join(place(result, int(row)) for row in where[:MOST_PLACES])
-            lines.append(f"  {title} {numbers[i]} x {texts[i]} [{places}{'; ...' * (len(where) > MOST_PLACES)}]")
-        if len(order) > MOST_REASONS:
-            lines.append(f"  {title}: {len(order) - MOST_REASONS} more messages, in status/message of the file")
+        where: dict[str, list[int]] = {}
+        for row in np.flatnonzero((status == state) & (messages != "")):
+            # a solved case may have several remarks, a failed one has one reason
+            for text in messages[row].split("; ") if state == DONE else [messages[row]]:
+                where.setdefault(text, []).append(int(row))
+        texts = sorted(where, key=lambda text: -len(where[text]))
+        for text in texts[:MOST_REASONS]:
+            places = "; ".join(place(result, row) for row in where[text][:MOST_PLACES])
+            more = "; ..." * (len(where[text]) > MOST_PLACES)
+            lines.append(f"  {title} {len(where[text])} x {text} [{places}{more}]")
+        if len(texts) > MOST_REASONS:
+            lines.append(f"  {title}: {len(texts) - MOST_REASONS} more messages, in status/message of the file")
     return lines
 
 
