@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from study.exits import USAGE, StudyError
 
 if TYPE_CHECKING:
@@ -31,6 +29,8 @@ def build_object(shape: Shape) -> GapObject:
         from fem.mesh_object import MeshObject
 
         return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
+    import numpy as np
+
     from fem import objects
 
     match shape.shape:

@@ -88,7 +88,8 @@ def model_curves(data: Data, position: int, index: tuple[int, ...], mu: float | 
         panel.set_xlabel("normal force per finger [N]" if position == len(index) - 1 else data.axis_label(axis))
     bars = " Bars: difference to a mesh half as fine." if data.map("e_n_error") is not None else ""
     where = data.place(index) if position == len(index) - 1 else data.place(index, force=True)
-    fixed = ", ".join(w for w in where.split(", ") if not w.startswith((f"{data.name(axis)} ", f"{data.name(axis)}\u00a0")))
+    own = (f"{data.name(axis)} ", f"{data.name(axis)}\u00a0")
+    fixed = ", ".join(words for words in where.split(", ") if not words.startswith(own))
     caption = f"{fixed[:1].upper()}{fixed[1:]}. F is the normal force of one finger.{ruled}{bars}"
     what = "e_n, quality, largest friction forces, torque and travel"
     alt = f"Curves of {what} over {data.name(axis)} for three friction models, {fixed}."
