@@ -19,7 +19,7 @@ MODEL_STYLE = {
     "projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
 }
 COLOURS = {"quality": "viridis", "e_n": "cividis", "pressure": "magma_r"}
-RASTER = 4000  # cells above which a map is stored as pixels: a page must stay small
+RASTER = 600  # polygons above which a map is stored as pixels: a page must stay small
 _STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
@@ -109,17 +109,22 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
 
     Failed cells are grey and crossed out; cells without a value are dotted.
     """
-    if np.any(np.isnan(values) & ~failed):
-        dotted(axes, [np.array([[x[0], y[0]], [x[-1], y[0]], [x[-1], y[-1]], [x[0], y[-1]]])])
-    crossed_out(axes, _cells(x, y, failed))
-    many = values.size > RASTER
+    many, missing = values.size > RASTER, np.isnan(values) & ~failed
+    crosses, dots = _cells(x, y, failed), _cells(x, y, missing)
+    if len(crosses) > RASTER:  # one ground of crosses that shows through is drawn much faster
+        crosses = _cells(x[[0, -1]], y[[0, -1]], np.ones((1, 1), bool))
+    crossed_out(axes, crosses)
+    dotted(axes, dots)
     shown = np.ma.masked_invalid(np.where(failed, np.nan, values))
-    return axes.pcolormesh(x, y, shown, rasterized=many, edgecolors="face", linewidth=0.4, **look)
+    return axes.pcolormesh(x, y, shown, rasterized=many, edgecolors="face", linewidth=0.4, zorder=1.1, **look)
 
 
 def _cells(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    rows, columns = np.nonzero(chosen)
-    box = np.stack([x[columns], y[rows], x[columns + 1], y[rows + 1]], axis=-1)
+    """Chosen cells as rectangles, neighbours in a row as one."""
+    steps = np.diff(chosen.astype(int), axis=1, prepend=0, append=0)
+    rows, first = np.nonzero(steps == 1)
+    last = np.nonzero(steps == -1)[1]
+    box = np.stack([x[first], y[rows], x[last], y[rows + 1]], axis=-1)
     return box[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
 
 
@@ -129,13 +134,13 @@ def crossed_out(axes: Any, corners: Sequence[Any]) -> None:
 
     if len(corners):
         look = {"facecolor": EMPTY, "edgecolor": SOFT, "linewidth": 0.3, "hatch": "xxxx"}
-        axes.add_collection(PolyCollection(corners, rasterized=len(corners) > RASTER, **look), autolim=False)
+        axes.add_collection(PolyCollection(corners, zorder=0.5, **look), autolim=False)
 
 
 def dotted(axes: Any, corners: Sequence[Any]) -> None:
     """Polygons in the way cases without a value are drawn everywhere."""
     for polygon in corners:
-        axes.fill(*np.transpose(polygon), facecolor="white", edgecolor="#c3cad0", linewidth=0, hatch="...", zorder=0)
+        axes.fill(*np.transpose(polygon), facecolor="white", edgecolor="#c3cad0", linewidth=0, hatch="...", zorder=1)
 
 
 def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any) -> Any:

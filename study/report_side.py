@@ -15,6 +15,8 @@ from study.report_maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, sca
 from study.report_outline import outline, pad_extent, slice_polygon
 from study.report_page import Picture
 
+MOST_STATIONS = 80  # more ticks than that would be a bar
+
 
 def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
     """The object from the side in the colours of both maps, with the best grasp's pads; None if it cannot be drawn."""
@@ -37,7 +39,8 @@ def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
             _slices(data, drawn, axis, name, index, (z, radius), borders)
         axis.plot(1e3 * np.concatenate([z, z[::-1], z[:1]]), 1e3 * np.concatenate([radius, -radius[::-1], radius[:1]]),
                   color=pictures.INK, lw=0.9)  # fmt: skip
-        axis.plot(1e3 * stations, np.zeros(len(stations)), "|", color=pictures.INK, ms=5, mew=0.6)
+        if len(stations) <= MOST_STATIONS:
+            axis.plot(1e3 * stations, np.zeros(len(stations)), "|", color=pictures.INK, ms=5, mew=0.6)
         if data.best is not None:
             _pads(axis, float(data.axes[-3].values[index[-3]]), z, radius, length, thickness)
         axis.set(aspect="equal", xlabel="station [mm]")
@@ -46,8 +49,9 @@ def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
     how = "" if exact else " The outline is drawn from the measured distance of the contacts."
     pads = " Grey: the pads of the best grasp before they press, to scale." if length and data.best else ""
     where = elsewhere(data, index, len(data.shape) - 3)
+    ticks = "Ticks: stations." if len(stations) <= MOST_STATIONS else ""
     read = f" {HOW_TO_READ}" if names else ""
-    caption = f"Seen across the approach{f', at {where}' if where else ''}. Ticks: stations.{pads}{read}{how}"
+    caption = f"Seen across the approach{f', at {where}' if where else ''}. {ticks}{pads}{read}{how}"
     coloured = " in the colours of grasp quality and e_n" if names else ""
     alt = f"Side view of {data.title}{coloured}. {extremes(data, index)}"
     return Picture(pictures.as_svg(drawn), alt, caption, narrow=len(names) < 2)
