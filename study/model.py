@@ -104,7 +104,7 @@ def image_of(first: Pose, second: Pose, axis_symmetry: int) -> bool:
 
 
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
-    """Planes of symmetry that are used with this mesh: those that exist, halve it evenly and are allowed by the effects.
+    """Planes of symmetry used with this mesh: those that exist, halve it evenly and are allowed by the effects.
 
     Raises
     ------

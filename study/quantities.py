@@ -177,8 +177,8 @@ REASONS = (
 
 def cor_wrench(n: int) -> Quantity:
     """Friction wrenches of an ``n x n`` grid of centres of rotation."""
-    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction (f_x,"
-                   " f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of"
+    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction"
+                   " (f_x, f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of"
                    f" ten contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
 
 
