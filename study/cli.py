@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="softjaw",
         description="How well a two-finger gripper with soft jaws holds an object, place by place.",
-        epilog=f"exit codes:\n{codes}\n\nexample:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml -o results/bottle-rigid.hdf",
+        epilog=f"exit codes:\n{codes}\n\nexample:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     listed = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -69,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     plan = add("plan", commands.plan, "cases, units, disk, memory and time, before anything is spent",
                "softjaw plan jobs/bottle-rigid.toml -n 16")  # fmt: skip
     run = add("run", commands.run, "solve a scene into a result file; the same command again resumes",
-              "mpirun -n 8 softjaw run jobs/bottle-rigid.toml -o results/bottle-rigid.hdf -- -contact_snes_monitor")  # fmt: skip
+              "mpirun -n 8 softjaw run jobs/bottle-rigid.toml -o out.hdf -- -contact_snes_monitor")  # fmt: skip
     for made in (check, plan, run):
         made.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
         made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",

@@ -116,7 +116,8 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
     crossed_out(axes, crosses)
     dotted(axes, dots)
     shown = np.ma.masked_invalid(np.where(failed, np.nan, values))
-    return axes.pcolormesh(x, y, shown, rasterized=many, edgecolors="face", linewidth=0.4, zorder=1.1, **look)
+    seams = {"edgecolors": "none"} if many else {"edgecolors": "face", "linewidth": 0.4}
+    return axes.pcolormesh(x, y, shown, rasterized=many, zorder=1.1, **seams, **look)
 
 
 def _cells(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> np.ndarray:

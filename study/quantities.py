@@ -177,9 +177,12 @@ REASONS = (
 
 def cor_wrench(n: int) -> Quantity:
     """Friction wrenches of an ``n x n`` grid of centres of rotation."""
-    return _finger("fingers", "cor_wrench", "N, N, N m", "wrenches of a grid of centres of rotation", "Friction"
-                   " (f_x, f_y, tau_z) of the curved model in the contact frame for turns about the points of a square grid of"
-                   f" ten contact lengths side about the origin, {n} x {n} points, x first.", shape=(n * n, 3))
+    text = (
+        "Friction (f_x, f_y, tau_z) of the curved model in the contact frame, for turns about the points of a square grid"
+        f" of ten contact lengths a side about the origin: {n} x {n} points, x first."
+    )
+    name = "wrenches of a grid of centres of rotation"
+    return _finger("fingers", "cor_wrench", "N, N, N m", name, text, shape=(n * n, 3))
 
 
 def quantities(meshes: int = 1, cor_grid: int = 0) -> tuple[Quantity, ...]:
