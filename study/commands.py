@@ -103,8 +103,8 @@ def report(options: Namespace) -> int:
     from study.report import write_report
 
     page = Path(options.output or Path(options.file).with_suffix(".html"))
-    write_report(Path(options.file), page)
-    print(f"report: {page}")
+    for made in write_report(Path(options.file), page):
+        print(f"written: {made}")
     return DONE
 
 

@@ -178,8 +178,8 @@ REASONS = (
 def cor_wrench(n: int) -> Quantity:
     """Friction wrenches of an ``n x n`` grid of centres of rotation."""
     text = (
-        "Friction (f_x, f_y, tau_z) of the curved model in the contact frame, for turns about the points of a square grid"
-        f" of ten contact lengths a side about the origin: {n} x {n} points, x first."
+        "Friction (f_x, f_y, tau_z) of the curved model in the contact frame, for turns about the points of a square"
+        f" grid of ten contact lengths a side about the origin: {n} x {n} points, x first."
     )
     name = "wrenches of a grid of centres of rotation"
     return _finger("fingers", "cor_wrench", "N, N, N m", name, text, shape=(n * n, 3))

@@ -1,4 +1,4 @@
-"""One self-contained page about a result file, and a picture of its maps: for mails, slides and printing.
+"""One self-contained page about a result file, and a picture of its maps or curves: for mails, slides, printing.
 
 The page answers first: where to grasp, how sure that is, what failed. It needs no network and runs no script.
 """
@@ -30,7 +30,7 @@ Sections = list[tuple[str, str, str]]
 
 
 def write_report(file: Path, out: Path) -> list[Path]:
-    """Write the page ``out`` and, beside it, the maps as a PNG; the paths that were written.
+    """Write the page ``out`` and, beside it, the maps (or difference curves) as a PNG; the paths that were written.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def write_report(file: Path, out: Path) -> list[Path]:
 
 
 def build(result: Any) -> tuple[str, bytes]:
-    """The page and the picture of the maps of an open result file."""
+    """The page and the picture of an open result file."""
     data, scene = Data(result), read_scene(result.scene)
     mu = scene.friction.mu if scene else None
     best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
@@ -59,7 +59,8 @@ def build(result: Any) -> tuple[str, bytes]:
         ("maps", "Maps", _pictures(shapes) + paragraph(report_words.CAVEAT, "note")),
     ]
     if curves := report_curvature.difference_pictures(data, scene, best):
-        sections.append(("curvature", "What curvature costs", _pictures(curves)))
+        sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in curves)))
+        png = curves[0][1]  # what a sweep of the shape was made for
     if data.best is not None:
         sections.append(("models", "Friction models compared", _models(data, data.best, mu)))
         if patch := report_patch.patch_picture(data, data.best):

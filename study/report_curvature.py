@@ -34,8 +34,8 @@ class Line(NamedTuple):
     error: np.ndarray | None
 
 
-def difference_pictures(data: Data, scene: Any, index: tuple[int, ...]) -> list[Picture]:
-    """Curves over each abscissa of the longest sweep of the object's shape; none where no shape is swept."""
+def difference_pictures(data: Data, scene: Any, index: tuple[int, ...]) -> list[tuple[Picture, bytes]]:
+    """Curves over each abscissa of the longest sweep of the object's shape, for the page and as PNG."""
     position = _shape_axis(data, scene)
     if position is None:
         return []
@@ -122,7 +122,7 @@ def _ellipse(data: Data, scene: Any, index: tuple[int, ...]) -> tuple[float, flo
     return both if round(turns) % 2 == 0 else both[::-1]
 
 
-def _picture(data: Data, label: str, x: np.ndarray, lines: list[Line], index: tuple[int, ...]) -> Picture:
+def _picture(data: Data, label: str, x: np.ndarray, lines: list[Line], index: tuple[int, ...]) -> tuple[Picture, bytes]:
     models = [m for m in MODELS if any(line.model == m for line in lines)]
     drawn, axes = pictures.figure(10, 3.7, 1, len(models), sharey=True)
     order = np.argsort(x)
@@ -149,4 +149,5 @@ def _picture(data: Data, label: str, x: np.ndarray, lines: list[Line], index: tu
         for line in lines
         for low, high in [(np.nanmin(line.values), np.nanmax(line.values))]
     )
-    return Picture(pictures.as_svg(drawn), f"Differences of planar and curved model over {label}. {said}.", caption)
+    shown_ = Picture(pictures.as_svg(drawn), f"Differences of planar and curved model over {label}. {said}.", caption)
+    return shown_, pictures.as_png(drawn)

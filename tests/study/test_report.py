@@ -273,7 +273,7 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
     with open_result(path) as result, pictures.style():
         data, scene = Data(result), read_scene(result.scene)
-        ratio, curvature = difference_pictures(data, scene, data.best)
+        (ratio, _), (curvature, _) = difference_pictures(data, scene, data.best)
     assert "a / b" in ratio.alt
     assert "curvature at the apex" in curvature.alt
     assert "across, f_y, flat: 4 to 4 %" in ratio.alt
