@@ -21,6 +21,7 @@ from friction.frame import Frame, contact_frame, contact_length, in_frame
 from friction.motion import cor_grid
 from friction.patch import ContactPatch
 from friction.wrench import FrictionLimits, friction_limits, friction_wrench
+from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from scoring.score import ScoreFlag, score
 from study import model
 from study.build import build_object, pad_shape
@@ -39,7 +40,7 @@ FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 
 
 class Contact:
-    """One finger at one force: its patch in the pad's frame, its contact frame and its friction limits per model."""
+    """One finger at one force: patch in the pad's frame, contact frame, friction limits and limit surface per model."""
 
     def __init__(self, scene: Scene, finger: model.Finger, state: Pressed) -> None:
         self.finger, self.state, self.symmetry = finger, state, state.pad.symmetry
@@ -49,6 +50,10 @@ class Contact:
         self.local: ContactPatch = in_frame(self.patch, self.frame)
         self.limits: dict[str, FrictionLimits] = {
             name: friction_limits(self.local, scene.friction.mu, name) for name in MODELS
+        }
+        rho = contact_length(self.local)
+        self.surfaces: dict[str, Ellipsoid] = {
+            name: three_motion_ellipsoid(*found.per_unit_force, rho) for name, found in self.limits.items()
         }
 
     def placed(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
@@ -153,6 +158,8 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         "fingers/pose_rotation": np.array([c.finger.pose.rotation for c in contacts]),
         "fingers/pose_origin": np.array([c.finger.pose.origin for c in contacts]),
     }
+    for name in ("semi_axes", "rank"):
+        values[f"limit_surface/{name}"] = [[getattr(c.surfaces[m], name) for m in MODELS] for c in contacts]
     for name, key in LIMITS:
         values[f"maps/{key}"] = limits[name].min(axis=0)
         values[f"fingers/{key}"] = limits[name]
@@ -169,7 +176,7 @@ def _score(scene: Scene, obj, contacts: list[Contact], name: str, distance: floa
     contact_length = scene.score.contact_length or scene.gripper.pad_length
     if scene.score.torque_scale == "object":
         contact_length = object_length
-    one, two = (c.limits[name].per_unit_force for c in contacts)
+    one, two = (c.surfaces[name].semi_axes for c in contacts)
     return score(one, two, distance, object_length, contact_length)
 
 

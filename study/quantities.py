@@ -145,7 +145,13 @@ WORK = (
       for part in ("assembly", "factorisation", "rest", "friction", "total")),
 )
 
-LIMIT_SURFACE: tuple[Quantity, ...] = ()
+LIMIT_SURFACE = (
+    _finger("limit_surface", "semi_axes", "-, -, m", "semi-axes of the ellipsoid", "Largest f_x, f_y and tau_z over S:"
+            " the ellipsoid through the wrenches of three motions, which the score is computed from.", by_model=True,
+            shape=(3,)),
+    _finger("limit_surface", "rank", "", "semi-axes that are not zero", "3: a body; less: a disc, a segment or a point,"
+            " because the contact carries no load along an axis.", by_model=True),
+)
 
 PATCH = (
     _finger("patch", "pressure", "Pa", "contact pressure", "Pressure of each face of the pad's front."),
