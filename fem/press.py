@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.checks import Checks, check
 from fem.contact import ContactPoints, ContactProblem, Control, Gap
-from fem.errors import CheckError, ConvergenceError
+from fem.errors import ConvergenceError
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
+from fem.spring_bed import SpringBed
 
 FloatArray = NDArray[np.float64]
-BALANCE = 1e-8  # of the normal force
-PENETRATION = 1e-9  # of an element's size
 WALK_STEPS = 60  # of the sheet, for one force
 
 
@@ -37,25 +37,6 @@ class Settings:
 
     residual: float = 1e-10
     min_step: float = 1.0 / 8.0
-
-
-@dataclass(frozen=True)
-class Checks:
-    """Measures of a converged state; the first four must be small, ``min_det_f`` positive.
-
-    ``force_balance`` is relative to the force, ``tension`` to the largest pressure, ``penetration`` and
-    ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
-    ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear modulus: not positive means that the
-    foam has lost ellipticity and that strains may localise.
-    """
-
-    force_balance: float
-    tension: float
-    penetration: float
-    complementarity: float
-    min_det_f: float
-    max_strain: float
-    acoustic: float
 
 
 @dataclass(frozen=True)
@@ -125,11 +106,9 @@ class Press:
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
         self._set_up()
-        self._directions = _hemisphere(24)
-        size = min(np.ptp(self.pad.nodes[self.pad.face_nodes[0]], axis=0)[:2])
-        self._element_size = float(size)
 
     def _set_up(self) -> None:
+        self._bed = SpringBed(self.pad, self.gap)
         self.problem = ContactProblem(self.pad, self.gap)
         self.solver = NonlinearSolver(self.problem, self.options)
 
@@ -156,7 +135,7 @@ class Press:
                     x, reached = self._first(force, work)
                 x = self._climb(x, reached, force, work)
             reached = force
-            checks = self._check(x, force)
+            checks = check(self.problem, x, force, self.settings.residual)
             spent = self.solver.seconds
             seconds = Seconds(
                 spent.assembly - before.assembly,
@@ -180,7 +159,7 @@ class Press:
 
     def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
         """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""
-        start = self._guess(travel) if x is None else x
+        start = self._bed.guess(travel) if x is None else x
         x = self._solve(start, Control(travel=travel), _Work())
         return x, self.problem.sheet_force(x)
 
@@ -193,7 +172,7 @@ class Press:
     def _solve(self, x: FloatArray, control: Control, work: _Work) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
         self.problem.control = control
-        scale = control.force if control.force is not None else self._force_scale(control.travel)
+        scale = control.force if control.force is not None else self._bed.force_scale(control.travel)
         work.steps += 1
         try:
             x, iterations = self.solver.solve(x, self.settings.residual * scale * self.pad.share)
@@ -241,10 +220,10 @@ class Press:
 
     def _first(self, force: float, work: _Work) -> tuple[FloatArray, float]:
         """First state in contact, by travel control from the bed-of-springs estimate: force control has no start."""
-        travel, failure = self._spring_travel(force), "no force yet"
+        travel, failure = self._bed.travel(force), "no force yet"
         for _ in range(12):
             try:
-                x = self._solve(self._guess(travel), Control(travel=travel), work)
+                x = self._solve(self._bed.guess(travel), Control(travel=travel), work)
             except ConvergenceError as error:
                 travel, failure = 0.6 * travel, str(error)
                 continue
@@ -256,96 +235,6 @@ class Press:
             f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
             f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
         )
-
-    def _height(self) -> FloatArray:
-        """Distance along the approach from every node of the undeformed front to the object, roughly [m]."""
-        gap, normal, _ = self.gap(self.pad.nodes[self.pad.front_nodes])
-        return np.maximum(gap, 0.0) / np.maximum(-normal[:, 2], 0.2)
-
-    def _spring_force(self, travel: float) -> float:
-        bed = self.problem.kappa * np.maximum(0.0, travel - self._height())
-        return float(self.pad.node_area @ bed) / self.pad.share
-
-    def _force_scale(self, travel: float) -> float:
-        return max(self._spring_force(travel), 1e-3 * self.problem.kappa * self.pad.node_area.max() * abs(travel))
-
-    def _spring_travel(self, force: float) -> float:
-        """Travel at which a bed of springs carries the force [m]."""
-        low, high = 0.0, 1e-3 * self.pad.shape.size[2]
-        while self._spring_force(high) < force and high < 10 * self.pad.shape.size[2]:
-            high *= 2.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._spring_force(middle) < force else (low, middle)
-        return high
-
-    def _guess(self, travel: float) -> FloatArray:
-        """Pad squeezed like a bed of springs: columns shortened affinely so that no element starts inverted."""
-        pad = self.pad
-        squeeze = np.clip(travel - self._height(), 0.0, 0.6 * pad.shape.size[2])
-        column = _nearest_column(pad)
-        u = np.zeros(pad.dofs.shape)
-        u[:, 2] = travel - squeeze[column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
-        x = np.zeros(pad.size)
-        x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
-        x[pad.travel_dof] = travel
-        x[pad.travel_dof + 1 :] = squeeze
-        return x
-
-    # -- checking ------------------------------------------------------------------------------------------------------
-
-    def _check(self, x: FloatArray, force: float) -> Checks:
-        """Laws that a right answer obeys, whatever the solver said.
-
-        Raises
-        ------
-        CheckError
-            With the law that is broken, the figure and its bound.
-        """
-        pressure, gap, points = self.problem.contact_state(x)
-        det, strain, acoustic = self.problem.strains(x, self._directions)
-        size, largest = self._element_size, float(pressure.max(initial=0.0))
-        product = float(np.max(np.abs(pressure * gap), initial=0.0))
-        left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
-        checks = Checks(
-            force_balance=abs(points.force[2] / self.pad.share - force) / force,
-            tension=max(0.0, -float(pressure.min())) / max(largest, 1e-300),
-            penetration=max(0.0, -float(gap.min())) / size,
-            complementarity=product / (max(largest, 1e-300) * size),
-            min_det_f=det,
-            max_strain=strain,
-            acoustic=acoustic,
-        )
-        for broken, law in (
-            (not checks.force_balance <= BALANCE, f"force balance is off by {checks.force_balance:.1e} of the force"),
-            (not checks.tension <= 1e-8, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
-            (not checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
-            (not checks.complementarity <= 1e-8, "pressure and gap are both positive at a node"),
-            (not det > 0.0, f"an element is inverted: det F = {det:.3g}"),
-            (
-                not left_over <= max(BALANCE, self.settings.residual) * force,
-                f"a node of the foam is out of balance by {left_over:.3g} N",
-            ),
-        ):
-            if broken:
-                raise CheckError(f"the state at {force:.4g} N converged but is wrong: {law}")
-        return checks
-
-
-def _nearest_column(pad: Pad) -> NDArray[np.int64]:
-    """For every node the index, in ``front_nodes``, of the front's node above it (columns are straight)."""
-    front = pad.nodes[pad.front_nodes].reshape(*pad.front_grid, 3)
-    x, y = front[:, 0, 0], front[0, :, 1]
-    i = np.abs(pad.nodes[:, 0, None] - x).argmin(axis=1)
-    j = np.abs(pad.nodes[:, 1, None] - y).argmin(axis=1)
-    return i * len(y) + j
-
-
-def _hemisphere(n: int) -> FloatArray:
-    """Unit vectors spread evenly over a hemisphere ``(n, 3)`` (Fibonacci)."""
-    z = (np.arange(n) + 0.5) / n
-    phi = np.arange(n) * np.pi * (3.0 - np.sqrt(5.0))
-    return np.column_stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
 
 
 def _copy(seconds: Seconds) -> Seconds:

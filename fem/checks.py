@@ -1,0 +1,81 @@
+"""Laws that a converged state must obey, whatever the solver said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.contact import ContactProblem
+from fem.errors import CheckError
+
+FloatArray = NDArray[np.float64]
+BALANCE = 1e-8  # of the normal force
+PENETRATION = 1e-9  # of an element's size
+TENSION = COMPLEMENTARITY = 1e-8  # of the largest pressure, of that times an element's size
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Measures of a converged state; the first four must be small, ``min_det_f`` positive.
+
+    ``force_balance`` is relative to the force, ``tension`` to the largest pressure, ``penetration`` and
+    ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
+    ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear modulus: not positive means that the
+    foam has lost ellipticity and that strains may localise.
+    """
+
+    force_balance: float
+    tension: float
+    penetration: float
+    complementarity: float
+    min_det_f: float
+    max_strain: float
+    acoustic: float
+
+
+def check(problem: ContactProblem, x: FloatArray, force: float, residual: float) -> Checks:
+    """Measures of the state ``x`` at a normal force [N] on the whole pad that was solved to ``residual`` times it.
+
+    Raises
+    ------
+    CheckError
+        With the law that is broken, the figure and its bound.
+    """
+    pad = problem.pad
+    pressure, gap, points = problem.contact_state(x)
+    det, strain, acoustic = problem.strains(x, DIRECTIONS)
+    size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
+    largest = max(float(pressure.max(initial=0.0)), 1e-300)
+    left_over = np.abs(problem.residual(x)[: pad.travel_dof + 1]).max() / pad.share
+    checks = Checks(
+        force_balance=abs(points.force[2] / pad.share - force) / force,
+        tension=max(0.0, -float(pressure.min())) / largest,
+        penetration=max(0.0, -float(gap.min())) / size,
+        complementarity=float(np.abs(pressure * gap).max(initial=0.0)) / (largest * size),
+        min_det_f=det,
+        max_strain=strain,
+        acoustic=acoustic,
+    )
+    for kept, broken in (
+        (checks.force_balance <= BALANCE, f"force balance is off by {checks.force_balance:.1e} of the force"),
+        (checks.tension <= TENSION, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
+        (checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
+        (checks.complementarity <= COMPLEMENTARITY, "pressure and gap are both positive at a node"),
+        (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
+        (left_over <= max(BALANCE, residual) * force, f"a node of the foam is out of balance by {left_over:.3g} N"),
+    ):
+        if not kept:
+            raise CheckError(f"the state at {force:.4g} N converged but is wrong: {broken}")
+    return checks
+
+
+def _hemisphere(n: int) -> FloatArray:
+    """Unit vectors spread evenly over a hemisphere ``(n, 3)`` (Fibonacci)."""
+    z = (np.arange(n) + 0.5) / n
+    phi = np.arange(n) * np.pi * (3.0 - np.sqrt(5.0))
+    return np.column_stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
+
+
+DIRECTIONS = _hemisphere(24)  # in which the acoustic tensor is formed
