@@ -1,0 +1,316 @@
+"""The pipeline with the real solver on coarse meshes: what symmetry, definitions and limits demand of every number."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study import model, pipeline
+from study.build import build_object
+from study.quantities import MODELS
+from study.result import CaseFailure
+from study.scene import parse_scene
+from study.sweep import units
+
+CURVED, FLAT, PROJECTED = range(len(MODELS))
+MU = 0.8
+PLATE = 'shape = "plane"\nthickness_mm = 40'
+OVAL = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 25\nsemi_axis_b_mm = 20\nlength_mm = 120'
+BALL = 'shape = "sphere"\nradius_mm = 30'
+CONE = 'shape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 20], [150, 12]]'
+BOX = 'shape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4'
+
+
+@lru_cache(maxsize=64)
+def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", elements="[8, 4, 2]"):
+    """Units of a scene with the results of each."""
+    text = f"""[object]
+{shape}
+[gripper]
+elements = {elements}
+[candidates]
+stations_mm = {stations}
+angles_deg = {angles}
+[load]
+normal_force_n = {forces}
+"""
+    scene = parse_scene(text, "scene.toml", overrides)
+    made = units(scene, lambda point: build_object(point.object).axis_symmetry)
+    return [(unit, [result for _, result in pipeline.solve_unit(unit)]) for unit in made]
+
+
+def cases(*arguments, **choices):
+    """Values of every case, in order."""
+    return [result.values for _, ladder in solved(*arguments, **choices) for result in ladder]
+
+
+def differing(found, expected, tolerance, scale=None):
+    """Names of the values, timings aside, that differ by more than a share of their size."""
+    assert found.keys() == expected.keys()
+    wrong = []
+    for name, b in expected.items():
+        a, b = np.asarray(found[name], float), np.asarray(b, float)
+        size = max(np.abs(b).max(initial=0.0), (scale or {}).get(name, 0.0))
+        if not name.startswith("work/") and not np.allclose(a, b, rtol=0.0, atol=tolerance * size, equal_nan=True):
+            wrong.append(name)
+    return wrong
+
+
+# Values that are zero up to rounding, with the size that rounding is to be compared with.
+SCALES = {
+    "maps/misalignment": 1.0, "fingers/frame_origin": 0.01, "fingers/pose_origin": 0.01, "fingers/frame_axes": 1.0,
+    "maps/curvature_loss": 1.0, "checks/force_balance": 1.0, "checks/tension": 1.0, "checks/penetration": 1.0,
+    "checks/complementarity": 1.0,
+    **{f"maps/{n}_overestimate{s}": 1.0 for n in ("f_x", "f_y", "tau_z") for s in ("", "_projected")},
+}  # fmt: skip
+
+
+def test_on_a_plane_all_models_are_one_and_nothing_is_overestimated():
+    for values, force in zip(cases(PLATE), (2.0, 5.0), strict=True):
+        for name in ("quality", "epsilon", "e_n", "e_n_projected", "f_x_max", "f_y_max", "tau_z_max"):
+            assert values[f"maps/{name}"] == pytest.approx([values[f"maps/{name}"][CURVED]] * 3, rel=1e-12), name
+        for name in ("f_x", "f_y", "tau_z"):
+            assert values[f"maps/{name}_overestimate"] == pytest.approx(0.0, abs=1e-12)
+            assert values[f"maps/{name}_overestimate_projected"] == pytest.approx(0.0, abs=1e-12)
+        assert values["maps/S"] == pytest.approx(force, rel=1e-8)
+        assert values["maps/F_N"] == pytest.approx(force, rel=1e-8)
+        assert values["maps/f_x_max"][FLAT] == pytest.approx(MU * force, rel=1e-8)
+        assert values["maps/contact_distance"] == pytest.approx(0.04, rel=1e-9)
+        assert values["maps/flags"] == 0
+
+
+@pytest.mark.parametrize("angle", [0, 30, 90])
+def test_the_curved_limits_lie_between_the_planar_ones(angle):
+    for values, force in zip(cases(OVAL, angles=f"[{angle}]", elements="[8, 8, 4]"), (2.0, 5.0), strict=True):
+        S, F_N = values["fingers/S"], values["fingers/F_N"]
+        assert (S > (1 + 1e-3) * F_N).all()
+        if angle != 30:  # there the contact normal is not the approach
+            assert pytest.approx(force, rel=1e-8) == F_N
+        slack = 1 + 1e-12
+        for name in ("f_x_max", "f_y_max", "tau_z_max"):
+            limits = values[f"fingers/{name}"]
+            assert (limits[:, PROJECTED] <= limits[:, CURVED] * slack).all(), name
+            assert (limits[:, CURVED] <= limits[:, FLAT] * slack).all(), name
+        assert values["fingers/f_x_max"][:, FLAT] == pytest.approx(MU * S)
+        assert values["fingers/f_y_max"][:, PROJECTED] == pytest.approx(MU * F_N)
+        # along the cylinder nothing is lost, across it much more than around the normal
+        assert values["maps/f_y_overestimate"] > values["maps/tau_z_overestimate"] > values["maps/f_x_overestimate"]
+        assert values["maps/curvature_loss"] == pytest.approx(1 - F_N.sum() / S.sum())
+
+
+def test_both_definitions_of_e_n_say_the_same_torque():
+    for values in cases(OVAL, angles="[0, 30]") + cases(CONE, stations="[75]"):
+        tau = values["fingers/tau_z_max"]
+        S, F_N = values["fingers/S"], values["fingers/F_N"]
+        assert values["maps/e_n"] == pytest.approx((tau / (MU * S[:, None])).min(axis=0), rel=1e-12)
+        assert values["maps/e_n_projected"] == pytest.approx((tau / (MU * F_N[:, None])).min(axis=0), rel=1e-12)
+        # both fingers are alike here, so the products of the maps agree as well
+        assert values["maps/e_n"] * values["maps/S"] == pytest.approx(
+            values["maps/e_n_projected"] * values["maps/F_N"], rel=1e-9
+        )
+
+
+@pytest.mark.parametrize(("shape", "overrides"), [
+    (OVAL, ("candidates.roll_deg=30",)), (BALL, ("candidates.roll_deg=70",)), (BOX, ()), (OVAL, ()),
+])  # fmt: skip
+def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overrides):
+    monkeypatch.setattr(model, "image_of", lambda *_: False)  # solve them one after the other
+    solved.cache_clear()
+    for values in cases(shape, *overrides):
+        for name, both in values.items():
+            # frames are mirrored, and the directions in which the acoustic tensor is sampled are not
+            if name.startswith(("fingers/", "checks/")) and not any(w in name for w in ("frame", "pose", "acoustic")):
+                one, two = np.asarray(both, float)
+                assert two == pytest.approx(one, rel=1e-8, abs=1e-9), name
+        assert values["maps/misalignment"] == pytest.approx(0.0, abs=1e-7)
+    solved.cache_clear()
+
+
+@pytest.mark.parametrize("shape", [OVAL, CONE])
+def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, shape):
+    place = dict(stations="[75]" if shape == CONE else "[0]", angles="[20]")
+    shared = cases(shape, **place)
+    monkeypatch.setattr(model, "image_of", lambda *_: False)
+    solved.cache_clear()
+    separate = cases(shape, **place)
+    solved.cache_clear()
+    for found, expected in zip(shared, separate, strict=True):
+        assert differing(found, expected, 1e-8, SCALES) == []
+
+
+@pytest.mark.parametrize(("shape", "station", "angles"), [
+    (CONE, 75, (0, 37)), (OVAL, 0, (25, 205)), (BALL, 4, (0, 90)),
+])  # fmt: skip
+def test_images_under_the_objects_symmetry_are_what_solving_them_gives(shape, station, angles):
+    stations = f"[{station}]"
+    [(unit, ladder)] = solved(shape, stations=stations, angles=str(list(angles)))
+    assert len(unit.served) == 2
+    [(_, own)] = solved(shape, stations=stations, angles=f"[{angles[1]}]")
+    for result, expected in zip(ladder, own, strict=True):
+        turned = pipeline.image(result, unit, 1)
+        assert differing(turned.values, expected.values, 1e-9, SCALES) == []
+        assert [e[0] for e in turned.effects.values()] == [e[0] for e in expected.effects.values()]
+        assert turned.message == expected.message
+        for name, faces in expected.patch.items():
+            assert turned.patch[name] == pytest.approx(faces, abs=1e-9 * np.abs(faces).max()), name
+        assert pipeline.image(result, unit, 0) is result
+
+
+def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
+    shapes = {size: cases(OVAL, f'effects.model_size="{size}"') for size in ("full", "half", "quarter", "auto")}
+    for size in ("half", "quarter", "auto"):
+        for found, expected in zip(shapes[size], shapes["full"], strict=True):
+            names = [name for name in expected if name.startswith(("maps/", "fingers/"))]
+            pick = [{name: values[name] for name in names} for values in (found, expected)]
+            assert differing(*pick, 1e-8, SCALES) == []
+    [(_, ladder)] = solved(OVAL)
+    assert [ladder[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
+        "quarter",
+        "half",
+    ]
+
+
+def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
+    text = f"[object]\n{BOX}\n[gripper]\nelements = [8, 4, 2]\n[load]\nnormal_force_n = [2, 5]\n"
+    pose = "[[candidates.poses]]\npoint_mm = [7, 0, 10]\napproach = [-2, 0, 0]\nlong_side = [1, 0, 3]\n"
+    [unit] = units(parse_scene(text + pose, "poses.toml"), lambda _: 2)
+    for (_, result), expected in zip(pipeline.solve_unit(unit), cases(BOX, stations="[10]"), strict=True):
+        assert differing(result.values, expected, 1e-9, SCALES) == []
+
+
+@pytest.mark.parametrize(("overrides", "rho", "length"), [
+    ((), 0.05, 0.12),
+    (('score.torque_scale="object"',), 0.12, 0.12),
+    (("score.contact_length_mm=20", "score.object_length_mm=80"), 0.02, 0.08),
+])  # fmt: skip
+def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, length):
+    """7/12 d^2 (V1 A2 + A1 V2): contacts with semi-axes f_x, f_y, tau_z / rho per unit force, arms over a length."""
+    for values in cases(OVAL, *overrides, angles="[30]"):
+        S = values["fingers/S"][:, None]
+        f_x, f_y, tau = (values[f"fingers/{name}_max"] / S for name in ("f_x", "f_y", "tau_z"))
+        V, A = 4 / 3 * np.pi * f_x * f_y * tau / rho, np.pi * f_x * f_y
+        rotation, at = values["fingers/pose_rotation"], values["fingers/pose_origin"]
+        origin = np.einsum("fij,fj->fi", rotation, values["fingers/frame_origin"]) + at
+        d = np.linalg.norm(origin[1] - origin[0])
+        assert values["maps/contact_distance"] == pytest.approx(d, rel=1e-12)
+        expected = 7 / 12 * (d / length) ** 2 * (V[0] * A[1] + A[0] * V[1])
+        assert values["maps/quality"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_friction_nothing_is_held_and_a_flag_says_so():
+    [(_, ladder)] = solved(OVAL, "friction.mu=0")
+    for result, held in zip(ladder, cases(OVAL), strict=True):
+        values = result.values
+        for name in ("quality", "epsilon", "f_x_max", "f_y_max", "tau_z_max"):
+            assert (np.asarray(values[f"maps/{name}"]) == 0.0).all()
+        assert values["maps/flags"] == 1 | 2
+        assert "carries no torque" in result.message
+        assert values["maps/e_n"] == pytest.approx(held["maps/e_n"], rel=1e-12)  # a length, whatever mu is
+        assert values["maps/S"] == held["maps/S"]
+
+
+@pytest.mark.parametrize("n", [5, 40])
+def test_the_paper_grid_of_centres_of_rotation_stays_below_the_exact_limits_and_nears_them(n):
+    for values in cases(OVAL, f"friction.cor_grid={n}", angles="[30]"):
+        wrench = np.asarray(values["fingers/cor_wrench"])
+        assert wrench.shape == (2, n * n, 3)
+        limits = np.stack([values[f"fingers/{q}_max"][:, CURVED] for q in ("f_x", "f_y", "tau_z")], axis=1)
+        largest = np.abs(wrench).max(axis=1)
+        assert (largest <= limits * (1 + 1e-12)).all()
+        if n % 2:  # the contact itself is one of the centres
+            assert largest[:, 2] == pytest.approx(limits[:, 2], rel=1e-12)
+        # five contact lengths away a turn is a slide but for 1 %
+        assert (largest[:, :2] >= 0.99 * limits[:, :2]).all()
+
+
+def test_error_maps_are_the_differences_to_the_coarser_mesh_and_shrink_with_refinement():
+    errors = []
+    for elements, half in (("[8, 8, 4]", "[4, 4, 2]"), ("[24, 24, 12]", "[12, 12, 6]")):
+        [values] = cases(OVAL, "accuracy.meshes=2", elements=elements, forces="[5]")
+        [coarse] = cases(OVAL, elements=half, forces="[5]")
+        for name in ("e_n", "f_x_max", "f_y_max", "tau_z_max"):
+            fine, rough = values[f"maps/{name}"][CURVED], coarse[f"maps/{name}"][CURVED]
+            assert values[f"maps/{name}_error"] == pytest.approx(abs(rough / fine - 1), rel=1e-6, abs=1e-10), name
+        for name in ("f_y_overestimate", "tau_z_overestimate_projected"):
+            gone = abs(values[f"maps/{name}"] - coarse[f"maps/{name}"])
+            assert values[f"maps/{name}_error"] == pytest.approx(gone, rel=1e-6, abs=1e-10), name
+        errors.append([values[f"maps/{name}_error"] for name in ("e_n", "tau_z_max", "f_y_overestimate")])
+    # the rim of the contact moves by whole faces, so the errors of a third mesh may fall between by chance
+    assert (np.array(errors[1]) < 0.6 * np.array(errors[0])).all(), errors
+
+
+@pytest.mark.parametrize(("shape", "station"), [(OVAL, 0), (BALL, 0), (PLATE, 0), (CONE, 75)])
+def test_the_pad_stands_at_first_touch_and_lies_on_the_object_under_load(shape, station):
+    """The contact's laws with weighted gaps: pressures do no work against them, so the sum of load times gap is 0."""
+    [(unit, ladder)] = solved(shape, stations=f"[{station}]")
+    obj = build_object(unit.scene.object)
+    x, y = np.meshgrid(np.linspace(-0.025, 0.025, 501), np.linspace(-0.011, 0.011, 23))
+    front = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    for result in ladder:
+        values, patch = result.values, result.patch
+        for f in range(2):
+            rotation, origin = values["fingers/pose_rotation"][f], values["fingers/pose_origin"][f]
+            gap = obj.gap(front @ rotation.T + origin)[0]
+            assert gap.min() == pytest.approx(0.0, abs=1e-9)
+            load = patch["pressure"][f] * patch["area"][f]
+            gap, normal, _ = obj.gap(patch["centroid"][f] @ rotation.T + origin)
+            travel = np.asarray(values["fingers/travel"])[f]
+            assert abs(load @ gap) < 1e-8 * load.sum() * travel
+            assert (load * gap**2).sum() < (0.5 * travel) ** 2 * load.sum()
+            loaded = load > 0
+            # the patch's normals point into the object
+            inward = -normal @ rotation
+            assert patch["normal"][f][loaded] == pytest.approx(inward[loaded], abs=1e-9)
+            assert values["fingers/S"][f] == pytest.approx(load.sum(), rel=1e-12)
+            along = (load * patch["normal"][f][:, 2]).sum()
+            assert along == pytest.approx(unit.scene.load.normal_force[ladder.index(result)], rel=1e-8)
+
+
+@pytest.mark.parametrize("radius", [5, 30])
+def test_a_ladder_that_ends_names_the_last_good_force_and_what_was_not_tried(radius):
+    [(_, ladder)] = solved(f'shape = "sphere"\nradius_mm = {radius}', forces="[2, 20, 30]")
+    if radius == 30:
+        assert not any(isinstance(result, CaseFailure) for result in ladder)
+        return
+    good, ended, above = ladder
+    assert good.values["maps/e_n"][CURVED] > 0
+    assert isinstance(ended, CaseFailure)
+    assert ended.message.startswith("ConvergenceError: the force stays below 20 N: reached ")
+    assert ended.message.endswith("; the last good force is 2 N")
+    assert above.message.startswith("not tried, because the ladder of forces ended at 20 N: ")
+
+
+def test_a_ladder_without_a_first_rung_says_so():
+    first, second = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
+    assert first.message.startswith("ConvergenceError: ")
+    assert first.message.endswith("; no force below it was tried")
+    assert second.message.startswith("not tried, because the ladder of forces ended at 2 N")
+
+
+def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
+    cut = cases(OVAL, "petsc.contact_snes_max_it=3")
+    for found, expected in zip(cut, cases(OVAL), strict=True):
+        assert differing(found, expected, 1e-7, SCALES) == []
+    assert sum(sum(values["work/cuts"]) for values in cut) > 0
+
+
+def test_a_symmetry_that_is_forced_but_not_there_is_refused():
+    with pytest.raises(ValueError, match=r"'quarter' needs 2 plane\(s\) of symmetry.*have 1 here; use 'auto'"):
+        solved(CONE, 'effects.model_size="quarter"', stations="[75]")
+
+
+@pytest.mark.long
+def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged():
+    """At the foot of the shipped bottle's neck the rim of the pad bears on a slope; 10 N is where that begins."""
+    path = Path(__file__).parents[2] / "jobs" / "bottle-rigid.toml"
+    place = ["candidates.stations_mm=[161.76470588235293]", "load.normal_force_n=[7, 10, 13]"]
+    scene = parse_scene(path.read_text(), path, place)
+    [unit] = units(scene, lambda point: point.object.axis_symmetry)
+    ladder = [result for _, result in pipeline.solve_unit(unit)]
+    assert [bool(result.values["maps/flags"] & 512) for result in ladder] == [False, True, True]
+    assert "nodal gaps were taken" not in ladder[0].message
+    for result in ladder[1:]:
+        assert "weighted gaps had no solution, nodal gaps were taken" in result.message

@@ -1,0 +1,139 @@
+"""Real runs under mpirun: not a bit of the results depends on the number of ranks, on stops, or on kills."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from study.environment import launch_environment
+from study.layout import DONE
+from study.store import open_result
+from tests.study.launching import ROOT, contents, differing, launch, wait_for
+
+pytestmark = pytest.mark.launches
+
+# Two stations x three angles: 205 degrees is the image of 25, so there are four ladders of two forces.
+SCENE = """
+[object]
+shape = "box"
+size_mm = [50, 40, 120]
+edge_radius_mm = 8
+
+[gripper]
+elements = [8, 4, 2]
+
+[friction]
+cor_grid = 3
+
+[candidates]
+stations_mm = [0, 30]
+angles_deg = [0, 5, 185]
+
+[load]
+normal_force_n = [1, 3]
+
+[accuracy]
+meshes = 2
+"""
+CASES = 12
+# The same program with a pause before every case, so that there is time to interrupt it.
+SLOWLY = """
+import os, sys, time
+os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
+from study import pipeline
+solve = pipeline.solve_unit
+
+def slow(unit):
+    for case in solve(unit):
+        time.sleep(0.25)
+        yield case
+
+pipeline.solve_unit = slow
+from study.cli import main
+sys.exit(main())
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory, comm):
+    path = None
+    if comm.rank == 0:
+        path = tmp_path_factory.mktemp("scene") / "box.toml"
+        path.write_text(SCENE)
+    return comm.bcast(path)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory, scene, comm):
+    """What one process writes without mpirun."""
+    path = None
+    if comm.rank == 0:
+        path = tmp_path_factory.mktemp("alone") / "alone.hdf"
+        code, output, errors = run(0, scene, path)
+        assert (code, errors) == (0, ""), output
+    return comm.bcast(path)
+
+
+def run(ranks, scene, path, *words):
+    return launch(ranks, "-m", "study", "run", scene, "-o", path, *words)
+
+
+def done(path):
+    with open_result(path) as result:
+        return int((result.status == DONE).sum())
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alone, ranks):
+    path = shared_path / "ranks.hdf"
+    code, output, errors = once(run, ranks, scene, path)
+    assert code == 0, errors
+    assert f"{CASES} of {CASES} cases to solve on {ranks} rank" in output
+    expected = once(contents, alone)
+    # all that is compared: maps of every model, both fingers, the checks and every face
+    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure", "status/crc"):
+        assert f"study/{name}" in expected
+    assert once(differing, path, expected) == []
+
+
+@pytest.mark.parametrize(("how", "ranks"), [("SIGUSR1", 2), ("SIGKILL", 3)])
+def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(
+    once, shared_path, scene, alone, how, ranks
+):
+    path = shared_path / f"{how}.hdf"
+
+    def interrupt():
+        process = subprocess.Popen(
+            [sys.executable, "-c", SLOWLY, "run", str(scene), "-o", str(path)], env=launch_environment(), cwd=ROOT,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+        wait_for(lambda: path.exists() and done(path) >= 2)
+        process.send_signal(getattr(signal, how))
+        process.communicate(timeout=60)
+        return process.returncode, done(path)
+
+    code, before = once(interrupt)
+    assert code == (75 if how == "SIGUSR1" else -signal.SIGKILL)
+    assert 2 <= before < CASES
+    code, output, errors = once(run, ranks, scene, path)
+    assert code == 0, errors
+    assert f"resumed, {CASES - before} of {CASES} cases to solve on {ranks} ranks" in output
+    assert once(differing, path, once(contents, alone)) == []
+
+
+def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path, scene, alone):
+    """Bounds on the pressures instead of the active set: another algorithm, the same answer."""
+    path = shared_path / "bounds.hdf"
+    code, _, errors = once(run, 2, scene, path, "--", "-contact_snes_type", "vinewtonrsls")
+    assert code == 0, errors
+    with open_result(path) as found, open_result(alone) as expected:
+        assert 'contact_snes_type = "vinewtonrsls"' in found.scene
+        for name in ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max"):
+            for model in ("curved", "flat", "projected"):
+                assert found.map(name, model) == pytest.approx(expected.map(name, model), rel=1e-8), name
+        pressure = expected.read("patch/pressure")
+        assert found.read("patch/pressure") == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())
