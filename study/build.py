@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from fem.pad_shape import PadShape
     from fem.shape import GapObject
     from study.scene import Scene
-    from study.scene_sections import Gripper
-    from study.scene_shapes import Shape
+    from study.scene.sections import Gripper
+    from study.scene.shapes import Shape
 
 
 @lru_cache(maxsize=8)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem.pose import Pose
 from study.scene import Scene
-from study.scene_sections import GraspPose
+from study.scene.sections import GraspPose
 
 FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch

@@ -30,7 +30,7 @@ def complain(error: StudyError) -> int:
 
 def _scene(options: Namespace) -> Any:
     from study.scene import load_scene
-    from study.scene_errors import SceneError
+    from study.scene.errors import SceneError
 
     try:
         return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])

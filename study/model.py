@@ -15,7 +15,7 @@ from fem.shape import GapFunction, GapObject
 from fem.touch import first_touch
 from study.build import pad_material, pad_shape
 from study.scene import Scene
-from study.scene_sections import Gripper
+from study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from study.candidates import Candidate, candidates, groups
 from study.scene import Option, Scene
-from study.scene_units import UNITS, in_si, split_unit
+from study.scene.units import UNITS, in_si, split_unit
 
 FloatArray = NDArray[np.float64]
 

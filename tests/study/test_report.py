@@ -19,12 +19,12 @@ from study.layout import Derived, Header, Layout
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
 from study.report import build, write_report
-from study.report_curvature import difference_pictures
-from study.report_data import Data, number
-from study.report_outline import read_scene, shape_outline, slice_polygon
-from study.report_patch import cells
+from study.report.curvature import difference_pictures
+from study.report.data import Data, number
+from study.report.outline import read_scene, shape_outline, slice_polygon
+from study.report.patch import cells
 from study.result import CaseResult
-from study.scene_shapes import EllipticCylinder, Sphere
+from study.scene.shapes import EllipticCylinder, Sphere
 from study.show import best
 from study.store import create, open_result
 

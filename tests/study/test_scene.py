@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from study.scene import Scene, SceneError, load_scene, parse_scene
-from study.scene_shapes import SHAPES
+from study.scene.shapes import SHAPES
 
 ROOT = Path(__file__).parents[2]
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from study.scene_errors import Finding, shown
-from study.scene_sections import Accuracy, Effects, Friction, Gripper, Load
+from study.scene.errors import Finding, shown
+from study.scene.sections import Accuracy, Effects, Friction, Gripper, Load
 
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from study.scene_units import UNITS, si
+from study.scene.units import UNITS, si
 
 Span = tuple[float, float]
 Length = Annotated[float, Field(gt=0)]

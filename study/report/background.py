@@ -9,8 +9,8 @@ import numpy as np
 from study.layout import DONE
 from study.progress import duration
 from study.quantities import EFFECTS, REASONS
-from study.report_data import Data, number
-from study.report_page import bullets, paragraph, table, text_block
+from study.report.data import Data, number
+from study.report.page import bullets, paragraph, table, text_block
 from study.status import PARTS
 
 

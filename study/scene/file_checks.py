@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from study.scene_errors import Finding, shown
-from study.scene_sections import Output
-from study.scene_shapes import Mesh
+from study.scene.errors import Finding, shown
+from study.scene.sections import Output
+from study.scene.shapes import Mesh
 
 
 def output_file(output: Output) -> Iterator[Finding]:

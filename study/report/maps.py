@@ -10,8 +10,8 @@ import numpy as np
 
 from study import pictures
 from study.layout import FAILED
-from study.report_data import Data, number, shown
-from study.report_page import Picture
+from study.report.data import Data, number, shown
+from study.report.page import Picture
 
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
 SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]"}

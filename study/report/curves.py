@@ -8,8 +8,8 @@ import numpy as np
 
 from study import pictures
 from study.quantities import MODELS
-from study.report_data import Data, shown
-from study.report_page import Picture
+from study.report.data import Data, shown
+from study.report.page import Picture
 
 # map, text of the panel, unit, factor from SI; "F" divides by the normal force
 PANELS = (

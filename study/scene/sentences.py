@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from study.scene_errors import Finding, KeyPath, closest, key_text, shown
-from study.scene_units import UNITS, split_unit
+from study.scene.errors import Finding, KeyPath, closest, key_text, shown
+from study.scene.units import UNITS, split_unit
 
 LATER_KEYS = {
     "object": ("wall_mm", "material", "young_modulus_mpa", "poisson_ratio", "support"),

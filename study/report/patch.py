@@ -9,8 +9,8 @@ from scipy.spatial import QhullError, Voronoi
 
 from study import pictures
 from study.layout import DONE
-from study.report_data import Data, number
-from study.report_page import Picture
+from study.report.data import Data, number
+from study.report.page import Picture
 
 ALIKE = 1e-3  # difference of the fingers' pressures over the largest one that is not drawn twice
 LOADED = 1e-9  # share of the largest pressure below which a face counts as free

@@ -9,11 +9,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from study import scene_checks
-from study.scene_errors import Finding, KeyPath, Problem, closest, shown
-from study.scene_sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
-from study.scene_sentences import model_findings
-from study.scene_shapes import SHAPES, Section
+from study.scene import checks as scene_checks
+from study.scene.errors import Finding, KeyPath, Problem, closest, shown
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
+from study.scene.sentences import model_findings
+from study.scene.shapes import SHAPES, Section
 
 SECTIONS: dict[str, type[Section]] = {
     "gripper": Gripper,

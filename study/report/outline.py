@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from study.report_data import Data
+from study.report.data import Data
 
 Outline = tuple[np.ndarray, np.ndarray, bool]
 
@@ -15,7 +15,7 @@ Outline = tuple[np.ndarray, np.ndarray, bool]
 def read_scene(text: str) -> Any:
     """The scene kept in a result file; None if this version cannot read it."""
     from study.scene import parse_scene
-    from study.scene_errors import SceneError
+    from study.scene.errors import SceneError
 
     try:
         return parse_scene(text, check_files=False)
@@ -32,7 +32,7 @@ def outline(data: Data, scene: Any, index: tuple[int, ...]) -> Outline | None:
 
 def swept_object(scene: Any, index: tuple[int, ...]) -> Any:
     """The object at this point of the sweep; None if it cannot be told."""
-    from study.scene_errors import SceneError
+    from study.scene.errors import SceneError
 
     try:
         if any(any(isinstance(v, str) for v in values) for values in scene.sweep.values()):

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from study.scene_errors import Finding, shown
-from study.scene_file_checks import output_file, petsc_options
-from study.scene_gripper_checks import pad_material, pad_mesh
-from study.scene_sections import Candidates, Load
-from study.scene_shapes import Box, Plate, Revolution, Shape
+from study.scene.errors import Finding, shown
+from study.scene.file_checks import output_file, petsc_options
+from study.scene.gripper_checks import pad_material, pad_mesh
+from study.scene.sections import Candidates, Load
+from study.scene.shapes import Box, Plate, Revolution, Shape
 
 SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from study import pictures
 from study.layout import FAILED
-from study.report_data import Data
-from study.report_maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
-from study.report_outline import outline, pad_extent, slice_polygon
-from study.report_page import Picture
+from study.report.data import Data
+from study.report.maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
+from study.report.outline import outline, pad_extent, slice_polygon
+from study.report.page import Picture
 
 MOST_STATIONS = 80  # more ticks than that would be a bar
 

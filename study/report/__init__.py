@@ -10,20 +10,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from study import (
-    pictures,
-    report_background,
-    report_curvature,
-    report_curves,
-    report_maps,
-    report_patch,
-    report_side,
-    report_words,
-)
+from study import pictures
 from study.exits import CANNOT_WRITE, StudyError
-from study.report_data import Data
-from study.report_outline import read_scene
-from study.report_page import Picture, heading, page, paragraph, picture
+from study.report import background, curvature, curves, words
+from study.report import maps as report_maps
+from study.report import patch as report_patch
+from study.report import side as report_side
+from study.report.data import Data
+from study.report.outline import read_scene
+from study.report.page import Picture, heading, page, paragraph, picture
 from study.store import open_result
 
 Sections = list[tuple[str, str, str]]
@@ -55,25 +50,25 @@ def build(result: Any) -> tuple[str, bytes]:
     several = maps if data.status.size > 1 else None
     shapes = [report_side.side_view(data, scene, best), several, report_maps.angle_maps(data, best)]
     sections: Sections = [
-        ("verdict", "", report_words.verdict(data, mu) + report_words.best_tables(data)),
-        ("maps", "Maps", _pictures(shapes) + paragraph(report_words.CAVEAT, "note")),
+        ("verdict", "", words.verdict(data, mu) + words.best_tables(data)),
+        ("maps", "Maps", _pictures(shapes) + paragraph(words.CAVEAT, "note")),
     ]
-    if curves := report_curvature.difference_pictures(data, scene, best):
-        sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in curves)))
-        png = curves[0][1]  # what a sweep of the shape was made for
+    if differences := curvature.difference_pictures(data, scene, best):
+        sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in differences)))
+        png = differences[0][1]  # what a sweep of the shape was made for
     if data.best is not None:
         sections.append(("models", "Friction models compared", _models(data, data.best, mu)))
         if patch := report_patch.patch_picture(data, data.best):
             sections.append(("patch", "Contact patch of the best case", _pictures([patch])))
     sections += [
-        ("cases", "Cases and checks", report_words.cases(data) + report_words.checks(data)),
-        ("effects", "What was simulated", report_background.effects(data)),
-        ("definitions", "Definitions", report_background.definitions(data)),
-        ("provenance", "Provenance and time", report_background.provenance(data) + report_background.time_split(data)),
-        ("scene", "Scene in effect", report_background.scene_text(data)),
+        ("cases", "Cases and checks", words.cases(data) + words.checks(data)),
+        ("effects", "What was simulated", background.effects(data)),
+        ("definitions", "Definitions", background.definitions(data)),
+        ("provenance", "Provenance and time", background.provenance(data) + background.time_split(data)),
+        ("scene", "Scene in effect", background.scene_text(data)),
     ]
     title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
-    return page(title, report_words.subtitle(data), sections), png
+    return page(title, words.subtitle(data), sections), png
 
 
 def _pictures(shown: Iterable[Picture | None]) -> str:
@@ -85,14 +80,14 @@ def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:
     force, html = len(best) - 1, ""
     other, why = data.other
     roles = [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]
-    common = report_curves.limits(data, force, *(index for index, _ in roles))
+    common = curves.limits(data, force, *(index for index, _ in roles))
     for index, role in roles:
         html += heading(f"{role}, over the force: {data.place(index)}")
-        html += picture(report_curves.model_curves(data, force, index, mu, common))
+        html += picture(curves.model_curves(data, force, index, mu, common))
     for position in _worth_a_curve(data):
-        own = report_curves.limits(data, position, best)
+        own = curves.limits(data, position, best)
         html += heading(f"Over the {data.name(data.axes[position])}, all else as in the best case")
-        html += picture(report_curves.model_curves(data, position, best, mu, own))
+        html += picture(curves.model_curves(data, position, best, mu, own))
     return html
 
 

@@ -13,15 +13,15 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from study import scene_checks
-from study.scene_errors import Finding, KeyPath, Problem, SceneError, key_text
-from study.scene_file_checks import mesh_file
-from study.scene_gripper_checks import warnings
-from study.scene_loading import checked_sections, flat, known_keys, with_overrides
-from study.scene_sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
-from study.scene_shapes import Mesh, Object, Section
-from study.scene_sweep import NOT_SWEPT, put, sweep_findings
-from study.scene_text import key_lines, parse_toml, read_text, toml_text
+from study.scene import checks as scene_checks
+from study.scene.errors import Finding, KeyPath, Problem, SceneError, key_text
+from study.scene.file_checks import mesh_file
+from study.scene.gripper_checks import warnings
+from study.scene.loading import checked_sections, flat, known_keys, with_overrides
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
+from study.scene.shapes import Mesh, Object, Section
+from study.scene.sweeps import NOT_SWEPT, put, sweep_findings
+from study.scene.text import key_lines, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
 WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print

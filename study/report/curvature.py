@@ -11,9 +11,9 @@ import numpy as np
 from study import pictures
 from study.layout import DONE
 from study.quantities import MODELS
-from study.report_data import Data, number, shown
-from study.report_outline import swept_object
-from study.report_page import Picture
+from study.report.data import Data, number, shown
+from study.report.outline import swept_object
+from study.report.page import Picture
 
 LINES = (
     {"color": "#12436d", "linestyle": "-", "marker": "o"},

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from study.layout import DONE, FAILED, MISSING
-from study.report_data import ABOVE, LIMITS, Data, number, passes, shown
-from study.report_page import box, paragraph, table
+from study.report.data import ABOVE, LIMITS, Data, number, passes, shown
+from study.report.page import box, paragraph, table
 from study.show import FLAGS
 
 BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4

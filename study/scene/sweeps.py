@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from study.scene_errors import Finding, closest, key_text, shown
-from study.scene_loading import SECTIONS, checked_sections, keys_by_place
-from study.scene_sentences import unknown_key
-from study.scene_shapes import SHAPES, Section
+from study.scene.errors import Finding, closest, key_text, shown
+from study.scene.loading import SECTIONS, checked_sections, keys_by_place
+from study.scene.sentences import unknown_key
+from study.scene.shapes import SHAPES, Section
 
 NOT_SWEPT = {
     "object.shape": "write one scene per shape",
