@@ -7,7 +7,9 @@ linear system is factorised by MUMPS; its symbolic analysis is done once and kep
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -46,6 +48,9 @@ from petsc4py import PETSc  # noqa: E402  (after init, as petsc4py requires)
 
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
+
+
+PRINTING = re.compile("monitor|view|converged_reason")
 
 
 class Problem(Protocol):
@@ -167,7 +172,7 @@ class NonlinearSolver:
         mine = {self.prefix + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
         for key, value in mine.items():
-            database.setValue(key, value)
+            database.setValue(key, None if value is True else value)  # a flag such as snes_monitor takes no value
         try:
             yield
         finally:
@@ -231,3 +236,46 @@ class NonlinearSolver:
         if factor < 1.0:
             y.scale(factor)
         return factor < 1.0
+
+
+class _OneUnknown:
+    """The equation ``x = 1``: enough for PETSc to read every option of a solve."""
+
+    size, rows, columns, complementarity = 1, np.zeros(1, np.int32), np.zeros(1, np.int32), False
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """See `Problem`."""
+        return x - 1.0
+
+    def tangent(self, x: FloatArray) -> FloatArray:
+        """See `Problem`."""
+        return np.ones(1)
+
+    def shorten(self, x: FloatArray, step: FloatArray) -> float:
+        """See `Problem`."""
+        return 1.0
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """See `Problem`."""
+        return np.full(1, -np.inf), np.full(1, np.inf)
+
+
+def unknown_options(options: dict[str, Any]) -> list[str]:
+    """Names among ``options`` that no solver asks PETSc for, misspelt ones for example; printing ones are not judged.
+
+    petsc4py has no binding for ``PetscOptionsUsed``, so it is called in the library that petsc4py has loaded.
+    """
+    asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
+    judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
+    solver = NonlinearSolver(_OneUnknown(), judged)
+    found = []
+    with solver._options_in_effect():
+        solver._snes.setFromOptions()
+        solver._snes.solve(None, solver._x)  # MUMPS reads its options here
+        for name in judged:
+            used = ctypes.c_int(0)
+            asked(None, name.encode(), ctypes.byref(used))
+            if not used.value:
+                found.append(name)
+    solver.destroy()
+    return found

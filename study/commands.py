@@ -144,6 +144,7 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
+    from fem.petsc import unknown_options
     from study import curvature, pipeline
     from study.plan import make_plan
     from study.run import Work, on_rank0, run_study
@@ -151,6 +152,9 @@ def _run_on(comm: Any, options: Namespace) -> int:
 
     def prepare() -> tuple[Any, Any]:
         scene = _scene(options)
+        if strange := unknown_options(dict(scene.petsc)):
+            text = f"petsc: no solver asks for the option{'s' * (len(strange) > 1)} {', '.join(strange)}"
+            raise StudyError(USAGE, f"{text}; correct the spelling, or remove what does not apply to this solver")
         overrides = [*options.overrides, *petsc_overrides(options.petsc)]
         return scene, make_plan(scene, options.scene, overrides)
 

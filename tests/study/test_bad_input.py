@@ -154,7 +154,6 @@ def test_options_of_another_solver_are_refused(once, folder):
     refused(once(run, 0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
 
 
-@pytest.mark.xfail(reason="PETSc does not tell options that nobody asked for; they are ignored", strict=True)
 def test_a_misspelt_option_of_the_solver_is_refused(once, folder):
     refused(once(run, 0, folder, "--", "-contact_snes_typ", "vinewtonrsls"), folder, 2, "contact_snes_typ")
 
