@@ -130,7 +130,10 @@ def run(options: Namespace) -> int:
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     from mpi4py import MPI
 
+    from study.progress import Unbreakable
+
     comm = MPI.COMM_WORLD
+    sys.stdout = Unbreakable(sys.stdout)
     try:
         return _run_on(comm, options)
     except StudyError as error:

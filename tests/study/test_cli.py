@@ -16,6 +16,7 @@ import pytest
 import study
 from study.cli import main
 from study.commands import RANK, petsc_overrides
+from study.environment import launch_environment
 from study.exits import MEANING, StudyError
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
@@ -220,3 +221,17 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
     assert main(["rum"]) == 2
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.launches
+def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
+    def piped():
+        run = f"{sys.executable} -m study run {ROOT}/jobs/smoke.toml -o smoke.hdf"
+        done = subprocess.run(
+            ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=shared_path,
+            env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
+            check=False,
+        )  # fmt: skip
+        return done.returncode, done.stderr
+
+    assert once(piped) == (0, "")
