@@ -121,8 +121,8 @@ FINGER = (
     _finger("fingers", "frame_flag", "", "flag of the contact frame", "0: regular; otherwise a rule for a degenerate"
             " patch chose the frame."),
     _finger("fingers", "pose_rotation", "", "rotation of the pad", "x_object = rotation x_pad + origin.", shape=(3, 3)),
-    _finger("fingers", "pose_origin", "m", "origin of the pad", "Centre of the undeformed front face after the press,"
-            " in the object's frame.", shape=(3,)),
+    _finger("fingers", "pose_origin", "m", "origin of the pad", "Centre of the undeformed front face at first touch, in"
+            " the object's frame; under load the pad's back has moved on by the travel, along its z axis.", shape=(3,)),
 )
 
 CHECKS = (
