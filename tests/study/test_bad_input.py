@@ -183,6 +183,7 @@ def test_all_ranks_leave_with_the_same_code(once, folder):
     assert (folder / "out.hdf").read_text() == "my notes"
 
 
+@pytest.mark.long
 def test_files_of_others_are_left_alone(once, folder):
     """In use, or of another scene; test_run has the details, and places that cannot be written."""
     path = folder / "out.hdf"

@@ -49,7 +49,7 @@ solve = pipeline.solve_unit
 
 def slow(unit):
     for case in solve(unit):
-        time.sleep(0.25)
+        time.sleep(0.12)
         yield case
 
 pipeline.solve_unit = slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,14 +30,19 @@ def begun(path):
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory, comm):
-    """What one rank writes without being disturbed."""
-    found = None
+def whole(tmp_path_factory, comm):
+    """A file that one rank wrote without being disturbed; tests that spoil it work on a copy."""
+    path = None
     if comm.rank == 0:
         path = tmp_path_factory.mktemp("whole") / "whole.hdf"
         assert study(0, path)[0] == 0
-        found = contents(path)
-    return comm.bcast(found)
+    return comm.bcast(path)
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(whole):
+    """What is in that file."""
+    return contents(whole)
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
@@ -158,24 +164,23 @@ def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, sha
         assert result.read("status/attempts").ravel()[14] == 0
 
 
-def test_another_scene_is_refused(once, shared_path):
+def test_another_scene_is_refused(once, shared_path, whole, uninterrupted):
     path = shared_path / "scene.hdf"
-    assert once(study, 0, path)[0] == 0
-    before = once(contents, path)
+    once(shutil.copy, whole, path)
     code, _, errors = once(study, 2, path, "--digest", "other")
     assert code == 3
     assert errors.count("error: ") == 1
     assert "made from another scene" in errors
-    assert once(differing, path, before) == []
+    assert once(differing, path, uninterrupted) == []
 
 
 @pytest.mark.parametrize(("what", "ranks"), [("text", 0), ("truncated", 0)])
-def test_a_file_that_is_no_result_is_refused(once, shared_path, what, ranks):
+def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ranks):
     path = shared_path / f"{what}.hdf"
 
     def spoil():
         if what == "truncated":
-            assert study(0, path)[0] == 0
+            shutil.copy(whole, path)
             os.truncate(path, 100_000)
         else:
             path.write_text("my notes")
@@ -243,13 +248,13 @@ def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path
     assert not (shared_path / "x.hdf.part").exists()
 
 
-def test_a_torn_row_is_solved_again(once, shared_path, uninterrupted):
+def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted):
     import h5py
 
     path = shared_path / "torn.hdf"
 
     def tear():
-        assert study(0, path)[0] == 0
+        shutil.copy(whole, path)
         with h5py.File(path, "r+") as file:
             file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
             file["study/patch/normal"][30, 0, 3, 1] = 0.0
@@ -270,14 +275,13 @@ def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(once, shared
     assert once(differing, path, uninterrupted) == []
 
 
-def test_a_finished_file_is_left_as_it_is(once, shared_path):
+def test_a_finished_file_is_left_as_it_is(once, shared_path, whole, uninterrupted):
     path = shared_path / "twice.hdf"
-    assert once(study, 0, path)[0] == 0
-    before = once(contents, path)
+    once(shutil.copy, whole, path)
     code, output, _ = once(study, 2, path, "--fail", 3)
     assert code == 0
     assert "0 of 36 cases to solve" in output
-    assert once(differing, path, before) == []
+    assert once(differing, path, uninterrupted) == []
     with open_result(path) as result:
         assert [s["reason"] for s in result.sessions] == ["complete", "complete"]
         assert [s["ranks"] for s in result.sessions] == [1, 2]
