@@ -100,7 +100,7 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     assert once(differing, path, expected) == []
 
 
-@pytest.mark.parametrize(("how", "ranks"), [("SIGUSR1", 2), ("SIGKILL", 3)])
+@pytest.mark.parametrize(("how", "ranks"), [("SIGUSR1", 2), pytest.param("SIGKILL", 3, marks=pytest.mark.long)])
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(
     once, shared_path, scene, alone, how, ranks
 ):
