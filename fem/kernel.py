@@ -2,6 +2,8 @@
 
 Element arrays keep the node index last and contiguous, so that the innermost loop over the nodes of an element becomes
 vector instructions; local unknowns are therefore ordered component first, ``(3, nodes)``.
+Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether code was compiled now or loaded from the
+cache, and a study would not be the same to the bit; these loops gain nothing from them.
 """
 
 from __future__ import annotations
@@ -9,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fem.materials import FAST, stress
+from fem.materials import stress
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def _gradient(u, dN, nodes, F, B):
     """Deformation gradient and its inverse at one point; returns ``det F``."""
     for i in range(3):
@@ -37,7 +39,7 @@ def _gradient(u, dN, nodes, F, B):
     return J
 
 
-@njit(cache=True, fastmath=FAST, inline="always")
+@njit(cache=True, inline="always")
 def _elements(law, par, u, dN, w, nodes, r, K):
     """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
     tangent = K.size > 0
@@ -85,7 +87,7 @@ def _elements(law, par, u, dN, w, nodes, r, K):
     return smallest
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def elements(law, par, u, dN, w, r, K):
     """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
 
@@ -110,7 +112,7 @@ def elements(law, par, u, dN, w, r, K):
     return _elements(law, par, u, dN, w, 27, r, K)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def smallest_det(u, dN):
     """Smallest ``det F`` over all points of all elements [-]."""
     F, B = np.empty((3, 3)), np.empty((3, 3))
@@ -121,7 +123,7 @@ def smallest_det(u, dN):
     return smallest
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def extreme_eigenvalues(M):
     """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
     mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
@@ -135,7 +137,7 @@ def extreme_eigenvalues(M):
     return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def strain_measures(law, par, shear_modulus, u, dN, directions):
     """Largest ``|principal stretch - 1|`` over all points, and the smallest eigenvalue of the acoustic tensor.
 
@@ -167,7 +169,7 @@ def strain_measures(law, par, shear_modulus, u, dN, directions):
     return strain, acoustic / shear_modulus
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
     """Weighted gaps, nodal forces and tangent blocks of the contact face.
 

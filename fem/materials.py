@@ -15,10 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-FAST = {"contract", "reassoc", "nsz", "arcp"}  # keeps NaN and Inf meaningful, so that a failure stays visible
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def blatz_ko(F, B, J, par, P, A):
     """Foam of Blatz and Ko: ``W = G/2 (tr C^-1 + 2 J - 5)``, ``P = G (J F^-T - F^-T C^-1)``; ``par = [G]``."""
     G = par[0]
@@ -43,7 +42,7 @@ def blatz_ko(F, B, J, par, P, A):
                     )  # fmt: skip
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def neo_hookean(F, B, J, par, P, A):
     """Compressible neo-Hookean: ``W = G/2 (tr C - 3 - 2 ln J) + lam/2 (ln J)^2``; ``par = [G, lam]``."""
     G, lam = par[0], par[1]
@@ -61,7 +60,7 @@ def neo_hookean(F, B, J, par, P, A):
             A[i, j, i, j] += G
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def linear(F, B, J, par, P, A):
     """Small-strain isotropic elasticity: ``P = lam tr(e) I + 2 G e``, ``e = sym F - I``; ``par = [G, lam]``."""
     G, lam = par[0], par[1]
@@ -158,7 +157,7 @@ def hyperfoam(F, B, J, par, P, A):
                         A[i, j, k, m] += S[j, m]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True)
 def stress(law, F, B, J, par, P, A):
     """Write stress and tangent of the law with this number; numbers, not functions, let compiled code be cached."""
     if law == 0:

@@ -27,7 +27,7 @@ from friction.frame import contact_frame
 from friction.motion import cor_grid
 from friction.wrench import friction_limits, friction_wrench
 from scoring.score import score
-from study.environment import mpirun
+from study.environment import launch_environment, mpirun
 from study.model import approach
 from tests.generators import cylinder_grid
 
@@ -116,13 +116,13 @@ def whole_map(scene: Path, folder: Path) -> None:
     softjaw = [sys.executable, "-m", "study", "run", str(scene), "-o"]
     seconds = {}
     for ranks in (1, 2):
-        command, environment = mpirun(ranks)
+        command = mpirun(ranks)
         start = time.perf_counter()
         subprocess.run(
             [*command, *softjaw, str(folder / f"{ranks}.hdf")],
             check=True,
             cwd=ROOT,
-            env=environment,
+            env=launch_environment(),
             stdout=subprocess.DEVNULL,
         )
         seconds[ranks] = time.perf_counter() - start
