@@ -9,13 +9,14 @@ from scipy.sparse.csgraph import connected_components
 from fem.crossing import crossing_pairs
 from fem.pose import FloatArray
 from fem.shape import IntArray
+from fem.units import LENGTHS
 
 MOST_TRIANGLES = 500_000
 MOST_PIECES = 50
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 TOLERATED_CROSSINGS = 1e-3  # share of crossing triangle pairs that is a scan's blemish, not a wrong shape
 DEBRIS = 0.02  # loose pieces below this share of the object's diagonal are dropped
-UNITS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254, "cm": 0.01}
+UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
 
 class MeshError(ValueError):

@@ -49,8 +49,10 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
         if word.startswith("-contact_"):
             found.append([word[1:], "true"])
         elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
-            remedy = "options of the contact solver begin with -contact_, others go into PETSC_OPTIONS"
-            raise StudyError(USAGE, f"PETSc option '{word}' after '--': {remedy}")
+            from study.scene.file_checks import OTHERS
+
+            takes = "softjaw takes only options of the contact solver, -contact_..."
+            raise StudyError(USAGE, f"PETSc option '{word}' after '--': {takes}; {OTHERS}")
         else:
             found[-1][1] = word
     return [f"petsc.{name}={value}" for name, value in found]

@@ -12,6 +12,9 @@ from study.scene.sections import Output
 from study.scene.shapes import Mesh
 
 
+OTHERS = "others go into the environment variable PETSC_OPTIONS"
+
+
 def output_file(output: Output) -> Iterator[Finding]:
     """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
     path, parts = ("output", "file"), PurePosixPath(output.file).parts
@@ -28,14 +31,14 @@ def petsc_options(table: Mapping[str, Any]) -> Iterator[Finding]:
     for key, value in table.items():
         path, bare = ("petsc", key), re.sub(r"^-*(contact_)?", "", key)
         if not re.fullmatch(r"contact_[a-z0-9_]+", key):
-            remedy = f"write `contact_{bare}`; other options go on the command line after `--`"
-            yield Finding(path, f"the option {shown(key)}", "an option of the contact solver, contact_...", remedy)
+            remedy = f"write `contact_{bare}` if the contact solver is meant; {OTHERS}"
+            yield Finding(path, f"the option {shown(key)}", "an option of the contact solver, contact_..., as softjaw takes no others", remedy)
         elif bare.endswith("python_type"):
             yield Finding(path, "an option that runs Python code", "options of the solver itself", "remove it")
         elif not isinstance(value, str | int | float):
             yield Finding(path, shown(value), "text, a number, or true or false", "write the option's value alone")
         elif isinstance(value, str) and not re.fullmatch(r"[A-Za-z0-9_,.+-]*", value):
-            remedy = "options that name files go on the command line after `--`"
+            remedy = "options that name files go into the environment variable PETSC_OPTIONS"
             yield Finding(path, shown(value), "a word, a number or a list of them", remedy)
 
 

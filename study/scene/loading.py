@@ -49,7 +49,7 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
     for name in NAMES:
         if name not in data and name in REQUIRED:
             found.append(
-                Finding((name,), "no such section", f"a section [{name}]", f"add [{name}], see `softjaw init`")
+                Finding((name,), "no such section", f"a section [{name}]", f"add [{name}], as in jobs/smoke.toml")
             )
         elif not isinstance(table := data.get(name, {}), Mapping):
             found.append(Finding((name,), shown(table), f"a section [{name}]", f"write [{name}] on a line of its own"))

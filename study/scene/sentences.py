@@ -16,6 +16,12 @@ LATER_KEYS = {
     "object": ("wall_mm", "material", "young_modulus_mpa", "poisson_ratio", "support"),
     "gripper": ("sheet", "sheet_thickness_mm", "sheet_material"),
 }
+EXAMPLES = {
+    "stations_mm": "[25, 50, 75]", "station_range_mm": "[25, 175]", "angles_deg": "[0, 90]", "size_mm": "[60, 40, 120]",
+    "profile_mm": "[[0, 30], [50, 30], [80, 20], [100, 20]]", "normal_force_n": "[1, 2, 5]", "alpha": "[-2]",
+    "shear_moduli_kpa": "[40]", "point_mm": "[0, 0, 20]", "approach": "[1, 0, 0]", "long_side": "[0, 0, 1]",
+    "poses": "[{ point_mm = [0, 0, 20], approach = [1, 0, 0], long_side = [0, 0, 1] }]",
+}  # fmt: skip
 LATER_LEVELS = {
     "object": ("linear_shell", "nonlinear_shell", "shell"), "pad": ("linear",), "sheet": ("elastic", "elastic_plate"),
     "fingers": ("one",), "limit_surface": ("fitted", "fitted_ellipsoid", "quartic", "convex_quartic"),
@@ -149,13 +155,29 @@ def _remedy(section: str, key: str, value: Any, schema: Mapping[str, Any], sibli
         )
     if isinstance(value, list) and schema.get("type") != "array" and f"{key}_mm" in siblings:
         return f"for a list write `{key}_mm = {shown(value, 30)}`"
-    if _is_number(value) and schema.get("type") == "array":
-        return f"write a list, `{key} = [{value}]`"
+    if schema.get("type") == "array" and not isinstance(value, dict):
+        member = schema.get("items", {})
+        alone = _is_number(value) and member.get("type") == "number" and _fits(value, member)
+        return f"write a list, `{key} = {[value] if alone else _example(key, schema)}`"
     if _is_number(value) and split_unit(key)[1]:
         return _other_unit(value, split_unit(key)[1], schema)
     if choices:
         return f"choose one of {', '.join(json.dumps(c) for c in choices)}"
     return f"the default is {shown(default)}" if default is not None else f"write {_kind(schema)}"
+
+
+def _example(key: str, schema: Mapping[str, Any]) -> str:
+    """A list that a key takes: a sensible one where it is known, else one of the right length."""
+    if key in EXAMPLES or schema.get("default"):
+        return EXAMPLES.get(key) or shown(schema["default"])
+    members = schema.get("prefixItems") or [schema.get("items", {})] * max(1, schema.get("minItems", 1))
+    return f"[{', '.join(_example('', s) if s.get('type') == 'array' else '1' for s in members)}]"
+
+
+def _fits(value: float, schema: Mapping[str, Any]) -> bool:
+    """Whether a number lies in the range of a schema."""
+    low = schema.get("minimum", -1e300) <= value and schema.get("exclusiveMinimum", -1e300) < value
+    return low and value <= schema.get("maximum", 1e300) and value < schema.get("exclusiveMaximum", 1e300)
 
 
 def _is_number(value: Any) -> bool:
@@ -173,4 +195,4 @@ def _other_unit(value: float, unit: str, schema: Mapping[str, Any]) -> str:
         if other.kind == ours.kind in ("length", "pressure") and other != ours and low < meant <= high:
             return f"the unit is {ours.text}: if {other.text} was meant, write {meant:.10g}"
     default = schema.get("default")
-    return f"the default is {shown(default)}" if default is not None else f"the unit is {ours.text}"
+    return f"the default is {shown(default)}" if default is not None else f"write {_kind(schema)} in {ours.text}"

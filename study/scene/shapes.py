@@ -146,7 +146,7 @@ class Mesh(Shape):
     mesh: str = Field(
         min_length=1, max_length=4000, description="file of the mesh (.stl, .ply, .obj), beside the scene file"
     )
-    unit: Literal["mm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")
+    unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")
     axis: Literal["x", "y", "z"] = Field("z", description="axis of the mesh file that becomes the object's axis")
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(
         "auto", description="step of the grid on which the distance to the mesh is sampled"

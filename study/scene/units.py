@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from fem.units import LENGTHS
+
 
 class Unit(NamedTuple):
     """A unit: kind of quantity, size in SI units as ``times / over`` (rounds once), SI unit, way of writing it."""
@@ -22,11 +24,8 @@ class Unit(NamedTuple):
 
 
 UNITS = {
-    "mm": Unit("length", 1, 1000, "m", "mm"),
-    "cm": Unit("length", 1, 100, "m", "cm"),
-    "m": Unit("length", 1, 1, "m", "m"),
+    **{name: Unit("length", times, over, "m", name) for name, (times, over) in LENGTHS.items()},
     "um": Unit("length", 1, 1e6, "m", "um"),
-    "inch": Unit("length", 0.0254, 1, "m", "inch"),
     "n": Unit("force", 1, 1, "N", "N"),
     "kn": Unit("force", 1000, 1, "N", "kN"),
     "pa": Unit("pressure", 1, 1, "Pa", "Pa"),

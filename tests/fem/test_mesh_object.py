@@ -208,7 +208,7 @@ def test_same_mesh_from_every_format(tmp_path, ending):
 
 def test_unit_is_applied():
     points, triangles = ball(1)
-    for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254)):
+    for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254), ("cm", 0.01)):
         x, _, _ = sound_mesh(points / factor, triangles, unit)
         assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
 
@@ -336,7 +336,7 @@ def test_damaged_files_are_refused_with_their_name(tmp_path, name, content, mess
 def test_file_with_nan_wrong_unit_missing_or_too_large_is_refused(tmp_path, monkeypatch):
     with pytest.raises(MeshError, match=r'flask.stl: an object of 120 m\? .* should be "mm" \(120 mm\)'):
         MeshObject.from_file(FLASK, "m")
-    with pytest.raises(MeshError, match="unit must be one of mm, m, inch, cm, found 'foot'"):
+    with pytest.raises(MeshError, match="unit must be one of mm, cm, m, inch, found 'foot'"):
         MeshObject.from_file(FLASK, "foot")
     with pytest.raises(MeshError, match="axis must be one of x, y, z"):
         MeshObject.from_file(FLASK, "mm", axis="w")

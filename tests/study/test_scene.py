@@ -5,12 +5,15 @@ import math
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from pydantic import ValidationError
 
+from fem.units import LENGTHS
 from study.scene import Scene, SceneError, load_scene, parse_scene
-from study.scene.shapes import SHAPES
+from study.scene.shapes import SHAPES, Mesh
+from study.scene.units import in_si
 
 ROOT = Path(__file__).parents[2]
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
@@ -84,7 +87,9 @@ WRONG_LINES = [
     ("[output]\nfile = '../a.hdf'", 12, "output.file", '"../a.hdf"', "below the working directory", "`-o`"),
     ("[output]\nfile = '/a.hdf'", 12, "output.file", '"/a.hdf"', "below the working directory", "`-o`"),
     ("[petsc]\nsnes_max_it = 9", 12, "petsc.snes_max_it", "snes_max_it", "contact_", "`contact_snes_max_it`"),
-    ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", "ascii:", "a word", "after `--`"),
+    ("[petsc]\nfoo = 1", 12, "petsc.foo", "foo", "no others", "others go into the environment variable PETSC_OPTIONS"),
+    ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", "ascii:", "a word",
+     "variable PETSC_OPTIONS"),
     ("[petsc]\ncontact_pc_python_type = 'a.b'", 12, "petsc.contact_pc_python_type", "Python", "solver", "remove"),
     ("[petsc]\ncontact_snes_max_it = [1]", 12, "petsc.contact_snes_max_it", "[1]", "a number", "alone"),
     ("[output_file]\na = 1", 11, "output_file", "unknown section", "[output]", "did you mean [output]?"),
@@ -128,7 +133,9 @@ WRONG_VALUES = [
     ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station beside the object: 30.5", "from -30 to 30 mm",
      "axis"),
     ("[0]", "[0, 0]", 6, "candidates.stations_mm", "0 more than once", "once", "repetition"),
-    ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000", "a list"),
+    ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000",
+     "`stations_mm = [25, 50, 75]`"),
+    ("[0]", "'top'", 6, "candidates.stations_mm", '"top"', "1 to 10000", "`stations_mm = [25, 50, 75]`"),
     ("[0]", "[inf]", 6, "candidates.stations_mm[0]", "inf", "a number [mm]", "a number"),
     ("stations_mm = [0]", "", 5, "candidates", "no grasp", "stations_mm", "`stations = 35`"),
     ("stations_mm = [0]", "stations = [0, 1]", 6, "candidates.stations", "[0, 1]", "whole number",
@@ -147,8 +154,11 @@ WRONG_VALUES = [
     ("[1]", "[5000]", 9, "load.normal_force_n[0]", "5000", "<= 1000 [N]", "N"),
     ("[1]", "['5 N']", 9, "load.normal_force_n[0]", '"5 N"', "[N]", "`5` without quotes"),
     ("[1]", "5", 9, "load.normal_force_n", "5", "a list", "`normal_force_n = [5]`"),
+    ("[1]", "-3", 9, "load.normal_force_n", "-3", "> 0", "`normal_force_n = [1, 2, 5]`"),
+    ("[1]", "[-3]", 9, "load.normal_force_n[0]", "-3", "> 0", "> 0 and <= 1000 in N"),
     ("[1]", "[" + "9" * 400 + "]", 9, "load.normal_force_n[0]", "9999", "<= 1000", "a number"),
-    ("[load]\nnormal_force_n = [1]", "", None, "load", "no such section", "[load]", "add [load]"),
+    ("[load]\nnormal_force_n = [1]", "", None, "load", "no such section", "[load]",
+     "add [load], as in jobs/smoke.toml"),
     ("= 30", "= 30,5", 3, "", '"radius_mm = 30,5"', "TOML", "decimals with a point"),
     ("= 30", "= thirty", 3, "", "thirty", "TOML", "text in quotes"),
     ("= 30", "= 30\nradius_mm = 40", 4, "object.radius_mm", "again", "line 3 has it", "remove one"),
@@ -474,3 +484,10 @@ def test_checking_a_scene_starts_no_heavy_machinery():
     )
     done = subprocess.run([sys.executable, "-c", code, JOBS[0]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_meshes_come_in_the_units_that_lengths_come_in():
+    assert get_args(Mesh.model_fields["unit"].annotation) == tuple(LENGTHS)
+    for name, (times, over) in LENGTHS.items():
+        mesh = Mesh(shape="mesh", mesh="a.stl", unit=name)
+        assert mesh.unit_length == times / over == in_si(f"a_{name}", 1.0)
