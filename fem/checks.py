@@ -22,14 +22,16 @@ class Checks:
 
     ``force_balance`` is relative to the force, ``tension`` to the largest pressure, ``penetration`` and
     ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
-    ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear modulus: not positive means that the
-    foam has lost ellipticity and that strains may localise.
+    ``overlap`` is the deepest point of the front inside the object [m]: weighted gaps hold on average, so it tells how
+    well the mesh follows the object; ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear
+    modulus: not positive means that the foam has lost ellipticity and that strains may localise.
     """
 
     force_balance: float
     tension: float
     penetration: float
     complementarity: float
+    overlap: float
     min_det_f: float
     max_strain: float
     acoustic: float
@@ -54,6 +56,7 @@ def check(problem: ContactProblem, x: FloatArray, force: float, residual: float)
         tension=max(0.0, -float(pressure.min())) / largest,
         penetration=max(0.0, -float(gap.min())) / size,
         complementarity=float(np.abs(pressure * gap).max(initial=0.0)) / (largest * size),
+        overlap=max(0.0, -float(points.gap.min())),
         min_det_f=det,
         max_strain=strain,
         acoustic=acoustic,

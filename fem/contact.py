@@ -44,12 +44,15 @@ class ContactPoints:
     ----------
     position, normal : (faces, points, 3) arrays
         Deformed points [m] and the object's outward normals there.
+    gap : (faces, points) array
+        Signed distance to the object [m]; the solve makes its weighted mean at a node non-negative, not every value.
     load : (faces, points) array
         Contact pressure times reference area [N].
     """
 
     position: FloatArray
     normal: FloatArray
+    gap: FloatArray
     load: FloatArray
 
     @property
@@ -133,9 +136,9 @@ class ContactProblem:
         points = np.einsum("qa,fai->fqi", pad.face_N, corners)
         gap, normal, hessian = self.gap(points.reshape(-1, 3))
         shape = points.shape[:2]
-        self._points, self._normal = points, normal.reshape(*shape, 3)
+        self._points, self._normal, self._gap = points, normal.reshape(*shape, 3), gap.reshape(shape)
         kernel.contact(
-            pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], gap.reshape(shape),
+            pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], self._gap,
             self._normal, hessian.reshape(*shape, 3, 3), self._weighted, self._force,
             *((self._K_uu, self._K_ul) if tangent else self._none[1:]),
         )  # fmt: skip
@@ -208,7 +211,7 @@ class ContactProblem:
         weighted_gap = self._contact(x, tangent=False)
         pressure = self.kappa * x[self._pressures]
         load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
-        return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, load)
+        return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, self._gap, load)
 
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""

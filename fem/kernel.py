@@ -8,9 +8,13 @@ cache, and a study would not be the same to the bit; these loops gain nothing fr
 
 from __future__ import annotations
 
+import hashlib
+from pathlib import Path
+
 import numpy as np
 from numba import njit
 
+from fem import materials
 from fem.materials import stress
 
 
@@ -37,6 +41,31 @@ def _gradient(u, dN, nodes, F, B):
         for j in range(3):
             B[i, j] /= J
     return J
+
+
+@njit(cache=True)
+def smallest_det(u, dN):
+    """Smallest ``det F`` over all points of all elements [-]."""
+    F, B = np.empty((3, 3)), np.empty((3, 3))
+    smallest = np.inf
+    for e in range(dN.shape[0]):
+        for q in range(dN.shape[1]):
+            smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
+    return smallest
+
+
+@njit(cache=True)
+def extreme_eigenvalues(M):
+    """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
+    mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
+    a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
+    d, e, f = M[0, 1], M[0, 2], M[1, 2]
+    radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    if radius <= 1e-12 * abs(mean):
+        return mean, mean
+    half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
+    angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
+    return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
 
 
 @njit(cache=True, inline="always")
@@ -87,86 +116,75 @@ def _elements(law, par, u, dN, w, nodes, r, K):
     return smallest
 
 
-@njit(cache=True)
-def elements(law, par, u, dN, w, r, K):
-    """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
+def _bound_to(laws):
+    """Loops that call the material laws, compiled anew whenever the laws' source ``laws`` is another.
 
-    Parameters
-    ----------
-    law, par : int, (k,) array
-        Material number and parameters (``fem.materials``).
-    u : (n, 3, nodes) array
-        Nodal displacements of each element [m].
-    dN : (n, points, 3, nodes) array
-        Reference gradients of the shape functions [1/m].
-    w : (n, points) array
-        Reference volume of each point [m^3].
-    r : (n, 3, nodes) array, out
-        Nodal forces [N].
-    K : (n, 3, nodes, 3, nodes) array, out
-        Stiffness [N/m]; with size 0 only ``r`` is computed.
+    numba's cache looks at the file of a function alone, and at its closure; without this the laws of an older version
+    would go on being used.
     """
-    # constant node counts let the compiler unroll
-    if u.shape[2] == 8:
-        return _elements(law, par, u, dN, w, 8, r, K)
-    return _elements(law, par, u, dN, w, 27, r, K)
 
+    @njit(cache=True)
+    def elements(law, par, u, dN, w, r, K):
+        """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
 
-@njit(cache=True)
-def smallest_det(u, dN):
-    """Smallest ``det F`` over all points of all elements [-]."""
-    F, B = np.empty((3, 3)), np.empty((3, 3))
-    smallest = np.inf
-    for e in range(dN.shape[0]):
-        for q in range(dN.shape[1]):
-            smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
-    return smallest
+        Parameters
+        ----------
+        law, par : int, (k,) array
+            Material number and parameters (``fem.materials``).
+        u : (n, 3, nodes) array
+            Nodal displacements of each element [m].
+        dN : (n, points, 3, nodes) array
+            Reference gradients of the shape functions [1/m].
+        w : (n, points) array
+            Reference volume of each point [m^3].
+        r : (n, 3, nodes) array, out
+            Nodal forces [N].
+        K : (n, 3, nodes, 3, nodes) array, out
+            Stiffness [N/m]; with size 0 only ``r`` is computed.
+        """
+        if len(laws) == 0:  # read here, so that it enters the key of the cache
+            return np.nan
+        # constant node counts let the compiler unroll
+        if u.shape[2] == 8:
+            return _elements(law, par, u, dN, w, 8, r, K)
+        return _elements(law, par, u, dN, w, 27, r, K)
 
+    @njit(cache=True)
+    def strain_measures(law, par, shear_modulus, u, dN, directions):
+        """Largest ``|principal stretch - 1|`` of all points, and smallest eigenvalue of the acoustic tensor.
 
-@njit(cache=True)
-def extreme_eigenvalues(M):
-    """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
-    mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
-    a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
-    d, e, f = M[0, 1], M[0, 2], M[1, 2]
-    radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
-    if radius <= 1e-12 * abs(mean):
-        return mean, mean
-    half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
-    angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
-    return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
-
-
-@njit(cache=True)
-def strain_measures(law, par, shear_modulus, u, dN, directions):
-    """Largest ``|principal stretch - 1|`` over all points, and the smallest eigenvalue of the acoustic tensor.
-
-    The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the given
-    unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no localisation).
-    """
-    F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
-    C, Q = np.empty((3, 3)), np.empty((3, 3))
-    strain, acoustic = 0.0, np.inf
-    for e in range(dN.shape[0]):
-        for q in range(dN.shape[1]):
-            J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
-            for i in range(3):
-                for k in range(3):
-                    C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
-            low, high = extreme_eigenvalues(C)
-            strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
-            if q > 0:
-                continue
-            stress(law, F, B, J, par, P, A)
-            for m in directions:
+        The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the
+        given unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no
+        localisation).
+        """
+        F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
+        C, Q = np.empty((3, 3)), np.empty((3, 3))
+        strain, acoustic = 0.0, np.inf if len(laws) > 0 else np.nan
+        for e in range(dN.shape[0]):
+            for q in range(dN.shape[1]):
+                J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
                 for i in range(3):
                     for k in range(3):
-                        value = 0.0
-                        for j in range(3):
-                            value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
-                        Q[i, k] = value
-                acoustic = min(acoustic, extreme_eigenvalues(Q)[0])
-    return strain, acoustic / shear_modulus
+                        C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
+                low, high = extreme_eigenvalues(C)
+                strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
+                if q > 0:
+                    continue
+                stress(law, F, B, J, par, P, A)
+                for m in directions:
+                    for i in range(3):
+                        for k in range(3):
+                            value = 0.0
+                            for j in range(3):
+                                value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
+                            Q[i, k] = value
+                    acoustic = min(acoustic, extreme_eigenvalues(Q)[0])
+        return strain, acoustic / shear_modulus
+
+    return elements, strain_measures
+
+
+elements, strain_measures = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
 
 
 @njit(cache=True)

@@ -108,6 +108,16 @@ def principal(C):
 
 
 @njit(cache=True)
+def _transposed_product(M, N):
+    """``M^T N`` of two 3 x 3 matrices, without a call to BLAS."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = M[0, i] * N[0, j] + M[1, i] * N[1, j] + M[2, i] * N[2, j]
+    return out
+
+
+@njit(cache=True)
 def hyperfoam(F, B, J, par, P, A):
     """Storakers' hyperfoam in principal stretches ``l``; ``par = [nu, mu_1, alpha_1, mu_2, alpha_2, ...]``.
 
@@ -115,7 +125,7 @@ def hyperfoam(F, B, J, par, P, A):
     ``beta = nu / (1 - 2 nu)`` (Storakers, J. Mech. Phys. Solids 34, 1986).
     """
     beta = par[0] / (1.0 - 2.0 * par[0])
-    c, V = principal(F.T @ F)
+    c, V = principal(_transposed_product(F, F))
     stretch = np.sqrt(c)
     s, ds = np.zeros(3), np.zeros((3, 3))  # second Piola-Kirchhoff S_a and dS_a / dl_b
     for term in range((par.size - 1) // 2):
@@ -127,14 +137,15 @@ def hyperfoam(F, B, J, par, P, A):
             ds[a, a] += 2.0 * mu / alpha * ((alpha - 2.0) * power + 2.0 * volume) / (c[a] * stretch[a])
             for b in range(3):
                 ds[a, b] += 2.0 * mu * beta * volume / (c[a] * stretch[b])
-    FV = F @ V
+    FV = _transposed_product(F.T, V)
     for i in range(3):
         for j in range(3):
             P[i, j] = FV[i, 0] * s[0] * V[j, 0] + FV[i, 1] * s[1] * V[j, 1] + FV[i, 2] * s[2] * V[j, 2]
     if A.size == 0:
         return
     A[:] = 0.0
-    S = V @ np.diag(s) @ V.T
+    VT = np.ascontiguousarray(V.T)
+    S = _transposed_product(VT, VT * s.reshape(3, 1))
     shear = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
@@ -143,18 +154,21 @@ def hyperfoam(F, B, J, par, P, A):
                     shear[a, b] = (s[b] - s[a]) / (c[b] - c[a])
                 else:  # the limit of the quotient for equal stretches
                     shear[a, b] = 0.5 * (ds[b, b] - ds[a, b]) / stretch[b]
-    for i in range(3):
-        for j in range(3):
+    X, Y = np.empty((3, 3)), np.empty((3, 3))
+    for a in range(3):
+        for b in range(3):
             for k in range(3):
                 for m in range(3):
-                    value = 0.0
-                    for a in range(3):
-                        for b in range(3):
-                            value += ds[a, b] / stretch[b] * FV[i, a] * V[j, a] * FV[k, b] * V[m, b]
-                            value += shear[a, b] * FV[i, a] * V[j, b] * (FV[k, a] * V[m, b] + FV[k, b] * V[m, a])
-                    A[i, j, k, m] = value
-                    if i == k:
-                        A[i, j, k, m] += S[j, m]
+                    X[k, m] = ds[a, b] / stretch[b] * FV[k, b] * V[m, b]
+                    Y[k, m] = shear[a, b] * (FV[k, a] * V[m, b] + FV[k, b] * V[m, a])
+            for i in range(3):
+                for j in range(3):
+                    x, y = FV[i, a] * V[j, a], FV[i, a] * V[j, b]
+                    for k in range(3):
+                        for m in range(3):
+                            A[i, j, k, m] += x * X[k, m] + y * Y[k, m]
+    for i in range(3):
+        A[i, :, i, :] += S
 
 
 @njit(cache=True)

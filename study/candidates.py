@@ -92,6 +92,22 @@ def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pos
     return Pose(rotation, point - STANDOFF * approach)
 
 
+def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:
+    """Angle about z [rad] that takes one approaching pad to another, if the object looks the same after it, else None.
+
+    A shift along the approach does not count: the press closes the fingers.
+    """
+    turn = other.rotation @ one.rotation.T
+    if abs(turn[2, 2] - 1) > ALIKE or np.abs(turn[2, :2]).max() > ALIKE:
+        return None
+    angle = math.atan2(turn[1, 0], turn[0, 0])
+    step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
+    if step and abs(angle - step * round(angle / step)) > ALIKE:
+        return None
+    shift = other.rotation.T @ (turn @ one.origin - other.origin)  # in the pad's frame: z is along the approach
+    return None if np.abs(shift[:2]).max() > ALIKE else angle
+
+
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
     """Angle about z that turns both pads of one candidate into those of another, if the object looks the same then.
 
@@ -104,20 +120,12 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
     Returns
     -------
     float or None
-        Angle in [0, 2 pi) [rad]. A shift along the approach does not count: the press closes the fingers.
+        Angle in [0, 2 pi) [rad].
     """
-    turn = second.poses[0].rotation @ first.poses[0].rotation.T
-    if abs(turn[2, 2] - 1) > ALIKE or np.abs(turn[2, :2]).max() > ALIKE:
+    turns = [turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True)]
+    if None in turns or abs(math.remainder(turns[0] - turns[1], 2 * math.pi)) > ALIKE:
         return None
-    angle = math.atan2(turn[1, 0], turn[0, 0])
-    step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
-    if step and abs(angle - step * round(angle / step)) > ALIKE:
-        return None
-    for one, other in zip(first.poses, second.poses, strict=True):
-        shift = other.rotation.T @ (turn @ one.origin - other.origin)  # in the pad's frame: z is along the approach
-        if np.abs(turn @ one.rotation - other.rotation).max() > ALIKE or np.abs(shift[:2]).max() > ALIKE:
-            return None
-    return 0.0 if abs(angle) <= ALIKE else angle % (2 * math.pi)
+    return 0.0 if abs(turns[0]) <= ALIKE else turns[0] % (2 * math.pi)
 
 
 def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:

@@ -90,19 +90,6 @@ def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, boo
     )
 
 
-def image_of(first: Pose, second: Pose, axis_symmetry: int) -> bool:
-    """Whether turning the object about its axis, within its symmetry, takes one approaching pad to the other."""
-    turn = second.rotation @ first.rotation.T
-    if abs(turn[2, 2] - 1.0) > 1e-9:
-        return False
-    angle = np.arctan2(turn[1, 0], turn[0, 0])
-    step = 2.0 * np.pi / axis_symmetry if axis_symmetry else 0.0
-    if step and abs(angle - step * round(angle / step)) > 1e-9:
-        return False
-    aside = second.rotation.T @ (turn @ first.origin - second.origin)
-    return bool(np.abs(aside[:2]).max() <= 1e-9)
-
-
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
     """Planes of symmetry used with this mesh: those that exist, halve it evenly and are allowed by the effects.
 

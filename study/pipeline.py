@@ -14,51 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import CheckError, ConvergenceError
-from fem.extract import extract
-from fem.pose import Pose
 from fem.press import Press, Pressed, Settings
-from friction.frame import Frame, contact_frame, contact_length, in_frame
+from friction.frame import contact_length
 from friction.motion import cor_grid
-from friction.patch import ContactPatch
-from friction.wrench import FrictionLimits, friction_limits, friction_wrench
-from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
-from scoring.score import ScoreFlag, score
+from friction.wrench import friction_wrench
+from scoring.score import score
 from study import model
 from study.build import build_object, pad_shape
+from study.candidates import turn_of_pose
+from study.contact import Contact, angles, flags, remark
 from study.effects import effects_of
 from study.quantities import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
 
 FloatArray = NDArray[np.float64]
-X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-ANTIPODAL = np.radians(5.0)  # beyond this angle between the contacts the antipodal score is flagged
-NOT_ANTIPODAL, NODAL_INSTEAD = 256, 512  # flags, above those of score and contact frame
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 PLANAR = (("flat", ""), ("projected", "_projected"))  # planar model, suffix of the quantities that compare with it
-FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
-
-
-class Contact:
-    """One finger at one force: patch in the pad's frame, contact frame, friction limits and limit surface per model."""
-
-    def __init__(self, scene: Scene, finger: model.Finger, state: Pressed) -> None:
-        self.finger, self.state, self.symmetry = finger, state, state.pad.symmetry
-        self.nodal_instead = state.pad.contact != scene.accuracy.contact
-        self.patch: ContactPatch = extract(state.pad, state)
-        self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
-        self.local: ContactPatch = in_frame(self.patch, self.frame)
-        self.limits: dict[str, FrictionLimits] = {
-            name: friction_limits(self.local, scene.friction.mu, name) for name in MODELS
-        }
-        rho = contact_length(self.local)
-        self.surfaces: dict[str, Ellipsoid] = {
-            name: three_motion_ellipsoid(*found.per_unit_force, rho) for name, found in self.limits.items()
-        }
-
-    def placed(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
-        """Origin and inward normal of the contact in the object's frame, for a pad that stands at ``pose``."""
-        return pose.to_object(self.frame.origin[None])[0], pose.rotation @ self.frame.axes[2]
 
 
 def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
@@ -66,7 +38,7 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     scene = unit.scene
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in unit.candidate.poses]
-    shared = model.image_of(*unit.candidate.poses, scene.object.axis_symmetry)
+    shared = turn_of_pose(*unit.candidate.poses, scene.object.axis_symmetry) is not None
     meshes = (False, True)[: scene.accuracy.meshes]
     presses = [[_press(scene, f, coarser) for coarser in meshes] for f in (fingers[:1] if shared else fingers)]
     try:
@@ -96,7 +68,7 @@ def _states(presses: list[list[Press]], forces: Sequence[float]) -> Iterator[lis
             yield [[next(ladder) for ladder in own] for own in ladders]
         except (ConvergenceError, CheckError) as error:
             good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
-            yield CaseFailure(f"{type(error).__name__}: {error}; {good}")
+            yield CaseFailure(f"{error}; {good}")
             for _ in forces[k + 1 :]:
                 yield CaseFailure(f"not tried, because the ladder of forces ended at {force:g} N: {error}")
             return
@@ -129,13 +101,8 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
     }
     S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
-    (origin1, normal1), (origin2, normal2) = (c.placed(c.finger.pose) for c in contacts)
-    distance = float(np.linalg.norm(origin2 - origin1))
+    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
     scores = [_score(scene, obj, contacts, m, distance) for m in MODELS]
-    apart = float(np.arccos(np.clip(-normal1 @ normal2, -1.0, 1.0)))
-    flags = int(scores[0].flag) | NOT_ANTIPODAL * (apart > ANTIPODAL)
-    for c in contacts:
-        flags |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead
     areas = [float(c.patch.area[c.patch.pressure > 0].sum()) for c in contacts]
     values = {
         "maps/quality": [s.quality for s in scores],
@@ -147,8 +114,8 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         "maps/p_max": max(float(c.patch.pressure.max()) for c in contacts),
         "maps/contact_distance": distance,
         "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
-        "maps/misalignment": apart,
-        "maps/flags": flags,
+        "maps/misalignment": max(angles(*contacts)),
+        "maps/flags": flags(contacts, scene.friction.mu, int(scores[0].flag)),
         "fingers/S": S,
         "fingers/F_N": F_N,
         "fingers/travel": [c.state.travel for c in contacts],
@@ -220,16 +187,4 @@ def _result(
     values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values | checks, patch, _remark(values, fine), effects_of(scene, fine))
-
-
-def _remark(values: dict[str, Any], contacts: list[Contact]) -> str:
-    """What the reader should know about a valid result, always in the same words, so that remarks can be counted."""
-    score_flags = ScoreFlag.NO_TORQUE | ScoreFlag.NO_FORCE
-    remarks = {
-        "contacts more than 5 deg from antipodal, the score is approximate": values["maps/flags"] & NOT_ANTIPODAL,
-        "weighted gaps had no solution, nodal gaps were taken": values["maps/flags"] & NODAL_INSTEAD,
-        "a contact carries no torque, or no force along an axis": values["maps/flags"] & score_flags,
-        "foam lost ellipticity, strains may localise": min(c.state.checks.acoustic for c in contacts) <= 0,
-    }
-    return "; ".join(text for text, holds in remarks.items() if holds)
+    return CaseResult(values | checks, patch, remark(values["maps/flags"], fine), effects_of(scene, fine))

@@ -79,12 +79,16 @@ MAPS = (
     Quantity("contact_distance", "m", "distance of the contacts", "Distance between the contact frames' origins."),
     Quantity("curvature_loss", "", "force lost to curvature", "1 - F_N / S: zero for a flat contact, what the tilt of"
              " the loaded normals takes off the normal force otherwise; both fingers together."),
-    Quantity("misalignment", "rad", "misalignment of the contacts", "Angle between one contact normal and the other"
-             " reversed; the score's closed form is exact at 0 and off by about 1 % at 0.09 rad."),
+    Quantity("misalignment", "rad", "misalignment of the contacts", "Largest of the angles between one contact normal"
+             " and the other reversed, and between the line that joins the contacts and each normal; the score's closed"
+             " form is exact at 0 and off by about 1 % at 0.09 rad."),
     Quantity("flags", "", "flags of the case", "Sum of: 1 a contact carries no torque, 2 a contact carries no force"
              " along an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no"
              " corners, 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
-             " 512 solved with nodal gaps, because weighted ones had no solution."),
+             " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
+             " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
+             " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"
+             " the travel, or fewer than six elements carry load."),
     *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
                f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved"
                f" contact cannot carry ({note}); of the finger where it is largest.")
@@ -131,6 +135,8 @@ CHECKS = (
     _finger("checks", "penetration", "", "largest penetration", "Deepest mean overlap at a node over an element."),
     _finger("checks", "complementarity", "", "complementarity", "Largest product of pressure and gap at a node, over"
             " the largest pressure and the element size."),
+    _finger("checks", "overlap", "m", "deepest point inside the object", "Of the quadrature points of the front:"
+            " weighted gaps hold on average, so this tells how well the mesh follows the object."),
     _finger("checks", "min_det_f", "", "smallest det F", "Smallest ratio of deformed to undeformed volume."),
     _finger("checks", "max_strain", "", "largest strain", "Largest difference of a principal stretch from 1."),
     _finger("checks", "acoustic", "", "smallest acoustic eigenvalue", "Over the shear modulus, in 24 directions at one"

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import model, pipeline
+from study import pipeline
 from study.build import build_object
 from study.environment import launch_environment
 from study.quantities import MODELS
@@ -121,7 +121,7 @@ def test_both_definitions_of_e_n_say_the_same_torque():
     (OVAL, ("candidates.roll_deg=30",)), (BALL, ("candidates.roll_deg=70",)), (BOX, ()), (OVAL, ()),
 ])  # fmt: skip
 def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overrides):
-    monkeypatch.setattr(model, "image_of", lambda *_: False)  # solve them one after the other
+    monkeypatch.setattr(pipeline, "turn_of_pose", lambda *_: None)  # solve them one after the other
     solved.cache_clear()
     for values in cases(shape, *overrides):
         for name, both in values.items():
@@ -137,7 +137,7 @@ def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overri
 def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, shape):
     place = dict(stations="[75]" if shape == CONE else "[0]", angles="[20]")
     shared = cases(shape, **place)
-    monkeypatch.setattr(model, "image_of", lambda *_: False)
+    monkeypatch.setattr(pipeline, "turn_of_pose", lambda *_: None)
     solved.cache_clear()
     separate = cases(shape, **place)
     solved.cache_clear()
@@ -282,14 +282,14 @@ def test_a_ladder_that_ends_names_the_last_good_force_and_what_was_not_tried(rad
     good, ended, above = ladder
     assert good.values["maps/e_n"][CURVED] > 0
     assert isinstance(ended, CaseFailure)
-    assert ended.message.startswith("ConvergenceError: the force stays below 20 N: reached ")
+    assert ended.message.startswith("the force stays below 20 N: reached ")
     assert ended.message.endswith("; the last good force is 2 N")
     assert above.message.startswith("not tried, because the ladder of forces ended at 20 N: ")
 
 
 def test_a_ladder_without_a_first_rung_says_so():
     first, second = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
-    assert first.message.startswith("ConvergenceError: ")
+    assert "no force below it was tried" in first.message
     assert first.message.endswith("; no force below it was tried")
     assert second.message.startswith("not tried, because the ladder of forces ended at 2 N")
 
@@ -338,11 +338,6 @@ print(state.travel)
 
 @pytest.mark.long
 @pytest.mark.launches
-@pytest.mark.xfail(
-    reason="numba's cache of fem/kernel.py does not notice that fem/materials.py changed",
-    raises=AssertionError,
-    strict=True,
-)
 def test_a_changed_material_takes_effect_although_its_callers_were_compiled_before(tmp_path):
     """A foam twice as stiff yields less, also with the machine code of the last run at hand."""
     root = Path(__file__).parents[2]

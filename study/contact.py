@@ -1,0 +1,104 @@
+"""One finger's contact at one force, how two of them stand to each other, and what the reader should know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.extract import extract
+from fem.press import Pressed
+from friction.frame import Frame, contact_frame, contact_length, in_frame
+from friction.patch import ContactPatch
+from friction.wrench import FrictionLimits, friction_limits
+from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
+from study.model import Finger
+from study.quantities import MODELS
+from study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
+ANTIPODAL = np.radians(5.0)  # beyond this misalignment the antipodal score is flagged
+OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
+FEW_ELEMENTS = 6  # loaded ones, below which it is coarse too
+FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
+NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as study.quantities says
+REMARKS = {
+    SLIPS: "the line between the contacts leaves a friction cone, the grasp slips",
+    NOT_ANTIPODAL: "contacts more than 5 deg from antipodal, the score is approximate",
+    PADS_MEET: "the pads run into each other beside the object, which is not simulated",
+    COARSE: "the mesh is coarse for this contact",
+    NODAL_INSTEAD: "weighted gaps had no solution, nodal gaps were taken",
+    1 | 2: "a contact carries no torque, or no force along an axis",
+}
+UNSTABLE = "foam lost ellipticity, strains may localise"
+
+
+class Contact:
+    """One finger at one force: patch in the pad's frame, contact frame, friction limits and limit surface per model."""
+
+    def __init__(self, scene: Scene, finger: Finger, state: Pressed) -> None:
+        self.finger, self.state, self.symmetry = finger, state, state.pad.symmetry
+        self.nodal_instead = state.pad.contact != scene.accuracy.contact
+        self.patch: ContactPatch = extract(state.pad, state)
+        self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
+        self.local: ContactPatch = in_frame(self.patch, self.frame)
+        self.limits: dict[str, FrictionLimits] = {
+            name: friction_limits(self.local, scene.friction.mu, name) for name in MODELS
+        }
+        rho = contact_length(self.local)
+        self.surfaces: dict[str, Ellipsoid] = {
+            name: three_motion_ellipsoid(*found.per_unit_force, rho) for name, found in self.limits.items()
+        }
+
+    @property
+    def origin(self) -> FloatArray:
+        """Origin of the contact frame in the object's frame ``(3,)`` [m]."""
+        return self.finger.pose.to_object(self.frame.origin[None])[0]
+
+    @property
+    def normal(self) -> FloatArray:
+        """Contact normal, into the object, in the object's frame ``(3,)``."""
+        return self.finger.pose.rotation @ self.frame.axes[2]
+
+    @property
+    def loaded_elements(self) -> float:
+        """Hexahedra of the front that carry load."""
+        return np.count_nonzero(self.patch.pressure) / self.state.pad.shape.per_side**2
+
+    @property
+    def free_front(self) -> float:
+        """How far the unloaded part of the front has come beyond first touch [m]."""
+        return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
+
+
+def angles(one: Contact, two: Contact) -> tuple[float, float]:
+    """How far the contacts are from antipodal [rad]: between their normals, and between their line and each normal."""
+
+    def between(u: FloatArray, v: FloatArray) -> float:
+        return float(np.arccos(np.clip(u @ v / (np.linalg.norm(u) * np.linalg.norm(v)), -1.0, 1.0)))
+
+    line = two.origin - one.origin
+    return between(one.normal, -two.normal), max(between(one.normal, line), between(two.normal, -line))
+
+
+def flags(contacts: Sequence[Contact], mu: float, score_flag: int) -> int:
+    """Flags of a case, added up as ``study.quantities`` defines them."""
+    one, two = contacts
+    normals, line = angles(one, two)
+    between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
+    found = score_flag
+    found |= NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL)
+    found |= SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
+    found |= PADS_MEET * (one.free_front + two.free_front > between_fronts)
+    for c in contacts:
+        coarse = c.state.checks.overlap > OVERLAP * c.state.travel or c.loaded_elements < FEW_ELEMENTS
+        found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * coarse
+    return int(found)
+
+
+def remark(flagged: int, contacts: Sequence[Contact]) -> str:
+    """What the reader should know about a valid result, always in the same words, so that remarks can be counted."""
+    unstable = [UNSTABLE] if min(c.state.checks.acoustic for c in contacts) <= 0 else []
+    return "; ".join([text for mask, text in REMARKS.items() if flagged & mask] + unstable)
