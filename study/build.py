@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING
 
 from study.exits import USAGE, StudyError
+from study.scene.grasp_warnings import station_warnings
 
 if TYPE_CHECKING:
     from fem.materials import Material
@@ -46,28 +49,62 @@ def build_object(shape: Shape) -> GapObject:
             return objects.Plane(shape.thickness)
 
 
-def check_mesh(scene: Scene) -> None:
-    """Refuse a mesh that is no sound surface, and stations beside it, before any work starts; other shapes pass.
+def shapes_of(scene: Scene) -> list[Shape]:
+    """The object at every point of the sweep, each once."""
+    swept = {key: values for key, values in scene.sweep.items() if key.startswith("object.")}
+    if not swept:
+        return [scene.object]
+    points = product(*swept.values())
+    return list(dict.fromkeys(scene.with_values(dict(zip(swept, p, strict=True))).object for p in points))
+
+
+def check_object(scene: Scene) -> None:
+    """Refuse geometry that cannot be, and stations beside a mesh, before any work starts.
+
+    Outlines and meshes are built to be judged, at the price of importing numpy, scipy and numba; of the other shapes
+    the scene itself has checked every number, and whatever passes there can be built.
 
     Raises
     ------
     StudyError
-        With the file and what is wrong with it.
+        With the key and what is wrong with it.
     """
-    if scene.object.shape != "mesh":
-        return
-    try:
-        bounds = build_object(scene.object).bounds
-    except ValueError as error:
-        raise StudyError(USAGE, f"object.mesh: {error}") from error
-    low, high = 1e3 * bounds[:, 2]
+    for shape in shapes_of(scene):
+        key = {"revolution": "object.profile_mm", "mesh": "object.mesh"}.get(shape.shape)
+        if key is None:
+            return
+        try:
+            build_object(shape)
+        except ValueError as error:
+            raise StudyError(USAGE, f"{key}: {error}") from error
+        if shape.shape == "mesh":
+            _check_stations(scene, shape)
+
+
+def _check_stations(scene: Scene, mesh: Shape) -> None:
+    low, high = axis_span(mesh) or (-math.inf, math.inf)
     beside = [s for s in scene.candidates.station_values_mm if not low <= s <= high]
     if beside:
         raise StudyError(
             USAGE,
             f"candidates: found stations off the object, {', '.join(f'{s:g}' for s in beside[:5])} mm; expected {low:g}"
-            f" to {high:g} mm, the mesh along its axis {scene.object.axis}; change the stations or object.unit",
+            f" to {high:g} mm, the mesh along its axis {mesh.axis}, counted from its lowest point; change the stations"
+            " or object.unit",
         )
+
+
+def axis_span(shape: Shape) -> tuple[float, float] | None:
+    """Where the object begins and ends along its axis [mm]; None where it has no end."""
+    if shape.shape != "mesh":
+        return shape.spans_mm.get("z")
+    low, high = 1e3 * build_object(shape).bounds[:, 2]
+    return float(low), float(high)
+
+
+def warnings(scene: Scene) -> tuple[str, ...]:
+    """Sentences about values that are allowed but seldom meant; builds the object if it is a mesh."""
+    edges = (station_warnings(shape, axis_span(shape), scene.candidates, scene.gripper) for shape in shapes_of(scene))
+    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()))
 
 
 def pad_material(gripper: Gripper) -> Material:

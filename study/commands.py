@@ -60,23 +60,37 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
 
 def check(options: Namespace) -> int:
     """Find every error of a scene, or say what would be run."""
-    from study.build import check_mesh
+    from study.build import check_object
     from study.overview import scene_text
 
     scene = _scene(options)
-    check_mesh(scene)
+    check_object(scene)
     print(scene_text(scene, options.scene))
     return DONE
 
 
 def plan(options: Namespace) -> int:
     """Say what a run will take."""
+    from study.build import warnings
     from study.plan import make_plan, plan_text
 
     scene = _scene(options)
-    path = Path(options.output or scene.output.file)
-    print(plan_text(make_plan(scene, options.scene, options.overrides), scene, path, options.ranks))
+    path = target(options, scene)
+    made = make_plan(scene, options.scene, options.overrides)
+    print("\n".join([plan_text(made, scene, path, options.ranks), *(f"warning: {text}" for text in warnings(scene))]))
     return DONE
+
+
+def target(options: Namespace, scene: Any) -> Path:
+    """The result file of a run; refuse names that no viewer of results would open."""
+    if options.output is None:
+        return Path(scene.output.file)
+    path = Path(options.output)
+    if path.suffix != ".hdf":
+        better = path / Path(scene.output.file).name if path.is_dir() else path.with_name(path.name + ".hdf")
+        text = f"-o: found '{path}', expected a file ending in .hdf, which all viewers open; write -o {better}"
+        raise StudyError(USAGE, text)
+    return path
 
 
 def status(options: Namespace) -> int:
@@ -149,26 +163,52 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from fem.petsc import unknown_options
-    from study import curvature, pipeline
-    from study.plan import make_plan
     from study.run import Work, on_rank0, run_study
+
+    def read() -> tuple[Any, Path]:
+        scene = _scene(options)
+        return scene, target(options, scene)
+
+    scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
+    from study import curvature, pipeline
     from study.status import summary
 
-    def prepare() -> tuple[Any, Any]:
-        scene = _scene(options)
-        if strange := unknown_options(dict(scene.petsc)):
-            text = f"petsc: no solver asks for the option{'s' * (len(strange) > 1)} {', '.join(strange)}"
-            raise StudyError(USAGE, f"{text}; correct the spelling, or remove what does not apply to this solver")
-        overrides = [*options.overrides, *petsc_overrides(options.petsc)]
-        return scene, make_plan(scene, options.scene, overrides)
-
-    scene, plan = on_rank0(comm, prepare)
+    plan = on_rank0(comm, _prepare, scene, options)
     work = Work(
         solve_unit=pipeline.solve_unit,
         image=pipeline.image,
         finalise=lambda writer: curvature.finalise(writer, scene),
         summary=summary,
     )
-    path = Path(options.output or scene.output.file)
     return run_study(plan, work, path, comm, retry_failed=options.retry_failed)
+
+
+def _prepare(scene: Any, options: Namespace) -> Any:
+    """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
+    from study.build import warnings
+    from study.plan import make_plan
+    from study.reach import check_poses
+
+    _check_petsc(dict(scene.petsc))
+    plan = make_plan(scene, options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
+    check_poses(scene, [unit.scene for unit in plan.units])
+    for text in warnings(scene):
+        print(f"warning: {text}", file=sys.stderr, flush=True)
+    return plan
+
+
+def _check_petsc(wanted: dict[str, Any]) -> None:
+    """Refuse PETSc options that no solver asks for, or that PETSc itself refuses."""
+    from fem.petsc import PETSc, unknown_options
+
+    try:
+        strange = unknown_options(wanted)
+    except PETSc.Error as error:
+        # the last line says what, the ones above it where in PETSc
+        reason = str(error).strip().splitlines()[-1].partition("] ")[2] or str(error)
+        given = " ".join(f"-{name} {value}" for name, value in wanted.items())
+        text = f"petsc: PETSc refuses the options {given}: {reason.strip()}; correct them or leave them out"
+        raise StudyError(USAGE, text) from error
+    if strange:
+        text = f"petsc: no solver asks for the option{'s' * (len(strange) > 1)} {', '.join(strange)}"
+        raise StudyError(USAGE, f"{text}; correct the spelling, or remove what does not apply to this solver")

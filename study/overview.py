@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from study.build import axis_span, warnings
+
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
@@ -19,7 +21,7 @@ def scene_text(scene: Any, file: str) -> str:
     mesh = " x ".join(map(str, g.elements))
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
     rows = {
-        "object": f"{o.shape}{name}",
+        "object": f"{o.shape}{name}{_extent(o)}",
         "candidates": where,
         "forces": _list(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; curved, flat and projected",
@@ -31,8 +33,19 @@ def scene_text(scene: Any, file: str) -> str:
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "results": scene.output.file,
     }
-    warnings = [f"warning: {text}" for text in scene.warnings]
-    return "\n".join([f"{file}: no errors", *aligned(rows), *warnings])
+    told = [f"warning: {text}" for text in warnings(scene)]
+    return "\n".join([f"{file}: no errors", *aligned(rows), *told])
+
+
+def _extent(shape: Any) -> str:
+    """Where the object begins and ends along its axis, and for a mesh what that is counted from."""
+    span = axis_span(shape)
+    if span is None:
+        return ", without end along its axis"
+    text = f", {span[0]:g} to {span[1]:g} mm along its axis"
+    if shape.shape != "mesh":
+        return text
+    return f"{text} (the file's {shape.axis}, counted from the mesh's lowest point; x and y from the middle)"
 
 
 def _list(values: Sequence[Any], unit: str = "") -> str:

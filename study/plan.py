@@ -41,10 +41,10 @@ class Plan:
 def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
     """The plan of a scene; builds its objects, so a mesh is read here."""
     from study import sweep
-    from study.build import check_mesh, pad_shape
+    from study.build import check_object, pad_shape
     from study.curvature import derived
 
-    check_mesh(scene)
+    check_object(scene)
     patches = scene.output.patches != "none"
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     header = Header(

@@ -9,7 +9,7 @@ from typing import Any
 from study.scene.errors import Finding, shown
 from study.scene.file_checks import output_file, petsc_options
 from study.scene.gripper_checks import pad_material, pad_mesh
-from study.scene.sections import Candidates, Load
+from study.scene.sections import Candidates, GraspPose, Gripper, Load
 from study.scene.shapes import Box, Plate, Revolution, Shape
 
 SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
@@ -126,6 +126,35 @@ def explicit_poses(candidates: Candidates) -> Iterator[Finding]:
             yield Finding((*here, "point_mm"), shown(list(pose.point_mm)), expected, "check the unit, which is mm")
 
 
+def poses_on_object(shape: Shape, candidates: Candidates, gripper: Gripper) -> Iterator[Finding]:
+    """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
+    spans = shape.spans_mm
+    for i, pose in enumerate(candidates.poses):
+        frame = pose_axes(pose)
+        if frame is None or len(spans) < 3 or max(map(abs, pose.point_mm)) > LARGEST_MM:
+            continue
+        for axis, size in zip(frame, (gripper.pad_length_mm, gripper.pad_width_mm), strict=True):
+            off = sum((p - sum(spans[k]) / 2) * a for p, k, a in zip(pose.point_mm, "xyz", axis, strict=True))
+            reach = sum((spans[k][1] - spans[k][0]) / 2 * abs(a) for k, a in zip("xyz", axis, strict=True)) + size / 2
+            if abs(off) > reach:
+                label = f" of '{pose.label}'" if pose.label else ""
+                found = f"a pad{label} that passes the object at a distance of {abs(off) - reach:.3g} mm"
+                remedy = "point_mm is in mm, in the frame in which the object's shape is given"
+                yield Finding(("candidates", "poses", i, "point_mm"), found, "a pad that meets it", remedy)
+                break
+
+
+def pose_axes(pose: GraspPose) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Unit vectors along the pad's length and width; None where approach and long side do not fix them."""
+    a, b = pose.approach, pose.long_side
+    width = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    length = (width[1] * a[2] - width[2] * a[1], width[2] * a[0] - width[0] * a[2], width[0] * a[1] - width[1] * a[0])
+    sizes = math.hypot(*length), math.hypot(*width)
+    if not all(1e-12 < s < 1e12 for s in sizes):
+        return None
+    return tuple(v / sizes[0] for v in length), tuple(v / sizes[1] for v in width)
+
+
 def forces(load: Load) -> Iterator[Finding]:
     """Every force once."""
     yield from _twice(("load", "normal_force_n"), load.normal_force_n)
@@ -134,7 +163,8 @@ def forces(load: Load) -> Iterator[Finding]:
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("object",), object_size), (("object",), profile), (("object",), box_edges), (("gripper", "effects"), pad_mesh),
     (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
-    (("candidates",), explicit_poses), (("load",), forces), (("output",), output_file), (("petsc",), petsc_options),
+    (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
+    (("output",), output_file), (("petsc",), petsc_options),
 )  # fmt: skip
 
 

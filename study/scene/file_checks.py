@@ -11,7 +11,6 @@ from study.scene.errors import Finding, shown
 from study.scene.sections import Output
 from study.scene.shapes import Mesh
 
-
 OTHERS = "others go into the environment variable PETSC_OPTIONS"
 
 
@@ -32,7 +31,8 @@ def petsc_options(table: Mapping[str, Any]) -> Iterator[Finding]:
         path, bare = ("petsc", key), re.sub(r"^-*(contact_)?", "", key)
         if not re.fullmatch(r"contact_[a-z0-9_]+", key):
             remedy = f"write `contact_{bare}` if the contact solver is meant; {OTHERS}"
-            yield Finding(path, f"the option {shown(key)}", "an option of the contact solver, contact_..., as softjaw takes no others", remedy)
+            expected = "an option of the contact solver, contact_..., as softjaw takes no others"
+            yield Finding(path, f"the option {shown(key)}", expected, remedy)
         elif bare.endswith("python_type"):
             yield Finding(path, "an option that runs Python code", "options of the solver itself", "remove it")
         elif not isinstance(value, str | int | float):

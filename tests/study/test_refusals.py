@@ -1,0 +1,164 @@
+"""What would fail every case is refused before anything is solved, and what is seldom meant gets a warning."""
+
+from __future__ import annotations
+
+import pytest
+
+from study.build import check_object, shapes_of, warnings
+from study.cli import main
+from study.commands import RANK
+from study.exits import StudyError
+from study.scene import SceneError, parse_scene
+from tests.study.launching import ROOT, launch
+
+LOAD = "\n[load]\nnormal_force_n = [1]\n"
+BOTTLE = '[object]\nshape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 29], [200, 20]]\n'
+CYLINDER = '[object]\nshape = "elliptic_cylinder"\nsemi_axis_a_mm = 20\nsemi_axis_b_mm = 30\nlength_mm = 200\n'
+BOX = '[object]\nshape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6\n'
+FLASK = f'[object]\nshape = "mesh"\nmesh = "{ROOT}/jobs/objects/flask.stl"\nunit = "mm"\n'
+BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n'
+SWINGING = "[[0, 30], [50, 30], [50, 10], [100, 10]]"
+
+
+@pytest.fixture(autouse=True)
+def _speak_on_every_rank(monkeypatch):
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
+
+
+def at(stations, body=BOTTLE, *overrides):
+    return parse_scene(f"{body}[candidates]\nstations_mm = {stations}\n{LOAD}", overrides=overrides)
+
+
+def pose(point, label="", approach="[1, 0, 0]"):
+    named = f'label = "{label}"\n' if label else ""
+    return f"[[candidates.poses]]\n{named}point_mm = {point}\napproach = {approach}\nlong_side = [0, 0, 1]\n"
+
+
+@pytest.mark.parametrize("command", ["check", "plan"])
+def test_an_outline_that_makes_no_body_is_refused(tmp_path, capsys, command):
+    scene = tmp_path / "scene.toml"
+    text = BOTTLE.replace("[[0, 30], [50, 30], [100, 29], [200, 20]]", SWINGING)
+    scene.write_text(f"{text}[candidates]\nstations_mm = [50]\n{LOAD}")
+    assert main([command, str(scene)]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("error: object.profile_mm: the profile")
+    assert told.err.count("\n") == 1
+
+
+def test_every_object_of_a_sweep_is_judged():
+    swept = at([60], FLASK, 'sweep.object.unit=["mm", "m"]', "sweep.friction.mu=[0.5, 0.8]")
+    assert [shape.unit for shape in shapes_of(swept)] == ["mm", "m"]
+    with pytest.raises(StudyError, match=r"object.mesh: .* an object of 120 m"):
+        check_object(swept)
+    check_object(at([60], FLASK))
+
+
+@pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
+def test_a_pad_that_passes_the_box_round_the_object_is_named_by_its_label(body):
+    with pytest.raises(SceneError) as refused:
+        parse_scene(body + pose([0, 0, 0], "near") + pose([0, 90, 0], "far") + LOAD)
+    (problem,) = refused.value.problems
+    assert problem.key == "candidates.poses[1].point_mm"
+    assert "'far'" in problem.found
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
+def test_a_pad_that_just_meets_the_box_round_the_object_is_not_refused(angle):
+    """A pad 22 mm wide reaches a face at 20 mm from 31 mm off the middle, and not from beyond that."""
+    approach = "[1, 0, 0]"
+    assert parse_scene(BOX + pose([angle, 30.9, 0], "", approach) + LOAD)
+    with pytest.raises(SceneError, match=r"distance of 0\.1 mm"):
+        parse_scene(BOX + pose([angle, 31.1, 0], "", approach) + LOAD)
+
+
+@pytest.mark.launches
+def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
+    """The ball's corner of its box: only trying tells that the pad passes."""
+
+    def run():
+        text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
+        (shared_path / "scene.toml").write_text(text)
+        return launch(2, "-m", "study", "run", shared_path / "scene.toml", "-o", shared_path / "out.hdf")
+
+    code, output, errors = once(run)
+    assert (code, output) == (2, "")
+    assert errors.count("error: ") == 1
+    assert errors.startswith("error: candidates.poses[1]: found 'far', where both fingers pass the object")
+    assert not list(shared_path.glob("out.hdf*"))
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
+def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
+    words = ("-o", shared_path / "out.hdf", "--", *options.split())
+    code, output, errors = once(lambda: launch(0, "-m", "study", "run", ROOT / "jobs" / "smoke.toml", *words))
+    assert (code, output) == (2, "")
+    assert errors.count("\n") == 1
+    assert errors.startswith(f"error: petsc: PETSc refuses the options {options}: ")
+    assert options.split()[1] in errors.partition(": PETSc")[2].partition(":")[2]
+    assert not list(shared_path.glob("out.hdf*"))
+
+
+@pytest.mark.launches
+def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
+    words = ("-X", "importtime", "-m", "study", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
+    code, _, errors = once(lambda: launch(0, *words))
+    assert code == 2
+    assert "error: " in errors
+    loaded = {line.rpartition("|")[2].strip() for line in errors.splitlines() if line.startswith("import time:")}
+    assert loaded.isdisjoint({"numba", "skfem", "fem.petsc", "study.pipeline"})
+
+
+@pytest.mark.parametrize("command", ["plan", "run"])
+def test_a_result_file_is_named_with_its_ending(tmp_path, capsys, command):
+    smoke = str(ROOT / "jobs" / "smoke.toml")
+    for name, better in (("noext", "noext.hdf"), ("a.h5", "a.h5.hdf"), (".", "smoke.hdf")):
+        assert main([command, smoke, "-o", str(tmp_path / name)]) == 2
+        errors = capsys.readouterr().err
+        assert f"write -o {tmp_path / better}" in errors
+        assert errors.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("body", "inside", "outside", "words"),
+    [
+        (BOTTLE, "[25, 175]", "[20, 100]", "0 to 200 mm"),
+        (CYLINDER, "[-75, 75]", "[0, 80]", "-100 to 100 mm: the cylinder is taken as infinite there"),
+        (BOX, "[-35, 35]", "[-40]", "-60 to 60 mm"),
+        (FLASK, "[25, 95]", "[10]", "0 to 120 mm"),
+    ],
+)
+def test_pads_that_leave_the_object_along_its_axis_get_a_warning(body, inside, outside, words):
+    assert warnings(at(inside, body)) == ()
+    (text,) = warnings(at(outside, body))
+    assert words in text
+    assert "50 mm along" in text
+    across = warnings(at(outside, body, "candidates.roll_deg=90"))
+    assert len(across) == (body == FLASK)  # 22 mm wide: 11 mm to each side
+    assert all("22 mm along" in text for text in across)
+
+
+def test_a_swept_pad_that_leaves_the_object_gets_a_warning():
+    assert warnings(at([0], CYLINDER, "sweep.object.length_mm=[40, 200]"))
+
+
+def test_stations_in_metres_get_a_warning():
+    (text, *_) = warnings(at([100], BOTTLE, "candidates.stations=7", "candidates.station_range_mm=[0.025, 0.175]"))
+    assert text == (
+        "candidates.station_range_mm: 0.15 mm between first and last station of an object of 200 mm; metres? "
+        "Then write 25 to 175"
+    )
+    assert not any("metres" in text for text in warnings(at([100, 101], BOTTLE)))
+    assert not any("metres" in text for text in warnings(at([0.1], BOTTLE)))
+
+
+def test_check_says_where_a_mesh_begins_and_ends(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f"{FLASK}[candidates]\nstations_mm = [10]\n{LOAD}")
+    assert main(["check", str(scene)]) == 0
+    text = capsys.readouterr().out
+    assert "0 to 120 mm along its axis (the file's z, counted from the mesh's lowest point" in text
+    assert "\nwarning: candidates: at 1 of 1 stations (10 mm) the pad" in text
