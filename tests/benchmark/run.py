@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # as study.commands.run does
 
 import argparse
 import shutil

@@ -360,14 +360,14 @@ def test_a_changed_material_takes_effect_although_its_callers_were_compiled_befo
     assert travel() < 0.7 * soft
 
 
-@pytest.mark.parametrize(("angle", "expected"), [(0, 0), (8, NOT_ANTIPODAL), (45, NOT_ANTIPODAL | SLIPS)])
+@pytest.mark.parametrize(("angle", "expected"), [(0, 0), (4, NOT_ANTIPODAL), (45, NOT_ANTIPODAL | SLIPS)])
 def test_contacts_beside_each_other_are_flagged_although_their_normals_are_parallel(angle, expected):
-    """Pads turned against a plate touch it along opposite edges: mu = 0.8 holds up to 38.7 degrees."""
+    """Pads turned against a plate touch it towards opposite edges; mu = 0.8 holds up to 38.7 degrees."""
     plate = 'shape = "plane"\nthickness_mm = 20'
     [(_, [case])] = solved(plate, angles=f"[{angle}]", forces="[5]", elements="[12, 8, 4]")
     assert case.values["maps/flags"] & (NOT_ANTIPODAL | SLIPS) == expected
     if angle:
-        assert case.values["maps/misalignment"] > np.radians(angle)
+        assert case.values["maps/misalignment"] > np.radians(5)
 
 
 def test_pads_that_would_run_into_each_other_are_flagged():
