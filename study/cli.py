@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import traceback
@@ -85,8 +86,8 @@ def _parser() -> argparse.ArgumentParser:
                  "softjaw report out.hdf -o out.html")  # fmt: skip
     for made in (status, show, report):
         made.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    show.add_argument("--force", type=float, metavar="N", help="normal force [N], nearest level (default: the highest)")
-    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0 for all (default 10)")
+    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N newton (default: the highest)")
+    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10; images share a line)")
     form = show.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
     form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
@@ -99,6 +100,12 @@ def _parser() -> argparse.ArgumentParser:
 def _positive(text: str) -> int:
     if (value := int(text)) < 1:
         raise argparse.ArgumentTypeError(f"found {text}, expected at least 1")
+    return value
+
+
+def _force(text: str) -> float:
+    if not 0 < (value := float(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"found {text}, expected a force > 0 in N")
     return value
 
 

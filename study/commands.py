@@ -110,7 +110,7 @@ def show(options: Namespace) -> int:
 
     form = {"json": as_json, "csv": as_csv, None: as_text}[options.form]
     with open_result(options.file) as result:
-        print(form(best(result, options.force, options.top)))
+        print(form(best(result, options.force, options.top, whole_lines=form is as_text)))
     return DONE
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,10 +26,16 @@ FLAGS = (  # as study.quantities defines them
     (1, "no torque", "a contact carries no torque about its normal"),
     (2, "no force", "a contact carries no force along one of its axes"),
     (8, "hole", "the centre of pressure lies over a hole of the patch"),
-    (4 + 16 + 32 + 64, "frame", "the contact frame came from a rule for degenerate patches"),
+    (4 + 16, "frame", "the contact frame came from a rule for degenerate patches"),
+    (32, "mixed", "normals of a patch point to opposite sides: its normal force and frame cannot be trusted"),
+    (64, "overhang", "some loaded faces of a patch are turned more than 90 deg from the contact normal"),
     (256, "approx.", "contacts more than 5 deg from antipodal, where the score's closed form is an approximation"),
     (512, "nodal", "solved with nodal gaps, because weighted ones had no solution"),
+    (1024, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"),
+    (2048, "overlap", "the fingers' pads run into each other beside the object"),
+    (4096, "coarse", "the mesh is coarse for this contact: take more elements before trusting the numbers"),
 )
+Columns = tuple[tuple[str, str], ...]  # names and units
 UNITS = {"quality": "", "e_n": "m", "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "e_n_error": ""}
 
 
@@ -37,12 +44,15 @@ class Table:
     """Grasps in the order of their quality: names and units of the columns, and the rows."""
 
     title: str
-    columns: tuple[tuple[str, str], ...]
+    columns: Columns
     rows: tuple[tuple[Any, ...], ...]
 
 
-def best(result: Any, force: float | None = None, top: int = 10) -> Table:
-    """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N], by default at the highest one."""
+def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
+    """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N], by default at the highest one.
+
+    With ``whole_lines`` images of one grasp, which share a line of `as_text`, count as one.
+    """
     forces = result.axes[-1].values
     k = len(forces) - 1 if force is None else int(np.abs(forces - force).argmin())
     planar = result.layout.planar
@@ -50,25 +60,39 @@ def best(result: Any, force: float | None = None, top: int = 10) -> Table:
     maps = {column: result.map(*column)[..., k].ravel() for column in columns}
     score = maps[columns[0]] if np.isfinite(maps[columns[0]]).any() else maps[columns[1]]
     done = np.flatnonzero(result.status[..., k].ravel() == DONE)
-    order = done[np.argsort(-np.nan_to_num(score[done], nan=-np.inf), kind="stable")][: top or None]
+    order = done[np.argsort(-np.nan_to_num(score[done], nan=-np.inf), kind="stable")]
     extra = [("e_n_error", "")] if result.layout.meshes > 1 else []
     error = result.map("e_n_error")[..., k].ravel() if extra else None
     flags = np.nan_to_num(result.map("flags")[..., k].ravel())
     labels = np.broadcast_to(result.labels, result.layout.shape[:-1]).ravel()
-    named = [] if result.axes[-3].units else [("label", "")]  # explicit poses are numbered and have names
-    rows = []
-    for rank, i in enumerate(order, start=1):
+    named = [("label", "")] if has_poses(result) else []
+    head = [(axis.name, axis.units) for axis in result.axes[:-1]]
+    quantities = [(name if model == "curved" else f"{name}_{model}", UNITS[name]) for name, model in columns]
+    titles = (("rank", ""), *head, *quantities, *extra, ("flags", ""), *named)
+
+    def row(rank: int, i: int) -> tuple[Any, ...]:
         index = np.unravel_index(i, result.layout.shape[:-1])
         place = [float(axis.values[j]) for axis, j in zip(result.axes[:-1], index, strict=True)]
         values = [float(column[i]) for column in maps.values()]
         errors = [] if error is None else [float(error[i])]
-        rows.append((rank, *place, *values, *errors, int(flags[i]), *([str(labels[i])] * len(named))))
-    head = [(axis.name, axis.units) for axis in result.axes[:-1]]
-    quantities = [(name if model == "curved" else f"{name}_{model}", UNITS[name]) for name, model in columns]
-    columns = (("rank", ""), *head, *quantities, *extra, ("flags", ""), *named)
+        return (rank, *place, *values, *errors, int(flags[i]), *([str(labels[i])] * len(named)))
+
+    rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     nearest = "" if force is None or np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
-    return Table(f"{what} at {forces[k]:g} N{nearest}", columns, tuple(rows))
+    return Table(f"{what} at {forces[k]:g} N{nearest}", titles, tuple(rows))
+
+
+def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
+    """The first ``top`` rows (0: all), or all rows of the first ``top`` lines if the columns of the text are given."""
+    taken: list[tuple[Any, ...]] = []
+    lines = 0
+    for row in rows:
+        lines += not (columns and taken and _alike(row, taken[-1], columns))
+        if top and lines > top:
+            break
+        taken.append(row)
+    return taken
 
 
 def as_text(table: Table) -> str:
@@ -76,27 +100,40 @@ def as_text(table: Table) -> str:
     if not table.rows:
         return table.title
     shown = [DISPLAY.get(units, (units, 1.0)) for _, units in table.columns]
-    names = [name for name, _ in table.columns]
+    names, flags = [name for name, _ in table.columns], 0
     head = [f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(names, shown, strict=True)]
     body: list[list[str]] = []
-    for row in table.rows:
-        cells = [_cell(v, factor) for v, (_, factor) in zip(row, shown, strict=True)]
-        cells[names.index("flags")] = _words(row[names.index("flags")])
-        if body and _without_place(cells, names) == _without_place(body[-1], names):
+    for before, row in zip((None, *table.rows), table.rows, strict=False):
+        cells = _cells(row, table.columns)
+        flags |= row[names.index("flags")]
+        if before is not None and _alike(row, before, table.columns):
             for name in ("rank", "angle"):
                 body[-1][names.index(name)] += f", {cells[names.index(name)]}"
         else:
             body.append(cells)
     widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [head, *body]]
-    legend = [
-        f"{word}: {meaning}" for _, word, meaning in FLAGS if any(word in row[-1 - ("label" in names)] for row in body)
-    ]
+    legend = [f"{word}: {meaning}" for mask, word, meaning in FLAGS if flags & mask]
     return "\n".join([table.title, *lines, *legend])
 
 
-def _without_place(cells: list[str], names: list[str]) -> list[str]:
-    return [cell for cell, name in zip(cells, names, strict=True) if name not in ("rank", "angle")]
+def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
+    """A row as people read it."""
+    factors = [DISPLAY.get(units, (units, 1.0))[1] for _, units in columns]
+    pairs = zip(row, factors, columns, strict=True)
+    return [_words(value) if name == "flags" else _cell(value, factor) for value, factor, (name, _) in pairs]
+
+
+def _alike(row: tuple[Any, ...], other: tuple[Any, ...], columns: Columns) -> bool:
+    """Whether two grasps differ in their angle only, as far as a line of text tells."""
+    kept = [i for i, (name, _) in enumerate(columns) if name not in ("rank", "angle")]
+    one, two = _cells(row, columns), _cells(other, columns)
+    return all(one[i] == two[i] for i in kept)
+
+
+def has_poses(result: Any) -> bool:
+    """Whether the candidates are explicit poses: those are numbered along the axis of stations, and have labels."""
+    return not result.axes[-3].units
 
 
 def _words(flags: int) -> str:
@@ -121,10 +158,14 @@ def as_csv(table: Table) -> str:
 
 
 def place(result: Any, row: int) -> str:
-    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``."""
+    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
     index = np.unravel_index(row, result.layout.shape)
     words = []
+    label = f'"{result.labels[index[-3:-1]]}"' if has_poses(result) else ""
     for axis, i in zip(result.axes, index, strict=True):
+        if label and axis.name in ("station", "angle"):
+            words += [label] * (axis.name == "station")
+            continue
         unit, factor = DISPLAY.get(axis.units, (axis.units, 1.0))
         words.append(f"{axis.name} {axis.values[i] * factor:.5g} {unit}".rstrip())
     return ", ".join(words)

@@ -27,7 +27,7 @@ def status_text(result: Any) -> str:
 
 def summary(result: Any) -> str:
     """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
-    table = [as_text(best(result))] if np.any(result.status == DONE) else []
+    table = [as_text(best(result, whole_lines=True))] if np.any(result.status == DONE) else []
     return "\n".join([counts(result), *reasons(result), *time_split(result), *table, f"results are in {result.path}"])
 
 

@@ -1,0 +1,98 @@
+"""Tables of the best grasps: flags in words, images on one line, explicit poses by their labels, forces that exist."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from friction.frame import FrameFlag
+from study import contact
+from study.cli import main
+from study.layout import DONE, FAILED
+from study.quantities import MAPS
+from study.reading import StoredAxis
+from study.show import FLAGS, as_csv, as_text, best, place
+from study.status import reasons
+
+FORCES = np.array([1.0, 5.0])
+
+
+def study(quality, flags=0.0, labels=None, status=DONE):
+    """Result with this quality ``(stations, angles)`` at both forces; with ``labels`` its candidates are poses."""
+    quality = np.asarray(quality, dtype=float)
+    stations, angles = quality.shape
+    shape = (stations, angles, len(FORCES))
+    maps = {"flags": np.broadcast_to(np.reshape(flags, (-1, 1, 1)), shape)}
+    axes = (
+        StoredAxis("station", np.arange(stations, dtype=float), "" if labels else "m", "station"),
+        StoredAxis("angle", np.arange(angles) * np.pi / 2, "rad", "angle"),
+        StoredAxis("normal_force", FORCES, "N", "force"),
+    )
+    return SimpleNamespace(
+        axes=axes,
+        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1),
+        status=np.full(shape, status),
+        messages=np.full(shape, "no contact at this force" if status == FAILED else ""),
+        labels=np.array(labels).reshape(-1, 1) if labels else np.full((stations, angles), ""),
+        map=lambda name, model=None: maps.get(name, np.repeat(quality[..., None], len(FORCES), axis=-1)),
+    )
+
+
+@pytest.mark.parametrize("top", [1, 2, 3, 0])
+def test_images_of_a_grasp_are_never_torn_apart_and_count_as_one(top):
+    pairs = study([[4, 4], [3, 3], [2, 1]])
+    lines = as_text(best(pairs, top=top, whole_lines=True)).splitlines()
+    assert lines[2].split()[:4] == ["1,", "2", "0", "0,"]
+    assert len(lines) == 2 + (top or 4)
+    assert ("3, 4" in lines[-1]) == (top == 2)
+    assert len(as_csv(best(pairs, top=top)).splitlines()) == 1 + (top or 6)
+
+
+def test_every_flag_has_a_word_of_its_own():
+    masks = [mask for mask, _, _ in FLAGS]
+    assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
+    defined = next(q for q in MAPS if q.name == "flags").definition
+    for bit in (1 << k for k in range(13) if k != 7):
+        assert f" {bit} " in defined
+        assert any(mask & bit for mask in masks)
+
+
+@pytest.mark.parametrize(
+    ("bit", "word"),
+    [
+        (4 * FrameFlag.CYCLE, "frame"),
+        (4 * FrameFlag.ORIENTATION, "mixed"),
+        (4 * FrameFlag.OVERHANG, "overhang"),
+        (contact.SLIPS, "slips"),
+        (contact.PADS_MEET, "overlap"),
+        (contact.COARSE, "coarse"),
+    ],
+)
+def test_flags_are_words_with_a_legend(bit, word):
+    text = as_text(best(study([[2.0], [1.0]], flags=[0.0, float(bit)])))
+    assert text.splitlines()[3].endswith(word)
+    assert text.splitlines()[4].startswith(f"{word}: ")
+    assert len(text.splitlines()) == 5
+
+
+def test_explicit_poses_are_listed_by_their_labels():
+    poses = study([[2.0], [1.0]], labels=["near", "far"], status=FAILED)
+    assert place(poses, 3) == '"far", normal_force 5 N'
+    assert reasons(poses) == [
+        '  failed 4 x no contact at this force ["near", normal_force 1 N; "near", normal_force 5 N; "far", '
+        "normal_force 1 N; ...]"
+    ]
+    assert place(study([[2.0], [1.0]]), 3) == "station 1000 mm, angle 0 deg, normal_force 5 N"
+
+
+@pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
+def test_a_force_that_is_none_is_bad_usage(force, capsys):
+    assert main(["show", "any.hdf", "--force", force]) == 2
+    assert "--force" in capsys.readouterr().err
+
+
+def test_a_force_between_the_levels_is_answered_with_the_nearest():
+    assert best(study([[1.0]]), force=400.0).title.endswith("at 5 N, the level nearest to 400 N")
+    assert best(study([[1.0]]), force=5.0).title.endswith("at 5 N")
