@@ -155,12 +155,14 @@ def _write_attribute(node: Any, key: str, value: Any) -> None:
 
 def verify(path: Path, layout: Layout, header: Header) -> None:
     """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
+    from study.scene.difference import differences
+
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:
         if result.digest != header.digest:
             text = (
-                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]});"
-                " choose another file with -o, or move this one away"
+                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]}:"
+                f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
             )
             raise StudyError(OTHER_FILE, text)
         if result.layout.shape != layout.shape or result.layout.options() != layout.options():

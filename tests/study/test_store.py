@@ -309,3 +309,25 @@ def test_a_run_that_was_overtaken_while_it_locked_withdraws(tmp_path):
     with pytest.raises(StudyError, match="second"):
         lock.confirm()
     lock.release()
+
+
+def test_the_keys_in_which_another_scene_differs_are_named(tmp_path):
+    path, layout = tmp_path / "out.hdf", small()
+    theirs = "[object]\nname = 'a'\nradius_mm = 30\n\n[friction]\nmu = 0.8\n"
+    create(path, layout, Header("one", theirs, "title", "a.toml"))
+
+    def said(scene):
+        with pytest.raises(StudyError) as refused:
+            verify(path, layout, Header("two", scene, "title", "b.toml"))
+        assert refused.value.code == OTHER_FILE
+        return refused.value.message
+
+    text = said(theirs.replace("0.8", "0.5").replace("'a'", "'b'") + "cor_grid = 3\n")
+    assert "friction.mu is 0.8 there and 0.5 here; friction.cor_grid is not set there and 3 here)" in text
+    assert "name" not in text
+    many = said("[gripper]\n" + "".join(f"k{i} = 1\n" for i in range(9)))
+    assert "gripper.k4" in many
+    assert "gripper.k5" not in many
+    assert "and 6 more keys" in many  # 9 here and 2 there, less the five that are named
+    assert "another mesh file" in said(theirs)
+    assert "cannot be read" in said("no toml")
