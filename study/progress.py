@@ -29,8 +29,13 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
 
 
+FEWEST, MOST_WAITED, SHORTEST = 5, 50, 3.0  # cases and seconds from the first case on, before a rest is foretold
+
+
 class Progress:
     """Prints how many cases are done and how long the rest will take, judged by the cost of the cases.
+
+    The clock for that starts when the first cases are done: until then a cold start has compiled, not solved.
 
     Parameters
     ----------
@@ -58,8 +63,9 @@ class Progress:
     ) -> None:
         self._weights, self._todo = weights, codes == MISSING
         self._stream, self._live, self._clock = stream, live, clock
-        self._start = self._looked = self._printed = clock()
+        self._looked = self._printed = clock()
         self._share = 0.0
+        self._first: tuple[float, int, float] | None = None  # when the first cases were done, how many, their weight
 
     def due(self) -> bool:
         """Whether it is time to look at the states again; cheap, to be asked often."""
@@ -80,14 +86,18 @@ class Progress:
         self._stream.flush()
 
     def line(self, codes: np.ndarray) -> str:
-        """Counts, seconds for each case and the expected rest."""
+        """Counts, and as soon as they mean something seconds for each case and the expected rest."""
         solved = self._todo & (codes != MISSING)
         done, failed = int(np.sum(codes == DONE)), int(np.sum(codes == FAILED))
         text = f"{done}/{codes.size} done" + (f", {failed} failed" if failed else "")
-        elapsed, gone = self._clock() - self._start, float(self._weights[solved].sum())
-        if gone > 0:
-            left = elapsed * float(self._weights[self._todo & ~solved].sum()) / gone
-            text += f", {elapsed / solved.sum():.3g} s/case, {duration(left)} left"
+        now, count, gone = self._clock(), int(solved.sum()), float(self._weights[solved].sum())
+        if self._first is None and count:
+            self._first = now, count, gone
+        since, cases, weight = (b - a for a, b in zip(self._first or (now, 0, 0.0), (now, count, gone), strict=True))
+        enough = min(max(FEWEST, 0.03 * int(self._todo.sum())), MOST_WAITED)
+        if cases >= enough and since >= SHORTEST and weight > 0:
+            left = since * float(self._weights[self._todo & ~solved].sum()) / weight
+            text += f", {since / cases:.3g} s/case, {duration(left)} left"
         return text
 
     def clear(self) -> None:
