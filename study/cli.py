@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from typing import IO, Any
 
 from study import commands
-from study.environment import pin_threads
+from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, MEANING, USAGE, StudyError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code is the same on every rank."""
     pin_threads()
+    keep_compiled_loops()
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)
     try:
@@ -86,8 +87,8 @@ def _parser() -> argparse.ArgumentParser:
                  "softjaw report out.hdf -o out.html")  # fmt: skip
     for made in (status, show, report):
         made.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N newton (default: the highest)")
-    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10; images share a line)")
+    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N [N] (default: the highest)")
+    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10)")
     form = show.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
     form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")

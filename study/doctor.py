@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.environment import THREADS, ask, mpirun
+from study.environment import THREADS, ask, compiled_loops_pass, mpirun
 from study.exits import CANNOT_WRITE, DONE, USAGE
 
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
@@ -174,7 +174,7 @@ def check_cache() -> Finding:
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     for folder in [Path(wanted)] if wanted else [Path(__file__).parent.parent / "fem", home]:
-        if can_write(folder):
+        if can_write(folder) and not compiled_loops_pass():
             return Finding(f"compiled loops are kept in {folder}")
     cure = "export NUMBA_CACHE_DIR=<a folder you may write to>"
     return Finding("compiled loops cannot be kept, every start compiles anew", cure, CANNOT_WRITE)

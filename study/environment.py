@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+ROOT = Path(__file__).parent.parent
+COMPILED = ("fem", "friction")  # packages with loops that numba compiles
+PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
 
 
@@ -20,6 +26,44 @@ def pin_threads() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, "1")
+
+
+def keep_compiled_loops() -> None:
+    """Let numba keep compiled loops in a private temporary folder when it could not write anywhere else.
+
+    Without any place to write it refuses to compile at all. Has to run before numba is imported. The folder is removed
+    at the end of the process, so every start compiles anew: what is loaded from it is code, which nobody else may have
+    put there.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR") or _writable(_user_cache()):
+        return
+    if all(_writable(ROOT / package / "__pycache__") for package in COMPILED):
+        return
+    folder = tempfile.mkdtemp(prefix=PASSING)
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+
+
+def compiled_loops_pass() -> bool:
+    """Whether compiled loops are kept in a folder that `keep_compiled_loops` made, and no longer than the process."""
+    return Path(os.environ.get("NUMBA_CACHE_DIR", "")).name.startswith(PASSING)
+
+
+def _user_cache() -> Path | None:
+    """Where numba keeps a user's compiled loops; None where the user has no home."""
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "numba"
+    except RuntimeError:
+        return None
+
+
+def _writable(folder: Path | None) -> bool:
+    """Whether files can be made in a folder, which itself may have to be made first; nothing is made here."""
+    if folder is None:
+        return False
+    # Path.exists would raise where a folder above may not be searched
+    standing = next((place for place in (folder, *folder.parents) if os.access(place, os.F_OK)), folder)
+    return os.access(standing, os.W_OK | os.X_OK) and standing.is_dir()
 
 
 def outside_mpi(environment: Mapping[str, str]) -> dict[str, str]:
@@ -86,7 +130,7 @@ def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Answ
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parent.parent,
+        cwd=ROOT,
     ) as process:
         try:
             output, errors = process.communicate(timeout=limit)
