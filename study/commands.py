@@ -193,7 +193,7 @@ def _prepare(scene: Any, options: Namespace) -> Any:
     plan = make_plan(scene, options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
     check_poses(scene, [unit.scene for unit in plan.units])
     for text in warnings(scene):
-        print(f"warning: {text}", file=sys.stderr, flush=True)
+        print(f"warning: {text}", flush=True)
     return plan
 
 

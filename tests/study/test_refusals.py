@@ -155,6 +155,24 @@ def test_stations_in_metres_get_a_warning():
     assert not any("metres" in text for text in warnings(at([0.1], BOTTLE)))
 
 
+@pytest.mark.launches
+def test_plan_and_run_warn_as_check_does(once, shared_path):
+    text = f"{BOX}[gripper]\nelements = [4, 4, 2]\n[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}"
+
+    def told():
+        scene = shared_path / "scene.toml"
+        scene.write_text(text)
+        commands = (("check", scene), ("plan", scene), ("run", scene, "-o", shared_path / "out.hdf"))
+        return [launch(0, "-m", "study", *words) for words in commands]
+
+    said = []
+    for code, output, errors in once(told):
+        assert (code, errors) == (0, "")
+        said.append([line for line in output.splitlines() if line.startswith("warning: ")])
+    assert len(said[0]) == 1
+    assert said[1:] == said[:1] * 2
+
+
 def test_check_says_where_a_mesh_begins_and_ends(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(f"{FLASK}[candidates]\nstations_mm = [10]\n{LOAD}")

@@ -421,6 +421,13 @@ def test_the_shipped_studies_have_the_sizes_they_promise():
     assert (ratios[0] / a, ratios[-1] / a) == (0.4, 2.5)
 
 
+def test_qualities_of_the_curvature_study_are_scaled_by_the_same_lengths_for_every_ratio():
+    scene = load_scene(ROOT / "jobs" / "fig4-curvature.toml")
+    points = [scene.with_values({"object.semi_axis_b_mm": b}) for b in scene.sweep["object.semi_axis_b_mm"]]
+    assert len({point.object.extent for point in points}) > 1  # what the default would take
+    assert {(point.score.object_length, point.score.contact_length) for point in points} == {(0.12, 0.05)}
+
+
 def test_the_digest_follows_results_only():
     digest = parse_scene(BALL).digest
     same = ["object.name=x", "output.file=x.hdf", "output.patches=none", "petsc.contact_snes_monitor=true"]
