@@ -235,8 +235,10 @@ class ResultWriter:
         if self._code[index] == DONE:
             raise ValueError(f"row {row} is done already and must not be written again")
         for column, dataset, value in zip(self.layout.columns, self._columns, values, strict=True):
-            if value.size:
-                dataset[row if column.flat else index] = value.astype(dataset.dtype)  # text: with its encoding
+            if column.dtype.kind == "S":
+                dataset[index] = value.astype(dataset.dtype)  # with its encoding
+            elif value.size:
+                _write_block(dataset, (row,) if column.flat else index, value)
         self._crc[index] = crc32(self.layout, values)
         self._code[index] = state
 
@@ -270,6 +272,14 @@ class ResultWriter:
     def close(self) -> None:
         """Close on all ranks."""
         self._file.close()
+
+
+def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarray) -> None:
+    """``dataset[index] = value`` for numbers, without what h5py spends on understanding the index."""
+    count = (1,) * len(index) + value.shape
+    place = dataset.id.get_space()
+    place.select_hyperslab(index + (0,) * value.ndim, count)
+    dataset.id.write(h5py.h5s.create_simple(count), place, np.ascontiguousarray(value).reshape(count))
 
 
 # --- reading, without MPI ------------------------------------------------------------------------------------------
