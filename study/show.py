@@ -22,6 +22,7 @@ COLUMNS = (
     ("f_y_max", "curved"),
     ("tau_z_max", "curved"),
 )
+LOST = 1024 | 2048  # flags of a grasp that does not hold as it was computed
 FLAGS = (  # as study.quantities defines them
     (1, "no torque", "a contact carries no torque about its normal"),
     (2, "no force", "a contact carries no force along one of its axes"),
@@ -48,6 +49,16 @@ class Table:
     rows: tuple[tuple[Any, ...], ...]
 
 
+def ranking(score: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """Positions from the best to the worst: by score, but grasps that slip or whose pads meet come last.
+
+    >>> ranking(np.array([1.0, 3.0, 2.0]), np.array([0, 1024, 0])).tolist()
+    [2, 0, 1]
+    """
+    lost = (np.nan_to_num(flags).astype(int) & LOST) > 0
+    return np.lexsort((-np.nan_to_num(score, nan=-np.inf), lost))
+
+
 def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
     """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N], by default at the highest one.
 
@@ -60,10 +71,10 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
     maps = {column: result.map(*column)[..., k].ravel() for column in columns}
     score = maps[columns[0]] if np.isfinite(maps[columns[0]]).any() else maps[columns[1]]
     done = np.flatnonzero(result.status[..., k].ravel() == DONE)
-    order = done[np.argsort(-np.nan_to_num(score[done], nan=-np.inf), kind="stable")]
     extra = [("e_n_error", "")] if result.layout.meshes > 1 else []
     error = result.map("e_n_error")[..., k].ravel() if extra else None
     flags = np.nan_to_num(result.map("flags")[..., k].ravel())
+    order = done[ranking(score[done], flags[done])]
     labels = np.broadcast_to(result.labels, result.layout.shape[:-1]).ravel()
     named = [("label", "")] if has_poses(result) else []
     head = [(axis.name, axis.units) for axis in result.axes[:-1]]

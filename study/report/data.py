@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from study.layout import DONE, FAILED, MISSING, ROOT
+from study.show import ranking
 
 SHOWN = {
     "m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "Pa": ("kPa", 1e-3), "m^2": ("mm²", 1e6), "N m": ("N mm", 1e3),
@@ -137,7 +138,8 @@ class Data:
         found = self.map(self.score)
         done = np.flatnonzero(self.status[..., k].ravel() == DONE)
         score = np.full(done.shape, -np.inf) if found is None else found[..., k].ravel()[done]
-        ranked = done[np.argsort(-np.nan_to_num(score, nan=-np.inf), kind="stable")]
+        flags = self.map("flags")
+        ranked = done[ranking(score, np.zeros(done.shape) if flags is None else flags[..., k].ravel()[done])]
         return [(*(int(i) for i in np.unravel_index(c, self.shape[:-1])), k) for c in ranked]
 
     @cached_property
