@@ -112,14 +112,14 @@ def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
 
 
 @pytest.mark.parametrize("command", ["plan", "run"])
-def test_a_result_file_is_named_with_its_ending(tmp_path, capsys, command):
+def test_a_result_file_is_named_with_its_ending(shared_path, capsys, command):
     smoke = str(ROOT / "jobs" / "smoke.toml")
     for name, better in (("noext", "noext.hdf"), ("a.h5", "a.h5.hdf"), (".", "smoke.hdf")):
-        assert main([command, smoke, "-o", str(tmp_path / name)]) == 2
+        assert main([command, smoke, "-o", str(shared_path / name)]) == 2
         errors = capsys.readouterr().err
-        assert f"write -o {tmp_path / better}" in errors
+        assert f"write -o {shared_path / better}" in errors
         assert errors.count("\n") == 1
-    assert not list(tmp_path.iterdir())
+    assert not list(shared_path.iterdir())
 
 
 @pytest.mark.parametrize(
