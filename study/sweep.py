@@ -107,8 +107,16 @@ def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
         for group in groups(places, axis_symmetry(here)):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))
             served, turns = tuple(places[n] for n, _ in group), tuple(turn for _, turn in group)
-            made.append(Unit(len(made), here, served[0], rows, served, turns, cost))
+            made.append(Unit(len(made), here, served[0], rows, served, turns, cost * narrowness(here, served[0])))
     return made
+
+
+def narrowness(scene: Scene, place: Candidate) -> float:
+    """How much narrower a bottle is at a place than at its widest: narrow places are pressed deeper, in more steps."""
+    if scene.object.shape != "revolution" or scene.candidates.poses:
+        return 1.0
+    z, r = np.transpose(scene.object.profile)
+    return float(r.max() / max(np.interp(place.station, z, r), 0.1 * r.max()))
 
 
 def ladder_cost(scene: Scene) -> float:
