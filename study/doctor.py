@@ -42,7 +42,7 @@ def check_python() -> Finding:
 
 def check_packages() -> Finding:
     """The packages that pip brings import."""
-    names = "numpy scipy skfem numba pydantic matplotlib"
+    names = "numpy scipy skfem numba clarabel pydantic matplotlib"
     answer = ask(f"import {names.replace(' ', ', ')}; print('scipy', scipy.__version__, 'numba', numba.__version__)")
     if answer.code != 0:
         return Finding(answer.trouble, "run 'make setup', or: .venv/bin/pip install -e .")

@@ -13,7 +13,7 @@ OWN = ("study", "fem", "friction", "lsfit", "scoring")
 NUMERICS = {"numpy", "scipy", "numba"}
 ALLOWED = {
     "friction": {"friction"} | NUMERICS,
-    "lsfit": {"lsfit"} | NUMERICS,
+    "lsfit": {"lsfit", "clarabel"} | NUMERICS,
     "scoring": {"scoring"} | NUMERICS,
     "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
     "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
