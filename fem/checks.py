@@ -47,7 +47,7 @@ def check(problem: ContactProblem, x: FloatArray, force: float, residual: float)
     """
     pad = problem.pad
     pressure, gap, points = problem.contact_state(x)
-    det, strain, acoustic = problem.strains(x, DIRECTIONS)
+    det, strain, acoustic = problem.foam.strains(x, DIRECTIONS)
     size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
     largest = max(float(pressure.max(initial=0.0)), 1e-300)
     left_over = np.abs(problem.residual(x)[: pad.travel_dof + 1]).max() / pad.share

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem import kernel
+from fem.foam import Foam, gather
 from fem.pad import Pad
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-SMALLEST_DET = 0.05  # a Newton step is shortened before an element is squeezed further than this
 
 
 @dataclass
@@ -69,6 +69,7 @@ class ContactProblem:
 
     def __init__(self, pad: Pad, gap: Gap) -> None:
         self.pad, self.gap, self.control, self.complementarity = pad, gap, Control(travel=0.0), False
+        self.foam = Foam(pad)
         self.size = pad.size
         self.kappa = pad.modulus_per_thickness
         self.area = pad.node_area
@@ -80,25 +81,20 @@ class ContactProblem:
 
     def _allocate(self) -> None:
         """Work arrays, so that nothing is allocated in an iteration."""
-        n, nodes = self.pad.element_nodes.shape
         m, face = self.pad.face_nodes.shape
-        self._r = np.empty((n, 3, nodes))
         self._weighted, self._force = np.empty((m, face)), np.empty((m, 3, face))
-        self._K = np.empty((n, 3, nodes, 3, nodes))
         self._K_uu = np.empty((m, 3, face, 3, face))
         self._K_ul = np.empty((m, face, 3, face))
-        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
+        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
 
     def _describe_entries(self) -> None:
         """Row and column of every entry that ``tangent`` returns, in its order."""
         pad = self.pad
-        element = pad.dofs[pad.element_nodes].transpose(0, 2, 1)  # (n, 3, nodes)
         face = pad.dofs[pad.face_nodes].transpose(0, 2, 1)
         pressure = pad.travel_dof + 1 + pad.pressure_index[pad.face_nodes]
         own = np.arange(pad.travel_dof, pad.size, dtype=np.int32)
-        rows, columns = [], []
+        rows, columns = [self.foam.rows], [self.foam.columns]
         for first, second in (
-            (element[:, :, :, None, None], element[:, None, None, :, :]),
             (face[:, :, :, None, None], face[:, None, None, :, :]),
             (face[:, None, :, :], pressure[:, :, None, None]),
             (pressure[:, :, None, None], face[:, None, :, :]),
@@ -110,10 +106,8 @@ class ContactProblem:
         self.rows, self.columns = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
         self._ends = np.cumsum([len(r) for r in rows])
         self._values = np.zeros(self.rows.size)
-        K, K_uu, *_ = self._parts()
-        self._K, self._K_uu = K.reshape(self._K.shape), K_uu.reshape(self._K_uu.shape)
-        self._element_dofs, self._face_dofs = element.ravel(), face.ravel()
-        self._travel_row = np.flatnonzero(self.rows[: self._ends[0]] == pad.travel_dof)
+        self._K_uu = self._parts()[1].reshape(self._K_uu.shape)
+        self._face_dofs = face.ravel()
         self._face_pressures = pad.pressure_index[pad.face_nodes]
 
     def _parts(self) -> list[FloatArray]:
@@ -126,9 +120,6 @@ class ContactProblem:
         lower[self._pressures] = 0.0
         return lower, np.full(self.size, np.inf)
 
-    def _element_displacements(self, x: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(self.pad.displacement(x)[self.pad.element_nodes].transpose(0, 2, 1))
-
     def _contact(self, x: FloatArray, tangent: bool) -> FloatArray:
         """Evaluate the contact face at ``x``; returns the weighted gap of every node of the front [m^3]."""
         pad = self.pad
@@ -140,7 +131,7 @@ class ContactProblem:
         kernel.contact(
             pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], self._gap,
             self._normal, hessian.reshape(*shape, 3, 3), self._weighted, self._force,
-            *((self._K_uu, self._K_ul) if tangent else self._none[1:]),
+            *((self._K_uu, self._K_ul) if tangent else self._none),
         )  # fmt: skip
         return np.bincount(self._face_pressures.ravel(), self._weighted.ravel(), len(self.area))
 
@@ -150,14 +141,11 @@ class ContactProblem:
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
         pad = self.pad
-        u = self._element_displacements(x)
-        smallest = kernel.elements(
-            pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._none[0]
-        )
+        R, smallest = self.foam.force(x)
         if not smallest > 0.0:
             return np.full(self.size, np.nan)
         weighted_gap = self._contact(x, tangent=False)
-        R = _gather(self._element_dofs, self._r, self.size) + _gather(self._face_dofs, self._force, self.size)
+        R += gather(self._face_dofs, self._force, self.size)
         if self.control.force is None:
             R[pad.travel_dof] = self.travel_stiffness * (x[pad.travel_dof] - self.control.travel)
         else:
@@ -171,10 +159,8 @@ class ContactProblem:
 
     def tangent(self, x: FloatArray) -> FloatArray:
         """Entries of the tangent in the order of ``rows`` and ``columns``."""
-        pad = self.pad
         elements, _, by_pressure, by_displacement, own = self._parts()
-        u = self._element_displacements(x)
-        kernel.elements(pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._K)
+        self.foam.stiffness(x, elements)
         weighted_gap = self._contact(x, tangent=True)
         by_pressure[:] = -self.kappa * self._K_ul.ravel()
         own[:] = 0.0
@@ -185,26 +171,17 @@ class ContactProblem:
             by_displacement[:] = (self.kappa * active[self._face_pressures][:, :, None, None] * self._K_ul).ravel()
             own[1:] = np.where(active, 0.0, self.kappa * self.area)
         if self.control.force is None:
-            elements[self._travel_row] = 0.0
+            elements[self.foam.travel_entries] = 0.0
             own[0] = self.travel_stiffness
         return self._values
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of travel and the squeezing of every element within reason."""
-        factor = min(1.0, self.travel_step / max(abs(step[self.pad.travel_dof]), 1e-300))
-        for _ in range(12):
-            smallest = kernel.smallest_det(self._element_displacements(x - factor * step), self.pad.dN)
-            if smallest > SMALLEST_DET:
-                break
-            factor *= 0.5
-        return factor
+        return self.foam.shorten(x, step, self.travel_step)
 
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
-        pad = self.pad
-        u = self._element_displacements(x)
-        kernel.elements(pad.material.number, pad.material.parameters, u, pad.dN, pad.volume, self._r, self._none[0])
-        return float(_gather(self._element_dofs, self._r, self.size)[pad.travel_dof]) / pad.share
+        return self.foam.sheet_force(x)
 
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
@@ -212,15 +189,3 @@ class ContactProblem:
         pressure = self.kappa * x[self._pressures]
         load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
         return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, self._gap, load)
-
-    def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
-        """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""
-        pad, u = self.pad, self._element_displacements(x)
-        law = pad.material
-        strain, acoustic = kernel.strain_measures(law.number, law.parameters, law.shear_modulus, u, pad.dN, directions)
-        return kernel.smallest_det(u, pad.dN), strain, acoustic
-
-
-def _gather(dofs: NDArray[np.int32], values: FloatArray, size: int) -> FloatArray:
-    """Sum element values into a vector; fixed unknowns (index -1) fall off the front."""
-    return np.bincount(dofs + 1, values.ravel(), size + 1)[1:]
