@@ -1,0 +1,138 @@
+"""Shell problems with published answers: meshes, supports, loads and the displacements that are read.
+
+Nonlinear: Sze, Liu and Lo, Finite Elements in Analysis and Design 40, 2004; linear: MacNeal and Harder, Finite Elements
+in Analysis and Design 1, 1985. Lengths, forces and moduli as printed there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fem.shell_mesh import patch
+from fem.shell_model import Shell
+
+UX, UY, UZ = np.eye(6)[:3]  # one displacement of a node
+
+
+@dataclass
+class Case:
+    """``probes`` are (name, node, component, sign)."""
+
+    shell: Shell
+    fixed: np.ndarray
+    load: np.ndarray
+    probes: list = field(default_factory=list)
+
+    def read(self, q):
+        return [sign * q.reshape(-1, 6)[node, component] for node, component, sign in self.probes]
+
+
+def case(X, normal, thickness, E, nu):
+    shell = Shell(patch(X, normal, thickness), E, nu)
+    return Case(shell, np.zeros((shell.nodes, 6), bool), np.zeros((shell.nodes, 6)))
+
+
+def symmetric(fixed, nodes, axis):
+    """Plane of symmetry at right angles to the axis."""
+    fixed[nodes, axis] = fixed[nodes, 3 + axis] = True
+
+
+def line_load(c, nodes, force):
+    """Force per length along a line of nodes."""
+    length = np.linalg.norm(np.diff(c.shell.mesh.X[nodes], axis=0), axis=1)
+    for i, part in enumerate(length):
+        c.load[nodes[i : i + 2]] += 0.5 * part * np.asarray(force)
+
+
+def numbers(rows, columns):
+    return np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+
+
+def cantilever(n=16):
+    x, y = np.meshgrid(np.linspace(0, 10, n + 1), [0.0, 1.0], indexing="ij")
+    c = case(np.stack([x, y, 0 * x], -1), [0, 0, 1.0], 0.1, 1.2e6, 0.0)
+    k = numbers(n, 1)
+    c.fixed[k[0]] = True
+    line_load(c, k[-1], 4 * UZ)
+    c.probes = [(k[-1, 0], 0, -1), (k[-1, 0], 2, 1)]
+    return c
+
+
+def annulus(around=80, across=10):
+    r, t = np.meshgrid(np.linspace(6, 10, across + 1), np.linspace(0, 2 * np.pi, around + 1), indexing="ij")
+    c = case(np.stack([r * np.cos(t), r * np.sin(t), 0 * r], -1), [0, 0, 1.0], 0.03, 21e6, 0.0)
+    k = numbers(across, around)
+    c.fixed[k[:, -1]] = True
+    line_load(c, k[:, 0], 0.8 * UZ)
+    c.probes = [(k[0, 0], 2, 1), (k[-1, 0], 2, 1)]
+    return c
+
+
+def hemisphere(n=16, P=400.0):
+    """Quarter with a hole of 18 degrees; half of each point load."""
+    t, s = np.meshgrid(np.linspace(0, np.pi / 2, n + 1), np.radians(np.linspace(0, 72, n + 1)), indexing="ij")
+    e = np.stack([np.cos(s) * np.cos(t), np.cos(s) * np.sin(t), np.sin(s)], -1)
+    c = case(10 * e, e, 0.04, 6.825e7, 0.3)
+    k = numbers(n, n)
+    symmetric(c.fixed, k[0], 1)
+    symmetric(c.fixed, k[-1], 0)
+    c.fixed[k[0, 0], 2] = True
+    c.load[k[0, 0]], c.load[k[-1, 0]] = -P / 2 * UX, P / 2 * UY
+    c.probes = [(k[-1, 0], 1, 1), (k[0, 0], 0, -1)]
+    return c
+
+
+def hinged_roof(thickness, n=16):
+    """Quarter of a shallow cylindrical roof on two hinged straight sides; a quarter of the load in the middle."""
+    t, y = np.meshgrid(np.linspace(0, 0.1, n + 1), np.linspace(0, 254, n + 1), indexing="ij")
+    e = np.stack([np.sin(t), 0 * t, np.cos(t)], -1)
+    X = 2540 * e
+    X[..., 1] = y
+    c = case(X, e, thickness, 3102.75, 0.3)
+    k = numbers(n, n)  # angle, then length
+    c.fixed[k[-1], :3] = True
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[:, 0], 1)
+    c.load[k[0, 0]] = -3000 / 4 * UZ
+    c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
+def cylinder(radius, length, thickness, angles, E, nu, n):
+    """Patch of a cylinder along y; numbers by angle from the vertical, then length."""
+    t, y = np.meshgrid(np.linspace(*angles, n + 1), np.linspace(0, length, n + 1), indexing="ij")
+    e = np.stack([np.sin(t), 0 * t, np.cos(t)], -1)
+    X = radius * e
+    X[..., 1] = y
+    c = case(X, e, thickness, E, nu)
+    return c, numbers(n, n)
+
+
+def scordelis_lo(n):
+    """Quarter of a roof under its weight of 90 per area, on rigid diaphragms; 0.3024 down at the middle of the side."""
+    c, k = cylinder(25.0, 25.0, 0.25, (0, np.radians(40)), 4.32e8, 0.0, n)
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[:, 0], 1)
+    c.fixed[np.ix_(k[:, -1], [0, 2, 3, 4, 5])] = True
+    c.load[:, 2] = -90 * c.shell.node_area
+    c.probes = [(k[-1, 0], 2, -1)]
+    return c
+
+
+def pinched_cylinder(n):
+    """Eighth of a cylinder with rigid diaphragms between two unit forces; 1.8248e-5 under the force."""
+    c, k = cylinder(300.0, 300.0, 3.0, (0, np.pi / 2), 3e6, 0.3, n)
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[-1], 2)
+    symmetric(c.fixed, k[:, 0], 1)
+    c.fixed[np.ix_(k[:, -1], [0, 2, 3, 4, 5])] = True
+    c.load[k[0, 0]] = -0.25 * UZ
+    c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
+def linear_hemisphere(n):
+    """0.0940 under forces of 2, of which the quarter carries half."""
+    return hemisphere(n, 2.0)
