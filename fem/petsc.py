@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from fem.errors import ConvergenceError
+from fem.pattern import Pattern, add_up
 
 FloatArray = NDArray[np.float64]
 
@@ -54,7 +54,11 @@ PRINTING = re.compile("monitor|view|converged_reason")
 
 
 class Problem(Protocol):
-    """What a nonlinear problem tells the solver."""
+    """What a nonlinear problem tells the solver.
+
+    A problem whose couplings change has an attribute ``pattern`` instead of ``rows`` and ``columns``; its ``tangent``
+    fills ``pattern.values``, after it has let the pattern grow where that is needed.
+    """
 
     size: int
     rows: NDArray[np.int32]
@@ -88,30 +92,6 @@ class Seconds:
         return self.total - self.assembly - self.factorisation
 
 
-@njit(cache=True)
-def _add_up(slots, values, out):
-    """Add every value into its slot of the compressed matrix."""
-    out[:] = 0.0
-    for k in range(slots.size):
-        if slots[k] >= 0:
-            out[slots[k]] += values[k]
-
-
-class _Pattern:
-    """Fixed compressed-row pattern of entries given as (row, column) pairs; negative indices are dropped."""
-
-    def __init__(self, size: int, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> None:
-        keep = (rows >= 0) & (columns >= 0)
-        diagonal = np.arange(size, dtype=np.int64) * (size + 1)  # stored zeros where nothing else is
-        keys = rows[keep].astype(np.int64) * size + columns[keep]
-        unique = np.unique(np.concatenate([keys, diagonal]))
-        self.slots = np.full(rows.size, -1, dtype=np.int32)
-        self.slots[keep] = np.searchsorted(unique, keys)
-        self.column = (unique % size).astype(np.int32)
-        self.start = np.searchsorted(unique // size, np.arange(size + 1)).astype(np.int32)
-        self.values = np.zeros(unique.size)
-
-
 def factorisation_seconds() -> float:
     """Seconds this process has spent so far in numeric and symbolic factorisation and triangular solves."""
     events = ("MatLUFactorSym", "MatLUFactorNum", "MatCholFctrSym", "MatCholFctrNum", "MatSolve")
@@ -137,7 +117,11 @@ class NonlinearSolver:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
         self.seconds = Seconds()
-        self._pattern = _Pattern(n, self.problem.rows, self.problem.columns)
+        self._pattern, self._slots = getattr(self.problem, "pattern", None), None
+        if self._pattern is None:
+            self._pattern = Pattern(n, self.problem.rows, self.problem.columns)
+            self._slots = self._pattern.slots(self.problem.rows, self.problem.columns)
+        self._stored = self._pattern.start
         self._matrix = PETSc.Mat().createAIJ(
             (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
         )
@@ -225,11 +209,22 @@ class NonlinearSolver:
 
     def _on_tangent(self, _snes, x, matrix, _preconditioner) -> None:
         def fill() -> None:
-            _add_up(self._pattern.slots, self.problem.tangent(x.array_r), self._pattern.values)
+            values = self.problem.tangent(x.array_r)
+            if self._slots is not None:
+                self._pattern.values[:] = 0.0
+                add_up(self._slots, values, self._pattern.values)
+            if self._pattern.start is not self._stored:
+                self._grow()
             matrix.setValuesCSR(self._pattern.start, self._pattern.column, self._pattern.values)
             matrix.assemble()
 
         self._timed(fill)
+
+    def _grow(self) -> None:
+        """Give the matrix the pattern's new rows; its factors are analysed anew."""
+        self._stored = self._pattern.start
+        self._matrix.setPreallocationCSR((self._pattern.start, self._pattern.column, self._pattern.values))
+        self._snes.getKSP().getPC().reset()
 
     def _on_step(self, x, y) -> bool:
         factor = self.problem.shorten(x.array_r, y.array_r)

@@ -1,0 +1,68 @@
+"""Compressed rows of a sparse matrix whose pattern may grow, and where entries lie in it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+class Pattern:
+    """Entries of a square matrix in compressed rows; the diagonal is always stored.
+
+    Parameters
+    ----------
+    size : int
+        Rows of the matrix.
+    rows, columns : (k,) arrays
+        Places of entries, in any order and with repeats; negative indices are left out.
+
+    Attributes
+    ----------
+    start, column, values : arrays
+        The compressed rows. `grow` replaces them by new arrays.
+    """
+
+    def __init__(self, size: int, rows: IntArray, columns: IntArray) -> None:
+        self.size = size
+        diagonal = np.arange(size, dtype=np.int64) * (size + 1)
+        self._set(np.unique(np.concatenate([self._keys(rows, columns), diagonal])))
+
+    def slots(self, rows: IntArray, columns: IntArray) -> IntArray:
+        """Index into ``values`` of every entry, -1 for negative rows or columns; all must be in the pattern."""
+        keep = (rows >= 0) & (columns >= 0)
+        found = np.full(len(rows), -1, dtype=np.int32)
+        found[keep] = np.searchsorted(self.keys, rows[keep].astype(np.int64) * self.size + columns[keep])
+        return found
+
+    def grow(self, rows: IntArray, columns: IntArray) -> IntArray | None:
+        """Store these entries too; returns where each old entry has moved to, or None if nothing was new."""
+        wanted = np.unique(self._keys(rows, columns))
+        place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+        new = wanted[self.keys[place] != wanted]
+        if not len(new):
+            return None
+        old = self.keys
+        self._set(np.sort(np.concatenate([old, new]), kind="stable"))
+        return np.searchsorted(self.keys, old).astype(np.int32)
+
+    def _keys(self, rows: IntArray, columns: IntArray) -> NDArray[np.int64]:
+        keep = (rows >= 0) & (columns >= 0)
+        return rows[keep].astype(np.int64) * self.size + columns[keep]
+
+    def _set(self, keys: NDArray[np.int64]) -> None:
+        self.keys = keys
+        self.column = (keys % self.size).astype(np.int32)
+        self.start = np.searchsorted(keys, np.arange(self.size + 1) * np.int64(self.size)).astype(np.int32)
+        self.values = np.zeros(len(keys))
+
+
+@njit(cache=True)
+def add_up(slots, values, out):
+    """Add every value to its slot of the compressed rows."""
+    for k in range(slots.size):
+        if slots[k] >= 0:
+            out[slots[k]] += values[k]
