@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from friction.kernel import friction_sums
 from friction.patch import ContactPatch, FloatArray, NoContactError
-from friction.wrench import Model, friction_support, friction_wrench
+from friction.wrench import Model, checked_mu, model_faces
 
 MAX_CUTS = 2000
 
@@ -34,15 +35,20 @@ def pure_torque(patch: ContactPatch, mu: float, model: Model = "curved", toleran
     float
         Torque [N m].
     """
-    v, best, limit = np.zeros(2), np.inf, 0.0
-    P = np.eye(2) * _radius(patch) ** 2
+    mu = checked_mu(mu)
+    arm, normal, load = model_faces(patch, model)
+    size = 2.0 ** np.frexp(np.abs(arm).max())[1]  # lengths are divided by a power of two, which rounds nothing
+    arm, radius = arm / size, _radius(patch) / size
+    twist, sums = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]), np.empty((1, 7))
+    v, P, best, limit = np.zeros(2), np.eye(2) * radius**2, np.inf, 0.0
     for cut in range(MAX_CUTS):
-        twist = np.array([[*v, 1.0]])
-        T, g = friction_support(patch, twist, 1.0, model)[0], friction_wrench(patch, twist, 1.0, model)[0, :2]
+        twist[0, :2] = v
+        friction_sums(arm, normal, load, twist, sums)
+        T, g = sums[0, 6], sums[0, :2]
         best, limit = min(best, T), limit if cut else tolerance * T
         width = np.sqrt(max(g @ P @ g, 0.0))
         if T - width >= best - limit:
-            return float(mu * best)
+            return float(mu * size * best)
         v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
     raise ArithmeticError(f"pure torque not found to {tolerance:g} after {MAX_CUTS} cuts: ask for a larger tolerance")
 

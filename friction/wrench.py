@@ -105,7 +105,7 @@ def friction_wrench(
     >>> friction_wrench(patch, TURN_Z, mu=0.5).round(12)[0, 5]
     0.1
     """
-    return _mu(mu) * _sums(patch, twist, model, unrolled)[0][:, :6]
+    return checked_mu(mu) * _sums(patch, twist, model, unrolled)[0][:, :6]
 
 
 def friction_support(
@@ -117,7 +117,7 @@ def friction_support(
     and torque (principle of maximum dissipation), so those need no search. Parameters as in `friction_wrench`.
     """
     sums, scale = _sums(patch, twist, model, unrolled)
-    return _mu(mu) * scale * sums[:, 6]
+    return checked_mu(mu) * scale * sums[:, 6]
 
 
 def friction_limits(
@@ -127,11 +127,39 @@ def friction_limits(
     f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model, unrolled).tolist()
     faces = patch.loaded
     S, F_N = float(faces.load.sum()), float((faces.load * faces.normal[:, 2]).sum())
-    mu = _mu(mu)
+    mu = checked_mu(mu)
     return FrictionLimits(mu * f_x, mu * f_y, mu * tau_z, S, F_N, tau_z / S)
 
 
-def _mu(mu: float) -> float:
+def model_faces(
+    patch: ContactPatch, model: Model, unrolled: ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Arms ``(3, n)``, unit normals ``(3, n)`` and loads ``(n,)`` of the loaded faces, as the model sees them.
+
+    Parameters as in `friction_wrench`; faces that carry no force are left out.
+    """
+    if model not in MODELS:
+        raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
+    keep = patch.load > 0
+    arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
+    if model == "curved":
+        return arm, normal, load
+    if model == "projected":
+        load = load * np.abs(normal[2])
+    if model == "unrolled":
+        arc = np.asarray(unrolled, float)
+        if arc.shape != (len(keep), 2) or not np.isfinite(arc).all():
+            raise ValueError(
+                f"unrolled must hold finite arc lengths of shape {(len(keep), 2)}, found shape {arc.shape}"
+            )
+        arm[:2] = arc[keep].T
+    arm[2] = 0.0
+    normal[:] = np.array([[0.0], [0.0], [1.0]])
+    return arm, normal, load
+
+
+def checked_mu(mu: float) -> float:
+    """Friction coefficient, refused if it is negative or not finite."""
     if not 0 <= mu < math.inf:
         raise ValueError(f"mu is {mu}: the friction coefficient must be finite and not negative")
     return float(mu)
@@ -141,7 +169,7 @@ def _sums(
     patch: ContactPatch, twist: ArrayLike, model: Model, unrolled: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
     """Kernel sums ``(m, 7)`` for motions scaled by ``1 / scale``, and ``scale (m,)``."""
-    arm, normal, load = _elements(patch, model, unrolled)
+    arm, normal, load = model_faces(patch, model, unrolled)
     t = _six(twist)
     # Powers of two: they keep the squares of tiny and huge velocities in range and round nothing.
     reach = np.abs(arm).max()
@@ -166,27 +194,3 @@ def _six(twist: ArrayLike) -> FloatArray:
     six = np.zeros((len(t), 6))
     six[:, [0, 1, 5]] = t
     return six
-
-
-def _elements(
-    patch: ContactPatch, model: Model, unrolled: ArrayLike | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Arms ``(3, n)``, normals ``(3, n)`` and loads ``(n,)`` of the loaded faces as the model sees them."""
-    if model not in MODELS:
-        raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
-    keep = patch.load > 0
-    arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
-    if model == "curved":
-        return arm, normal, load
-    if model == "projected":
-        load = load * np.abs(normal[2])
-    if model == "unrolled":
-        arc = np.asarray(unrolled, float)
-        if arc.shape != (len(keep), 2) or not np.isfinite(arc).all():
-            raise ValueError(
-                f"unrolled must hold finite arc lengths of shape {(len(keep), 2)}, found shape {arc.shape}"
-            )
-        arm[:2] = arc[keep].T
-    arm[2] = 0.0
-    normal[:] = np.array([[0.0], [0.0], [1.0]])
-    return arm, normal, load

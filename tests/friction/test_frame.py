@@ -97,19 +97,29 @@ def test_a_cycle_between_faces_ends_with_their_mean_normal():
 
 
 def test_random_bumps_always_give_a_frame():
-    """The iteration ends for every mesh, and its origin lies on the line of pressure."""
-    for seed in range(60):
+    """300 meshes: nearly all settle at once, a few per cent alternate between faces, and none ends without a frame.
+
+    An independent implementation had 232 of its 300 meshes settled after two passes, and 13 that alternated.
+    """
+    passes, cycles = [], 0
+    for seed in range(300):
         draw = lcg(seed)
         height = np.array([[0.3 * next(draw) for _ in range(7)] for _ in range(7)])
+        pressure = np.array([next(draw) for _ in range(36)])
         corners = grid_mesh(6, 6, 1, 1)
-        corners[..., 2] = height[
-            np.rint((corners[..., 0] + 1) * 3).astype(int), np.rint((corners[..., 1] + 1) * 3).astype(int)
-        ]
-        frame = contact_frame(mesh_patch(corners), X)
+        i, j = np.moveaxis(np.rint((corners[..., :2] + 1) * 3).astype(int), -1, 0)
+        corners[..., 2] = height[i, j]
+        patch = mesh_patch(corners, lambda r, pressure=pressure: pressure)
+        frame = contact_frame(patch, X)
         arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
         np.testing.assert_allclose(frame.axes @ frame.axes.T, np.eye(3), atol=1e-14)
         assert np.abs(arm[:2]).max() < 1e-12
-        assert frame.iterations < 10
+        assert not frame.flag & ~FrameFlag.CYCLE
+        passes.append(frame.iterations)
+        cycles += bool(frame.flag & FrameFlag.CYCLE)
+    assert max(passes) <= 5
+    assert np.mean(np.array(passes) <= 2) > 0.75
+    assert 5 <= cycles <= 20
 
 
 def test_flipped_normals_are_found_with_and_without_corners():

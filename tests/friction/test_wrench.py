@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from friction.kernel import friction_sums, friction_sums_reference
-from friction.motion import SLIDE_X, SLIDE_Y, TURN_Z, cor_grid, cor_twists, fibonacci_twists, screw_twist
+from friction.motion import SLIDE_X, SLIDE_Y, cor_grid, cor_twists, fibonacci_twists, screw_twist
 from friction.patch import ContactPatch, moved
-from friction.torque import pure_torque
 from friction.wrench import FrictionLimits, friction_limits, friction_support, friction_wrench
-from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
+from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch
 
 SEEDS = range(1, 21)
 
@@ -33,15 +31,6 @@ def test_the_compiled_kernel_is_the_textbook_formula(seed):
     out = np.empty((len(twist), 7))
     friction_sums(*columns, twist, out)
     np.testing.assert_allclose(out, friction_sums_reference(*columns, twist), rtol=0, atol=1e-12 * patch.load.sum())
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_projected_is_inside_curved_is_inside_flat(seed):
-    """Face by face: the shadow of a tilted friction disc is an ellipse with semi-axes 1 and n_z."""
-    patch, twist = lcg_patch(seed, 60), fibonacci_twists(200, rho=2.0)
-    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("projected", "curved", "flat"))
-    assert (projected < curved).all()
-    assert (curved < flat).all()
 
 
 @pytest.mark.parametrize("model", ["curved", "flat", "projected"])
@@ -187,35 +176,6 @@ def test_screws_about_a_shifted_axis_are_centres_of_rotation():
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
         call(lcg_patch(1, 10))
-
-
-def test_pure_torque_is_smaller_where_one_support_carries_most():
-    """Loads 1:1:8 at an equilateral triangle: the median is the heavy support, 2 sqrt(3) is left of the torque."""
-    r = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]
-    patch = points_patch(r, [1.0, 1.0, 8.0])
-    assert pure_torque(patch, 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
-    cop = patch.load @ patch.centroid / 10
-    centred = moved(patch, np.eye(3), -cop)
-    assert pure_torque(centred, 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
-    assert friction_limits(centred, 0.5).tau_z > 1.5 * pure_torque(centred, 0.5)
-
-
-@pytest.mark.parametrize("seed", range(1, 6))
-def test_at_pure_torque_the_net_force_vanishes(seed):
-    """Smooth case: minimise over the velocity with another method, where the gradient (f_x, f_y) must be zero."""
-    patch = lcg_patch(seed, 30)
-
-    def torque(v):
-        twist = [[*v, 1.0]]
-        return friction_support(patch, twist, 1.0)[0], friction_wrench(patch, twist, 1.0)[0, :2]
-
-    found = minimize(torque, [0.0, 0.0], jac=True, method="BFGS", options={"gtol": 1e-12})
-    assert pure_torque(patch, 1.0) == pytest.approx(found.fun, rel=2e-9)
-
-
-@pytest.mark.parametrize("patch", [rect_grid(2, 1, 8, 4), cylinder_grid(1, 1, 2, 8, 8), points_patch([[0, 0]], [1])])
-def test_pure_torque_of_a_symmetric_patch_is_its_torque(patch):
-    assert pure_torque(patch, 1.0) == pytest.approx(friction_support(patch, TURN_Z, 1.0)[0], rel=1e-9, abs=1e-15)
 
 
 @pytest.mark.long

@@ -1,0 +1,191 @@
+"""Friction limits of patches with a closed form, for mu = 1, and the meshes that approach them.
+
+Sources: integrals of ``p |P v|`` over the surface, for ``v = x, y`` (forces) and ``v = z x r`` (torque). On a cylinder
+and a cap the speeds are ``sqrt(sin^2 + cos^2 (..))``, whence the elliptic integrals.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy import cos, pi, sin
+from scipy.integrate import quad
+from scipy.special import beta, ellipe, ellipeinc
+
+from friction.patch import ContactPatch
+from tests.generators import (
+    PRESSURES,
+    arc_lengths,
+    cap_polar,
+    cylinder_grid,
+    disc_polar,
+    ellcyl_grid,
+    points_patch,
+    rect_grid,
+    wedge,
+)
+
+ALPHA = pi / 3
+
+
+@dataclass(frozen=True)
+class Form:
+    """Exact values, and the patch with ``n`` faces per side that approaches them with ``order``."""
+
+    patch: Callable[[int], ContactPatch]
+    S: float
+    F_N: float
+    f_x: float
+    f_y: float
+    tau_z: float
+    order: float = 2.0
+    model: str = "curved"
+    arcs: Callable[[int], np.ndarray] | None = None
+
+
+def mean_distance(a: float, b: float) -> float:
+    """Mean distance of the points of a rectangle from its centre."""
+    A, B = a / 2, b / 2
+    return math.hypot(A, B) / 3 + A**2 / (6 * B) * math.asinh(B / A) + B**2 / (6 * A) * math.asinh(A / B)
+
+
+def strip(A: float, B: float, h: float) -> float:
+    """Integral of ``sqrt(A^2 + B^2 x^2)`` over ``0 < x < h``."""
+    return 0.5 * (h * math.hypot(A, B * h) + (A**2 / B * math.asinh(B * h / A) if A > 0 else 0))
+
+
+def integral(f: Callable[[float], float], upper: float) -> float:
+    return quad(f, 0, upper, epsabs=1e-14, epsrel=1e-13)[0]
+
+
+def cylinder_torque(a: float, b: float, tm: float, L: float, flat: bool = False) -> float:
+    """Cylinder along x, semi-axes ``a`` along z and ``b`` along y, up to the parameter ``tm`` on both sides."""
+
+    def across(t: float) -> float:
+        G = math.hypot(b * cos(t), a * sin(t))
+        return G * 2 * strip(b * sin(t), 1.0 if flat else b * cos(t) / G, L / 2)
+
+    return 2 * integral(across, tm)
+
+
+def cap(p: Callable[[float], float], kind: str | None = None, alpha: float = ALPHA, **field: float) -> Form:
+    """Unit spherical cap with the half angle ``alpha`` and the pressure ``p(t)`` at the polar angle ``t``."""
+    S = 2 * pi * integral(lambda t: p(t) * sin(t), alpha)
+    F_N = 2 * pi * integral(lambda t: p(t) * sin(t) * cos(t), alpha)
+    f = 4 * integral(lambda t: p(t) * sin(t) * ellipe(sin(t) ** 2), alpha)
+    tau = 2 * pi * integral(lambda t: p(t) * sin(t) ** 2, alpha)
+    return Form(lambda n: pressed(cap_polar(1, alpha, n, 4 * n), kind or "uniform", **field), S, F_N, f, f, tau)
+
+
+def pressed(patch: ContactPatch, kind: str, **field: float) -> ContactPatch:
+    return replace(patch, pressure=PRESSURES[kind](patch.centroid, **field))
+
+
+def disc(a: float, b: float, kind: str, share: float, arm: float, order: float = 2.0) -> Form:
+    """Plane ellipse; ``share``: S over its area, ``arm``: torque of the unit disc over S."""
+    S = share * pi * a * b
+    field = {} if kind == "uniform" else {"a": a, "b": b}
+    tau = S * arm * 2 * a / pi * ellipe(1 - (b / a) ** 2)
+    return Form(lambda n: pressed(disc_polar(a, n, 2 * n, b), kind, **field), S, S, S, S, tau, order)
+
+
+def power_disc(k: float, order: float) -> Form:
+    """Unit disc with ``p = (1 - r^k)^(1/k)``: a cone for k = 1, Hertz for k = 2, a flat top with steep sides above."""
+    S, tau = (2 * pi / k * beta(i / k, 1 / k + 1) for i in (2, 3))
+
+    def patch(n: int) -> ContactPatch:
+        grid = disc_polar(1, n, 2 * n)
+        r = np.linalg.norm(grid.centroid, axis=1)
+        return replace(grid, pressure=(1 - r**k) ** (1 / k))
+
+    return Form(patch, S, S, S, S, tau, order)
+
+
+def rectangle(a: float, b: float) -> Form:
+    return Form(lambda n: rect_grid(a, b, n, n), a * b, a * b, a * b, a * b, a * b * mean_distance(a, b))
+
+
+def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
+    """Unit cylinder along x; the unrolled arms make it the rectangle of its surface."""
+    args = {"R": 1.0, "alpha": alpha, "L": L}
+    S, F_N = 2 * alpha * L, 2 * sin(alpha) * L
+    curved = model == "curved"
+    tau = S * mean_distance(L, 2 * alpha) if model == "unrolled" else cylinder_torque(1, 1, alpha, L, not curved)
+
+    def arcs(n: int) -> np.ndarray:
+        return arc_lengths("cylinder_grid", {**args, "nphi": n, "nx": n})
+
+    patch = lambda n: cylinder_grid(**args, nphi=n, nx=n)  # noqa: E731
+    return Form(patch, S, F_N, S, F_N if curved else S, tau, 2.0, model, arcs if model == "unrolled" else None)
+
+
+def elliptic_cylinder(model: str, a: float = 2.0, b: float = 1.0, tm: float = 1.0, L: float = 2.0) -> Form:
+    S, F_N = 2 * L * b * ellipeinc(tm, 1 - (a / b) ** 2), 2 * L * b * sin(tm)
+    curved = model == "curved"
+    tau = cylinder_torque(a, b, tm, L, not curved)
+    return Form(lambda n: ellcyl_grid(a, b, tm, L, n, n), S, F_N, S, F_N if curved else S, tau, 2.0, model)
+
+
+def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
+    """Two rectangles that meet in a ridge along x."""
+    S, c = 2 * W * L, cos(tilt)
+    tau = {"curved": c * mean_distance(L, 2 * W), "flat": mean_distance(L, 2 * W * c)}[model] * S
+    return Form(lambda n: wedge(tilt, W, L, n, 2 * n), S, c * S, S, c * S if model == "curved" else S, tau, 2.0, model)
+
+
+def flat_cap(model: str, alpha: float = ALPHA) -> Form:
+    """Planar models of the uniform cap: flat has the curved model's torque, unrolled longer arms."""
+    S = 2 * pi * (1 - cos(alpha))
+    tau = pi * (alpha - sin(alpha) * cos(alpha)) if model == "flat" else 2 * pi * (sin(alpha) - alpha * cos(alpha))
+    F_N = pi * sin(alpha) ** 2
+
+    def arcs(n: int) -> np.ndarray:
+        return arc_lengths("cap_polar", {"R": 1, "alpha": alpha, "nth": n, "nphi": 4 * n})
+
+    patch = lambda n: cap_polar(1, alpha, n, 4 * n)  # noqa: E731
+    return Form(patch, S, F_N, S, S, tau, 2.0, model, arcs if model == "unrolled" else None)
+
+
+def ring(R: float) -> Form:
+    def patch(n: int) -> ContactPatch:
+        phi = 2 * pi * np.arange(n) / n
+        return points_patch(R * np.column_stack([cos(phi), sin(phi)]), np.full(n, 2 * pi * R / n))
+
+    F = 2 * pi * R
+    return Form(patch, F, F, F, F, F * R)
+
+
+DEPTH = 1 - cos(ALPHA)
+FORMS = {
+    "rectangle": rectangle(2, 1),
+    "square": rectangle(1, 1),
+    "uniform disc": disc(1, 1, "uniform", 1, 2 / 3),
+    "Hertz disc": disc(1, 1, "hertz", 2 / 3, 3 * pi / 16, 1.5),
+    "parabolic disc": disc(1, 1, "parab", 1 / 2, 8 / 15),
+    "cone-shaped pressure": power_disc(1, 2),
+    "power 2 is Hertz": power_disc(2, 1.5),
+    "power 4": power_disc(4, 1.25),
+    "uniform ellipse": disc(2, 1, "uniform", 1, 2 / 3),
+    "Hertz ellipse": disc(2, 1, "hertz", 2 / 3, 3 * pi / 16, 1.5),
+    "parabolic ellipse": disc(3, 1, "parab", 1 / 2, 8 / 15),
+    "line": Form(lambda n: rect_grid(2.0, 1e-9, 2 * n, 1), 2e-9, 2e-9, 2e-9, 2e-9, 2e-9 * 2 / 4),
+    "ring": ring(3.0),
+    "cap": cap(lambda t: 1.0),
+    "hemisphere": cap(lambda t: 1.0, alpha=pi / 2),
+    "cap, pressure by depth": cap(lambda t: 1 - (1 - cos(t)) / DEPTH, "depth", h=DEPTH),
+    "cap, root of the depth": replace(
+        cap(lambda t: math.sqrt(max(0, 1 - (1 - cos(t)) / DEPTH)), "hertzdepth", h=DEPTH), order=1.5
+    ),
+    "cap, flat": flat_cap("flat"),
+    "cap, unrolled": flat_cap("unrolled"),
+    "cylinder": cylinder("curved"),
+    "cylinder, flat": cylinder("flat"),
+    "cylinder, unrolled": cylinder("unrolled"),
+    "elliptic cylinder": elliptic_cylinder("curved"),
+    "elliptic cylinder, flat": elliptic_cylinder("flat"),
+    "wedge": roof("curved"),
+    "wedge, flat": roof("flat"),
+}
