@@ -6,6 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
+from lsfit.geometry import shadow_area
+
+__all__ = ["body_volume", "hull_volume", "shadow_area"]
+
 FloatArray = NDArray[np.float64]
 
 
@@ -33,19 +37,3 @@ def body_volume(coarse: ArrayLike, fine: ArrayLike) -> float:
         raise ValueError(f"the fine set is {gain:.2f} times as large as the coarse one: it must be larger")
     V = hull_volume(fine)
     return V + (V - hull_volume(coarse)) / (gain - 1)
-
-
-def shadow_area(support: ArrayLike) -> float:
-    """Area of a plane convex body from its support function, ``1/2 int (h^2 - h'^2) dphi``.
-
-    Parameters
-    ----------
-    support : (k,) array
-        ``h`` at ``k`` equal steps of the full turn. For the shadow on the plane of the forces these are the supports of
-        the translations ``(cos phi, sin phi, 0)``.
-    """
-    h = np.asarray(support, float)
-    c = np.fft.rfft(h) / len(h)
-    order = np.arange(len(c))
-    twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
-    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())

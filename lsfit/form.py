@@ -81,6 +81,24 @@ def substitute(coefficients: ArrayLike, E: IntArray, L: ArrayLike) -> FloatArray
 
 
 @lru_cache
+def _tensor_places(dimension: int) -> tuple[IntArray, FloatArray]:
+    place = {tuple(row): n for n, row in enumerate(exponents(dimension, 4).tolist())}
+    index = np.array(list(np.ndindex((dimension,) * 4)))
+    count = (index[:, :, None] == np.arange(dimension)).sum(axis=1)
+    orders = [24 / math.prod(map(math.factorial, row)) for row in count.tolist()]
+    return np.array([place[tuple(row)] for row in count.tolist()]), 12 / np.array(orders)
+
+
+def hessian_tensor(coefficients: ArrayLike, dimension: int) -> FloatArray:
+    """Symmetric ``Q (d, d, d, d)`` of a quartic, whose second derivative is ``H_ij(w) = Q_ijkl w_k w_l``.
+
+    Coefficients in the order of ``exponents(dimension, 4)``.
+    """
+    place, factor = _tensor_places(dimension)
+    return (np.asarray(coefficients, float)[place] * factor).reshape((dimension,) * 4)
+
+
+@lru_cache
 def _interpolation(dimension: int, degree: int) -> tuple[FloatArray, FloatArray]:
     E = exponents(dimension, degree)
     points = np.random.default_rng(len(E)).normal(size=(3 * len(E), dimension))

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntFlag
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsfit.flag import FitError, FitFlag
+from lsfit.geometry import supported_shadow
+
+__all__ = ["FitError", "FitFlag", "Image", "LevelSet", "LimitSurface"]
+
 FloatArray = NDArray[np.float64]
 ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface itself
-
-
-class FitFlag(IntFlag):
-    """What the reader of a fitted limit surface should know; flags add up."""
-
-    CLEAN = 0
-    RANK_DEFICIENT = 1  # the samples lie in a subspace: the body is flat and carries no load out of it
-    UNDERDETERMINED = (
-        2  # fewer independent data than coefficients: of all equally good fits, the nearest to an ellipsoid
-    )
-    BOUNDED = 4  # the data alone would give an endless body: its reach was limited to a multiple of the data's
-    THIN = 8  # the samples are a thousand times shorter along one direction: rho does not suit the contact
 
 
 class LimitSurface(Protocol):
@@ -170,12 +162,12 @@ class Image(LevelSet):
 
     @property
     def shadow_area(self) -> float:
-        """Area of the shadow on the first two components, for bodies that are flat or in three dimensions."""
+        """Area of the shadow on the first two components."""
         if self.rank == 1:
             return 0.0
         if self.rank == 2:
             return abs(float(np.linalg.det(self.B[:2]))) * self.inner.volume
-        raise NotImplementedError
+        return supported_shadow(self.support, self.dimension)
 
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``; infinite where the body does not extend."""

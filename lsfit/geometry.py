@@ -1,0 +1,164 @@
+"""Volume and shadow of the body inside a level set, ``P(w) <= 1``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import roots_gegenbauer
+
+from lsfit.flag import FitError
+from lsfit.form import exponents, monomials
+
+FloatArray = NDArray[np.float64]
+
+
+@lru_cache
+def directions(dimension: int, count: int) -> FloatArray:
+    """Unit vectors of one half of the sphere (opposites count once), ``(count, d)``, evenly spread for ``d <= 3``."""
+    if dimension <= 2:
+        phi = np.pi * (np.arange(count) + 0.5) / count
+        u = np.column_stack([np.cos(phi), np.sin(phi)])[:, :dimension]
+    elif dimension == 3:
+        i = np.arange(count)
+        z = (i + 0.5) / count
+        phi = i * np.pi * (3 - math.sqrt(5))
+        u = np.column_stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
+    else:
+        u = np.random.default_rng(dimension).normal(size=(count, dimension))
+    u = u / np.linalg.norm(u, axis=1, keepdims=True)
+    u.flags.writeable = False
+    return u
+
+
+@lru_cache
+def sphere_rule(dimension: int, n: int) -> tuple[FloatArray, FloatArray]:
+    """Points ``(k, d)`` and weights ``(k,)`` that integrate even functions over the unit sphere.
+
+    Gauss rules along each axis times equal steps around the last circle: errors of smooth functions fall faster than
+    any power of ``n``.
+    """
+    if dimension == 1:
+        return np.ones((1, 1)), np.array([2.0])
+    if dimension == 2:
+        phi = np.pi * (np.arange(n) + 0.5) / n
+        return np.column_stack([np.cos(phi), np.sin(phi)]), np.full(n, 2 * np.pi / n)
+    z, weight = roots_gegenbauer(n, (dimension - 2) / 2)
+    u, inner = sphere_rule(dimension - 1, n)
+    points = np.concatenate(
+        [np.sqrt(1 - z**2)[:, None, None] * u, np.broadcast_to(z[:, None, None], (n, len(u), 1))], axis=2
+    )
+    return points.reshape(-1, dimension), (weight[:, None] * inner).ravel()
+
+
+def ball_integral(value: Callable[[FloatArray], FloatArray], dimension: int, degree: int) -> float:
+    """Volume ``1/d int P(u)^(-d / degree) du`` over the unit sphere, for a body that is round within a factor of a few.
+
+    Rules of growing order are tried until two agree, to 1e-12 in up to three dimensions and to 1e-6 beyond.
+
+    Raises
+    ------
+    FitError
+        If they never agree to 1e-8 (1e-3), or ``P`` is not positive: the body is not bounded.
+    """
+    orders, aim, limit = ((10, 14, 20, 28, 40, 56, 80, 112, 160), 1e-12, 1e-8)
+    if dimension > 3:
+        orders, aim, limit = ((4, 6, 8, 10, 12), 1e-6, 1e-3)
+    last, change = math.nan, math.nan
+    for n in orders:
+        u, weight = sphere_rule(dimension, n)
+        P = value(u)
+        if not P.min() > 0:
+            raise FitError(f"P is {P.min():.3g} along {u[np.argmin(P)].round(6)}: a body without end has no volume")
+        V = float(weight @ P ** (-dimension / degree)) / dimension
+        last, change = V, abs(V - last) / V
+        if change <= aim:
+            return V
+    if change <= limit:
+        return last
+    raise FitError(f"the volume still changes by {change:.1e} of itself at order {orders[-1]}: the body is too uneven")
+
+
+def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degree: int) -> FloatArray:
+    """Map ``L (d, d)`` from a body that is nearly round onto ``P <= 1``, by the moments of its surface."""
+    u = directions(dimension, 40 * dimension**2)
+    L = np.eye(dimension)
+    for _ in range(40):
+        X = u @ L.T
+        P = value(X)
+        if not P.min() > 0:
+            raise FitError(f"P is {P.min():.3g} along {X[np.argmin(P)]}: the level set is not closed")
+        r = P ** (-1 / degree)
+        Y = u * r[:, None]
+        C = np.linalg.cholesky(dimension * (Y.T @ Y) / len(u))
+        L = L @ C
+        if abs(C - np.eye(dimension)).max() < 0.3:
+            break
+    return L
+
+
+def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
+    """Area of the shadow of a convex quartic body in 3-D on the first two components.
+
+    The shadow is the level set of ``min over tau of P(x, y, tau)``, where the derivative along ``tau`` is a cubic with
+    one real root; its area is a periodic integral, for which equal steps converge fastest.
+
+    Parameters
+    ----------
+    coefficients : (15,) array
+        In the order of ``exponents(3, 4)``.
+    reach : (3,) array
+        Reach along the axes, by which the variables are divided.
+    """
+    E = exponents(3, 4)
+    c = coefficients * np.prod(reach**E, axis=1)
+    power = (E[:, 2] == np.arange(5)[:, None]) * c  # (5, 15): which coefficients go with tau^j
+    last = math.nan
+    for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
+        phi = np.pi * np.arange(n) / n
+        plane = np.column_stack([np.cos(phi), np.sin(phi), np.ones(n)])
+        area = float(np.pi / n * (_least_of_quartic(power @ monomials(plane, E).T) ** -0.5).sum())
+        if abs(area - last) <= 1e-13 * area:
+            break
+        last = area
+    return area * float(reach[0] * reach[1])
+
+
+def _least_of_quartic(a: FloatArray) -> FloatArray:
+    """Smallest values of convex polynomials ``a_0 + ... + a_4 tau^4``, ``(5, n) -> (n,)``."""
+    # tau = s - a_3 / (4 a_4) leaves s^3 + p s + q = 0, with p >= 0 as the polynomial is convex.
+    shift = a[3] / (4 * a[4])
+    p = np.maximum(a[2] / (2 * a[4]) - 3 * shift**2, 0.0)
+    q = 2 * shift**3 - a[2] * shift / (2 * a[4]) + a[1] / (4 * a[4])
+    u = np.cbrt(np.abs(q) / 2 + np.sqrt(q**2 / 4 + p**3 / 27))
+    with np.errstate(invalid="ignore"):
+        s = np.where(u > 0, np.sign(q) * (p / (3 * u) - u), 0.0)
+    tau = s - shift
+    return (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]
+
+
+def shadow_area(support: FloatArray) -> float:
+    """Area of a plane convex body from its support function, ``1/2 int (h^2 - h'^2) dphi``.
+
+    Parameters
+    ----------
+    support : (k,) array
+        ``h`` at ``k`` equal steps of the full turn. For the shadow on the plane of the forces these are the supports of
+        the translations ``(cos phi, sin phi, 0)``.
+    """
+    h = np.asarray(support, float)
+    c = np.fft.rfft(h) / len(h)
+    order = np.arange(len(c))
+    twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
+    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
+
+
+def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int, n: int = 1024) -> float:
+    """`shadow_area` on the first two components of a body in ``d`` dimensions with this support function."""
+    t = np.zeros((n, dimension))
+    phi = 2 * np.pi * np.arange(n) / n
+    t[:, 0], t[:, 1] = np.cos(phi), np.sin(phi)
+    return shadow_area(support(t))
