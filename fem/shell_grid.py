@@ -1,0 +1,119 @@
+"""Grid lines of a thin-walled body's mesh: fine where pads touch, coarser with the distance from there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fem.outer_surface import OuterSurface
+from fem.pose import FloatArray
+
+SAMPLES = 4000  # of the wanted element size along a line
+TURN = np.radians(20.0)  # largest turn of the outline within one element
+
+
+@dataclass(frozen=True)
+class MeshSize:
+    """How fine a mesh is.
+
+    Parameters
+    ----------
+    angles : tuple of float
+        Middles of the gripped regions about the axis [rad].
+    heights : (float, float)
+        Range of z that pads touch [m].
+    half_width : float
+        Half the width of a gripped region round the body [m].
+    around, along : float
+        Element sizes in the gripped regions [m].
+    coarse : float
+        Largest element size elsewhere [m].
+    growth : float
+        Increase of the size per distance from the gripped regions [-].
+    """
+
+    angles: tuple[float, ...] = (0.0, np.pi)
+    heights: tuple[float, float] = (0.0, 0.0)
+    half_width: float = 0.012
+    around: float = 0.0015
+    along: float = 0.0025
+    coarse: float = 0.006
+    growth: float = 0.15
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that are no sizes."""
+        for name in ("half_width", "around", "along", "coarse", "growth"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, found {getattr(self, name)}")
+        if not self.heights[0] <= self.heights[1]:
+            raise ValueError(f"heights must be (low, high), found {self.heights}")
+
+
+def graded(
+    start: float, end: float, size: Callable[[FloatArray], FloatArray], growth: float, multiple: int = 1
+) -> FloatArray:
+    """Ascending places from ``start`` to ``end`` whose distances follow ``size`` and grow by at most ``growth``.
+
+    Their number of intervals is a multiple of ``multiple``.
+    """
+    x = np.linspace(start, end, SAMPLES)
+    h, step = size(x), growth * (x[1] - x[0])
+    for order in (range(1, len(x)), range(len(x) - 2, -1, -1)):
+        for k in order:
+            before = k - 1 if order.step > 0 else k + 1
+            h[k] = min(h[k], h[before] + step)
+    count = np.concatenate([[0.0], np.cumsum(0.5 * (1 / h[1:] + 1 / h[:-1]) * np.diff(x))])
+    n = multiple * max(1, int(np.ceil((count[-1] - 1e-6) / multiple)))
+    places = np.interp(np.arange(n + 1) * count[-1] / n, count, x)
+    places[[0, -1]] = start, end
+    return places
+
+
+def along(surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, hole: float) -> FloatArray:
+    """Grid lines along the outline, with one on the edge of each flat lid."""
+    begin = surface.wall[0] if open_bottom else hole
+    end = surface.wall[1] if open_top else surface.end
+    if not begin < surface.wall[1]:
+        raise ValueError(f"the hole of radius {hole:g} m is larger than the bottom")
+    low, high = (surface.station(z) for z in size.heights)
+    bend = np.abs(surface.curve.curvature(np.linspace(begin, end, SAMPLES)))
+    at = np.linspace(begin, end, SAMPLES)
+
+    def wanted(x: FloatArray) -> FloatArray:
+        off = np.maximum(np.maximum(low - x, x - high), 0.0)
+        return np.minimum(
+            np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(np.interp(x, at, bend), 1e-9)
+        )
+
+    edges = [x for x in surface.flat if begin + 1e-9 < x < end - 1e-9]
+    places = [begin, *edges, end]
+    runs = [graded(a, b, wanted, size.growth) for a, b in pairwise(places)]
+    return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
+
+
+def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
+    """Grid lines round the body; the sizes are true at the middle of the gripped heights."""
+    begin, end = {
+        (False, False): (size.angles[0], size.angles[0] + 2 * np.pi),
+        (False, True): (0.0, np.pi),
+        (True, False): (-0.5 * np.pi, 0.5 * np.pi),
+        (True, True): (0.0, 0.5 * np.pi),
+    }[tuple(bool(plane) for plane in symmetry)]
+    s = surface.station(0.5 * sum(size.heights))
+    fine = np.linspace(0, 4 * np.pi, 2881) - 2 * np.pi
+    speed = np.linalg.norm(surface.jets(fine, s)[:, 1], axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
+    turn = np.interp(0.0, fine, arc) - np.interp(-2 * np.pi, fine, arc)
+    middles = np.interp(np.mod(size.angles, 2 * np.pi), fine, arc)
+
+    def wanted(x: FloatArray) -> FloatArray:
+        off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
+        return np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
+
+    places = graded(*np.interp([begin, end], fine, arc), wanted, size.growth, 4 >> sum(symmetry))
+    theta = np.interp(places, arc, fine)
+    theta[[0, -1]] = begin, end
+    return theta
