@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.contact import ContactProblem
+from fem.contact import ContactPoints
 from fem.errors import CheckError
+from fem.foam import Foam
 
 FloatArray = NDArray[np.float64]
 BALANCE = 1e-8  # of the normal force
@@ -37,20 +38,34 @@ class Checks:
     acoustic: float
 
 
-def check(problem: ContactProblem, x: FloatArray, force: float, residual: float) -> Checks:
-    """Measures of the state ``x`` at a normal force [N] on the whole pad that was solved to ``residual`` times it.
+def check(
+    foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
+    residual: float,
+) -> Checks:  # fmt: skip
+    """Measures of a pad's state ``x`` at a normal force [N] on the whole pad.
+
+    Parameters
+    ----------
+    foam : Foam
+    x : (size,) array
+        Unknowns of the pad.
+    state : tuple
+        Nodal pressures, mean gaps and points of the front, as ``contact_state`` gives them.
+    left_over : float
+        Largest force out of balance at a node, of the whole pad [N].
+    force, residual : float
+        The normal force [N], and the part of it that a node may be out of balance.
 
     Raises
     ------
     CheckError
         With the law that is broken, the figure and its bound.
     """
-    pad = problem.pad
-    pressure, gap, points = problem.contact_state(x)
-    det, strain, acoustic = problem.foam.strains(x, DIRECTIONS)
+    pad = foam.pad
+    pressure, gap, points = state
+    det, strain, acoustic = foam.strains(x, DIRECTIONS)
     size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
     largest = max(float(pressure.max(initial=0.0)), 1e-300)
-    left_over = np.abs(problem.residual(x)[: pad.travel_dof + 1]).max() / pad.share
     checks = Checks(
         force_balance=abs(points.force[2] / pad.share - force) / force,
         tension=max(0.0, -float(pressure.min())) / largest,

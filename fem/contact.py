@@ -183,6 +183,10 @@ class ContactProblem:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
         return self.foam.sheet_force(x)
 
+    def travel(self, x: FloatArray) -> float:
+        """Travel of the sheet [m]."""
+        return float(x[self.pad.travel_dof])
+
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)

@@ -108,15 +108,19 @@ class GripProblem:
         for pad, pose in pads:
             self.fingers.append(Finger(pad, pose, self.size))
             self.size += pad.size
-        self.control = Control(travel=0.0)
         self.stiffness = sum(f.kappa * f.pad.node_area.sum() for f in self.fingers)
-        self.forget()
+        self.control = Control(travel=0.0)
         self.places = [self.wall.places(f.points(np.zeros(self.size))[1]) for f in self.fingers]
         self._build_pattern()
 
-    def forget(self) -> None:
-        """Begin a new Newton solve: its first tangent of the wall is the plain one."""
-        self._before: FloatArray | None = None
+    @property
+    def control(self) -> Control:
+        """What drives the sheets; setting it begins a new solve, whose first tangent of the wall is the plain one."""
+        return self._control
+
+    @control.setter
+    def control(self, control: Control) -> None:
+        self._control, self._before = control, None
 
     def _build_pattern(self) -> None:
         """Everything but the couplings between pads and wall, which come as pads touch."""
@@ -283,7 +287,7 @@ class GripProblem:
         return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_TRAVEL) for f in self.fingers)
 
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
-        """Of one finger: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature points in the pad's frame."""
+        """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature points."""
         f = self.fingers[number]
         c = self._contact(x, np.zeros((self.shell.nodes, 3)))[number]
         own, _ = f.points(x)

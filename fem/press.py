@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,24 +20,13 @@ from numpy.typing import NDArray
 from fem.checks import Checks, check
 from fem.contact import ContactPoints, ContactProblem, Control, Gap
 from fem.errors import ConvergenceError
+from fem.foam import Foam
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
 from fem.spring_bed import SpringBed
+from fem.stepping import Settings, Stepping, Work
 
 FloatArray = NDArray[np.float64]
-WALK_STEPS = 60  # of the sheet, for one force
-
-
-@dataclass(frozen=True)
-class Settings:
-    """When a solve ends and when a step is given up.
-
-    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that
-    is tried before another way.
-    """
-
-    residual: float = 1e-10
-    min_step: float = 1.0 / 8.0
 
 
 @dataclass(frozen=True)
@@ -73,13 +63,24 @@ class Pressed:
     seconds: Seconds
 
 
-@dataclass
-class _Work:
-    """Effort of one force level."""
+def pressed(
+    foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
+    settings: Settings, work: Work, seconds: Seconds,
+) -> Pressed:  # fmt: skip
+    """State of one pad that has passed its checks; parameters as in ``fem.checks.check``."""
+    pad, (pressure, _, points) = foam.pad, state
+    checks = check(foam, x, state, left_over, force, settings.residual)
+    front = (pad.nodes + pad.displacement(x))[pad.front_nodes]
+    return Pressed(
+        force, float(x[pad.travel_dof]), x, pad, pressure, front, points, checks, work.iterations, work.steps,
+        work.cuts, seconds,
+    )  # fmt: skip
 
-    iterations: int = 0
-    steps: int = 0
-    cuts: int = 0
+
+def since(before: Seconds, now: Seconds, start: float) -> Seconds:
+    """Where the time since ``start`` went."""
+    total = time.perf_counter() - start
+    return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
 
 
 @dataclass
@@ -111,6 +112,10 @@ class Press:
         self._bed = SpringBed(self.pad, self.gap)
         self.problem = ContactProblem(self.pad, self.gap)
         self.solver = NonlinearSolver(self.problem, self.options)
+        self._stepping = Stepping(
+            self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
+            self._bed.force_scale,
+        )  # fmt: skip
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on the whole pad [N].
@@ -122,32 +127,19 @@ class Press:
         """
         x, reached = None, 0.0
         for force in forces:
-            work, before, start = _Work(), _copy(self.solver.seconds), time.perf_counter()
+            work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
             try:
-                if x is None:
-                    x, reached = self._first(force, work)
                 x = self._climb(x, reached, force, work)
             except ConvergenceError:
                 if self.fallback is None:
                     raise
                 self._fall_back()
-                if x is None:
-                    x, reached = self._first(force, work)
                 x = self._climb(x, reached, force, work)
             reached = force
-            checks = check(self.problem, x, force, self.settings.residual)
-            spent = self.solver.seconds
-            seconds = Seconds(
-                spent.assembly - before.assembly,
-                spent.factorisation - before.factorisation,
-                time.perf_counter() - start,
-            )
-            front = (self.pad.nodes + self.pad.displacement(x))[self.pad.front_nodes]
-            pressure, _, points = self.problem.contact_state(x)
-            yield Pressed(
-                force, float(x[self.pad.travel_dof]), x.copy(), self.pad, pressure, front, points, checks,
-                work.iterations, work.steps, work.cuts, seconds,
-            )  # fmt: skip
+            seconds = since(before, self.solver.seconds, start)
+            left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
+            state = self.problem.contact_state(x)
+            yield pressed(self.problem.foam, x.copy(), state, left_over, force, self.settings, work, seconds)
 
     def _fall_back(self) -> None:
         """Go on with the fallback pad; its unknowns are numbered alike."""
@@ -160,82 +152,15 @@ class Press:
     def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
         """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""
         start = self._bed.guess(travel) if x is None else x
-        x = self._solve(start, Control(travel=travel), _Work())
+        x = self._stepping.solve(start, Control(travel=travel), Work())
         return x, self.problem.sheet_force(x)
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
         self.solver.destroy()
 
-    # -- stepping ------------------------------------------------------------------------------------------------------
-
-    def _solve(self, x: FloatArray, control: Control, work: _Work) -> FloatArray:
-        """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
-        self.problem.control = control
-        scale = control.force if control.force is not None else self._bed.force_scale(control.travel)
-        work.steps += 1
-        try:
-            x, iterations = self.solver.solve(x, self.settings.residual * scale * self.pad.share)
-        except ConvergenceError:
-            work.cuts += 1
-            raise
-        work.iterations += iterations
-        return x
-
-    def _climb(self, x: FloatArray, reached: float, force: float, work: _Work) -> FloatArray:
-        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or along the travel."""
-        fraction, done = 1.0, 0.0
-        while done < 1.0:
-            goal = min(1.0, done + fraction)
-            target = force if goal == 1.0 else reached + goal * (force - reached)
-            try:
-                x = self._solve(x, Control(force=target), work)
-            except ConvergenceError:
-                fraction *= 0.5
-                if fraction < self.settings.min_step:
-                    if self.fallback is not None:
-                        raise
-                    return self._walk(x, force, work)
-                continue
-            done = goal
-        return x
-
-    def _walk(self, x: FloatArray, force: float, work: _Work) -> FloatArray:
-        """Travel on until the force is bracketed, then solve for it from the interpolated state."""
-        dof = self.pad.travel_dof
-        step, low = 0.02 * self.pad.shape.size[2], (x, self.problem.sheet_force(x))
-        for _ in range(WALK_STEPS):
-            try:
-                ahead = self._solve(low[0], Control(travel=low[0][dof] + step), work)
-                high = (ahead, self.problem.sheet_force(ahead))
-                if high[1] >= force:
-                    share = (force - low[1]) / (high[1] - low[1])
-                    return self._solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
-                low, step = high, 1.5 * step
-            except ConvergenceError as error:
-                step *= 0.5
-                if step < 1e-5 * self.pad.shape.size[2]:
-                    raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
-        raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
-
-    def _first(self, force: float, work: _Work) -> tuple[FloatArray, float]:
-        """First state in contact, by travel control from the bed-of-springs estimate: force control has no start."""
-        travel, failure = self._bed.travel(force), "no force yet"
-        for _ in range(12):
-            try:
-                x = self._solve(self._bed.guess(travel), Control(travel=travel), work)
-            except ConvergenceError as error:
-                travel, failure = 0.6 * travel, str(error)
-                continue
-            reached = self.problem.sheet_force(x)
-            if reached > 1e-3 * force:
-                return x, reached
-            travel *= 1.5
-        raise ConvergenceError(
-            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
-            f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
-        )
-
-
-def _copy(seconds: Seconds) -> Seconds:
-    return Seconds(seconds.assembly, seconds.factorisation, seconds.total)
+    def _climb(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
+        """State at ``force`` from the one at ``reached`` [N], or from scratch."""
+        if x is None:
+            x, reached = self._stepping.first(self._bed.travel(force), force, work)
+        return self._stepping.climb(x, reached, force, work, walk=self.fallback is None)

@@ -1,0 +1,164 @@
+"""Press two fingers on a thin-walled object along a ladder of normal forces, each started from the one before.
+
+As in ``fem.press``, with a wall that gives way. Where a wall snaps in, force control jumps or fails; then the fingers
+are walked on by their travel, in short steps, and the first state with the wanted force is taken: what a gripper
+that closes with a growing force meets first.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fem.contact import Gap
+from fem.errors import CheckError, ConvergenceError
+from fem.grip_problem import GripProblem
+from fem.petsc import NonlinearSolver, Seconds
+from fem.pose import FloatArray
+from fem.press import Pressed, pressed, since
+from fem.spring_bed import SpringBed
+from fem.stepping import Settings, Stepping, Work
+
+LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
+JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
+BALANCE = 1e-6  # of the normal force
+ROUNDING = 3e-9  # norm of the residual [N]: a stiff wall's forces are differences of large numbers
+
+
+@dataclass(frozen=True)
+class WallState:
+    """The wall at one force.
+
+    Parameters
+    ----------
+    q : (6 k,) array
+        State, see ``fem.shell_model`` [m].
+    load : (k, 3) array
+        Contact forces on its nodes [N].
+    reaction : (3,) array
+        Force of supports and springs on the whole object [N].
+    snapped : bool
+        Whether the force fell on the way here while the fingers closed: the wall has passed a limit.
+    """
+
+    q: FloatArray
+    load: FloatArray
+    reaction: FloatArray
+    snapped: bool
+
+
+@dataclass(frozen=True)
+class Gripped:
+    """Both fingers, or the one that symmetry leaves, and the wall in equilibrium at one normal force."""
+
+    force: float
+    fingers: tuple[Pressed, ...]
+    wall: WallState
+
+
+@dataclass
+class Grip:
+    """Pads on a thin-walled object.
+
+    Parameters
+    ----------
+    problem : GripProblem
+    gaps : sequence of callables
+        Of the undeformed object in the frame of each pad, as in ``fem.press.Press``; they tell where contact begins.
+    mirrors : (bool, bool)
+        Whether ``x = 0`` and ``y = 0`` are planes of symmetry that the mesh of the wall ends at.
+    options : dict
+        PETSc options with the prefix ``contact_``.
+    """
+
+    problem: GripProblem
+    gaps: Sequence[Gap]
+    mirrors: tuple[bool, bool] = (False, False)
+    options: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=Settings)
+
+    def __post_init__(self) -> None:
+        """Set up the solver."""
+        fingers = self.problem.fingers
+        self._beds = [SpringBed(f.pad, gap) for f, gap in zip(fingers, self.gaps, strict=True)]
+        self.solver = NonlinearSolver(self.problem, self.options)
+        self._stepping = Stepping(
+            self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
+            self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds), ROUNDING,
+        )  # fmt: skip
+
+    def _guess(self, travel: float) -> FloatArray:
+        """The wall undeformed, the pads as beds of springs."""
+        x = np.zeros(self.problem.size)
+        for f, bed in zip(self.problem.fingers, self._beds, strict=True):
+            x[f.own] = bed.guess(travel)
+        return x
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Gripped]:
+        """Equilibrium states at ascending normal forces per finger [N].
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            At the first force without an acceptable state.
+        """
+        x, reached, compliance, snapped = None, 0.0, np.inf, False
+        for force in forces:
+            work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
+            if x is None:
+                travel = float(np.mean([bed.travel(force) for bed in self._beds]))
+                x, reached = self._stepping.first(travel, force, work)
+            last = self.problem.travel(x)
+            x, fell = self._climb(x, reached, force, compliance, work)
+            snapped |= fell
+            if force > reached:
+                compliance = (self.problem.travel(x) - last) / (force - reached)
+            reached = force
+            yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
+
+    def _climb(
+        self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
+    ) -> tuple[FloatArray, bool]:
+        """State at ``force``, and whether a limit was passed on the way from the one at ``reached`` [N]."""
+        expected = max(JUMP, 2.0 * compliance * (force - reached))
+        try:
+            ahead = self._stepping.climb(x, reached, force, work, walk=False)
+            if self.problem.travel(ahead) - self.problem.travel(x) <= expected:
+                return ahead, False
+        except ConvergenceError:
+            pass
+        forces: list[float] = []
+        ahead = self._stepping.walk(x, force, work, LONGEST_STEP, forces)
+        return ahead, bool((np.diff([reached, *forces]) < 0).any())
+
+    def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
+        """State of all parts, checked."""
+        problem, residual = self.problem, np.abs(self.problem.residual(x))
+        fingers = []
+        for k, f in enumerate(problem.fingers):
+            left_over = residual[f.offset : f.travel + 1].max() / f.pad.share
+            part = seconds if k == 0 else Seconds()
+            fingers.append(pressed(
+                f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
+                work if k == 0 else Work(), part,
+            ))  # fmt: skip
+        q, load = problem.state(x), problem.wall_load(x)
+        worst = residual[: len(problem.free)].max(initial=0.0)
+        if not worst <= max(BALANCE, self.settings.residual) * force:
+            raise CheckError(f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
+                             f"by {worst:.3g} N")
+        return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped))
+
+    def _reaction(self, load: FloatArray) -> FloatArray:
+        """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""
+        mirrored = np.array([*self.mirrors, False])
+        return np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self.solver.destroy()

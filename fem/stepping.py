@@ -1,0 +1,156 @@
+"""From one converged contact state to the next: by normal force, by halves of the step, or along the sheet's travel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.contact import Control
+from fem.errors import ConvergenceError
+from fem.petsc import NonlinearSolver
+
+FloatArray = NDArray[np.float64]
+WALK_STEPS = 60  # of the sheet, for one force
+FIRST_TRIES = 12
+
+
+@dataclass(frozen=True)
+class Settings:
+    """When a solve ends and when a step is given up.
+
+    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that
+    is tried before another way.
+    """
+
+    residual: float = 1e-10
+    min_step: float = 1.0 / 8.0
+
+
+@dataclass
+class Work:
+    """Effort of one force level."""
+
+    iterations: int = 0
+    steps: int = 0
+    cuts: int = 0
+
+
+class Pressing(Protocol):
+    """A contact problem that is driven by its sheet."""
+
+    control: Control
+
+    def sheet_force(self, x: FloatArray) -> float:
+        """Normal force on the sheet [N]."""
+
+    def travel(self, x: FloatArray) -> float:
+        """Travel of the sheet [m]."""
+
+
+@dataclass
+class Stepping:
+    """Steps of one problem.
+
+    Parameters
+    ----------
+    problem : Pressing
+    solver : NonlinearSolver
+    settings : Settings
+    thickness : float
+        Of the pad; steps along the travel are parts of it [m].
+    share : float
+        Part of the pad that is meshed.
+    guess : callable
+        Travel to a vector of unknowns to start from.
+    force_scale : callable
+        Travel to the force that a residual there is judged by [N].
+    floor : float
+        Norm of the residual that rounding leaves [N].
+    """
+
+    problem: Pressing
+    solver: NonlinearSolver
+    settings: Settings
+    thickness: float
+    share: float
+    guess: Callable[[float], FloatArray]
+    force_scale: Callable[[float], float]
+    floor: float = 0.0
+
+    def solve(self, x: FloatArray, control: Control, work: Work) -> FloatArray:
+        """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
+        self.problem.control = control
+        scale = control.force if control.force is not None else self.force_scale(control.travel)
+        work.steps += 1
+        try:
+            x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor))
+        except ConvergenceError:
+            work.cuts += 1
+            raise
+        work.iterations += iterations
+        return x
+
+    def climb(self, x: FloatArray, reached: float, force: float, work: Work, *, walk: bool = True) -> FloatArray:
+        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or (``walk``) along the travel."""
+        fraction, done = 1.0, 0.0
+        while done < 1.0:
+            goal = min(1.0, done + fraction)
+            target = force if goal == 1.0 else reached + goal * (force - reached)
+            try:
+                x = self.solve(x, Control(force=target), work)
+            except ConvergenceError:
+                fraction *= 0.5
+                if fraction < self.settings.min_step:
+                    if not walk:
+                        raise
+                    return self.walk(x, force, work)
+                continue
+            done = goal
+        return x
+
+    def walk(
+        self, x: FloatArray, force: float, work: Work, longest: float = np.inf, forces: list[float] | None = None
+    ) -> FloatArray:
+        """Travel on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
+
+        The forces on the way are appended to ``forces``.
+        """
+        problem = self.problem
+        step, low = min(0.02 * self.thickness, longest), (x, problem.sheet_force(x))
+        for _ in range(WALK_STEPS):
+            try:
+                ahead = self.solve(low[0], Control(travel=problem.travel(low[0]) + step), work)
+                high = (ahead, problem.sheet_force(ahead))
+                if forces is not None:
+                    forces.append(high[1])
+                if high[1] >= force:
+                    share = (force - low[1]) / (high[1] - low[1])
+                    return self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
+                low, step = high, min(1.5 * step, longest)
+            except ConvergenceError as error:
+                step *= 0.5
+                if step < 1e-5 * self.thickness:
+                    raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
+        raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
+
+    def first(self, travel: float, force: float, work: Work) -> tuple[FloatArray, float]:
+        """First state in contact and its force, by travel control near ``travel``: force control has no start."""
+        failure = "no force yet"
+        for _ in range(FIRST_TRIES):
+            try:
+                x = self.solve(self.guess(travel), Control(travel=travel), work)
+            except ConvergenceError as error:
+                travel, failure = 0.6 * travel, str(error)
+                continue
+            reached = self.problem.sheet_force(x)
+            if reached > 1e-3 * force:
+                return x, reached
+            travel *= 1.5
+        raise ConvergenceError(
+            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
+            f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
+        )
