@@ -188,8 +188,8 @@ class NonlinearSolver:
         reason, done = snes.getConvergedReason(), snes.getIterationNumber()
         if reason <= 0:
             raise ConvergenceError(
-                f"the contact solve stopped with {REASONS.get(reason, reason)} after {done} iterations at residual "
-                f"{snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
+                f"the {self.prefix.rstrip('_')} solve stopped with {REASONS.get(reason, reason)} after {done} "
+                f"iterations at residual {snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
             )
         return self._x.array.copy(), done
 
@@ -231,6 +231,60 @@ class NonlinearSolver:
         if factor < 1.0:
             y.scale(factor)
         return factor < 1.0
+
+
+class Factors:
+    """LU factors of one matrix, for many right-hand sides.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        With the matrix's values in ``pattern.values``.
+
+    Raises
+    ------
+    ConvergenceError
+        When the matrix is singular.
+    """
+
+    COLUMNS = 256  # solved at once; bounds the memory
+
+    def __init__(self, pattern: Pattern) -> None:
+        n = len(pattern.start) - 1
+        self._matrix = PETSc.Mat().createAIJ(
+            (n, n), csr=(pattern.start, pattern.column, pattern.values), comm=PETSc.COMM_SELF
+        )
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setType("lu")
+        self._pc.setFactorSolverType("mumps")
+        self._pc.setOperators(self._matrix)
+        self._pc.setUp()
+        self._factor = self._pc.getFactorMatrix()
+        try:
+            self.solve(np.zeros(n))
+        except PETSc.Error as error:  # the factorisation itself fails silently
+            raise ConvergenceError(f"a linear system of {n} unknowns is singular; is everything supported?") from error
+
+    def solve(self, B: FloatArray) -> FloatArray:
+        """Solutions ``X`` of ``A X = B`` for a vector ``(n,)`` or the columns of ``(n, m)``."""
+        columns = B.reshape(len(B), -1)
+        X = np.empty(columns.shape, order="F")
+        for k in range(0, columns.shape[1], self.COLUMNS):
+            part = np.asfortranarray(columns[:, k : k + self.COLUMNS])
+            right, left = (
+                PETSc.Mat().createDense(part.shape, array=a, comm=PETSc.COMM_SELF)
+                for a in (part.copy(order="F"), np.zeros_like(part, order="F"))
+            )
+            self._factor.matSolve(right, left)
+            X[:, k : k + self.COLUMNS] = left.getDenseArray()
+            right.destroy()
+            left.destroy()
+        return X.reshape(B.shape)
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self._pc.destroy()
+        self._matrix.destroy()
 
 
 class _OneUnknown:
