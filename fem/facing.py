@@ -16,6 +16,7 @@ and the gap by ``dg = e . (dx - N_a dv_a - g G N_a dw_a)``; ``e`` is nearly ``n`
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -32,7 +33,7 @@ SHARP = 1e-13  # how well the place is found [m]
 LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Wall:
     """Outer face of a structured shell mesh.
 
@@ -56,11 +57,17 @@ class Wall:
 
     def places(self, points: FloatArray) -> FloatArray:
         """Parameters ``(n, 2)`` of the undeformed wall's grid points that are closest to ``points (n, 3)``."""
+        parameters, tree = self._grid
+        return parameters[tree.query(points)[1]]
+
+    @cached_property
+    def _grid(self) -> tuple[FloatArray, cKDTree]:
+        """Parameters of the grid points, and a search tree of their places."""
         t, s = (grid.ravel() for grid in np.meshgrid(self.theta, self.s, indexing="ij"))
-        return np.column_stack([t, s])[cKDTree(self.surface.at(t, s)[0]).query(points)[1]]
+        return np.column_stack([t, s]), cKDTree(self.surface.at(t, s)[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Facing:
     """What ``n`` points face; arrays as in the module's formulas.
 

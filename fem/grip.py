@@ -150,8 +150,10 @@ class Grip:
         q, load = problem.state(x), problem.wall_load(x)
         worst = residual[: len(problem.free)].max(initial=0.0)
         if not worst <= max(BALANCE, self.settings.residual) * force:
-            raise CheckError(f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
-                             f"by {worst:.3g} N")
+            raise CheckError(
+                f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
+                f"by {worst:.3g} N"
+            )
         return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped))
 
     def _reaction(self, load: FloatArray) -> FloatArray:
