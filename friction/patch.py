@@ -138,4 +138,8 @@ def _unit(normal: FloatArray) -> FloatArray:
         i = int(np.argmax(largest == 0))
         raise ValueError(f"normal[{i}] is zero: a face needs a direction; recompute or drop face {i}")
     scaled = normal / largest
-    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    length = np.linalg.norm(scaled, axis=1, keepdims=True)
+    # A unit vector is left as it is: dividing again by a length that is 1 but for rounding would change its last bit.
+    with np.errstate(over="ignore"):
+        unit = np.abs(largest * length - 1) <= 4 * np.finfo(float).eps
+    return np.where(unit, normal, scaled / length)

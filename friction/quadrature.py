@@ -54,8 +54,8 @@ def gauss_patch(
     if q.ndim != 3 or q.shape[1:] != (4, 3):
         raise ValueError(f"corners has shape {q.shape}, expected (n, 4, 3); repeat the last corner of a triangle")
     N, slopes = shape_functions(POINTS)
-    r = np.einsum("gk,nkc->ngc", N, q)
-    along = np.einsum("gka,nkc->ngac", slopes, q)
+    r = N @ q
+    along = np.stack([slopes[..., 0] @ q, slopes[..., 1] @ q], axis=2)
     if corner_normal is not None:
         r, along = _curved(q, np.asarray(corner_normal, float), r, along)
     facing = np.cross(along[:, :, 0], along[:, :, 1])
@@ -110,4 +110,4 @@ def _quarters(q: FloatArray) -> FloatArray:
     """Corners of the four parts that the middle lines cut from each quadrilateral, ``(n, 4, 4, 3)``."""
     ends = (CORNERS[:, None] + CORNERS[None]) / 2
     N, _ = shape_functions(ends.reshape(-1, 2))
-    return np.einsum("gk,nkc->ngc", N, q).reshape(len(q), 4, 4, 3)
+    return (N @ q).reshape(len(q), 4, 4, 3)

@@ -10,7 +10,6 @@ from friction.patch import NoContactError, moved
 from friction.wrench import friction_limits
 from tests.generators import (
     bump,
-    cap_polar,
     cyl_mesh,
     cylinder_grid,
     disc_polar,
@@ -62,15 +61,6 @@ def test_the_normal_of_a_skew_cylinder_is_within_half_a_facet():
         patch = mesh_patch(cyl_mesh(1, np.pi / 3, 2, n, 4), lambda r: 1 + 0.8 * r[:, 1])
         N = contact_frame(patch, X).axes[2]
         assert abs(np.degrees(np.arctan2(N[1], N[2])) - 15.8376) < 60 / n + 2
-
-
-def test_a_hole_under_the_centre_of_pressure_takes_the_nearest_faces():
-    patch = mesh_patch(grid_mesh(5, 5, 1, 1))
-    ring = replace(patch, pressure=(np.linalg.norm(patch.centroid, axis=1) > 0.1).astype(float))
-    frame = contact_frame(ring, X)
-    assert frame.flag == FrameFlag.HOLE
-    np.testing.assert_allclose(frame.origin, 0, atol=1e-15)
-    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
 
 
 def test_without_corners_the_nearest_face_stands_in():
@@ -130,14 +120,6 @@ def test_flipped_normals_are_found_with_and_without_corners():
     assert contact_frame(replace(flipped, corners=None), X).flag & FrameFlag.ORIENTATION
     rewound = mesh_patch(np.where(sign[:, None] > 0, patch.corners, patch.corners[:, ::-1]))
     assert contact_frame(rewound, X).flag & FrameFlag.ORIENTATION
-
-
-def test_overhanging_faces_are_counted_and_no_flipped_ones_seen():
-    """A cap with the half angle 120 degrees: a third of its area looks back, (cos 90 - cos 120) / (1 - cos 120)."""
-    frame = contact_frame(cap_polar(1, np.radians(120), 60, 40), X)
-    assert frame.flag == FrameFlag.OVERHANG | FrameFlag.NO_CORNERS
-    assert frame.overhang_share == pytest.approx(1 / 3, rel=1e-12)
-    assert frame.overhang_count == 15 * 40
 
 
 def test_contact_length_is_the_longer_side_of_the_rectangle():
