@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import ellipeinc
 
 from friction.patch import ContactPatch
 
@@ -88,6 +89,20 @@ def lcg(seed) -> Iterator[float]:
         yield (state >> 11) / 2**53
 
 
+def lcg_noise(K, amplitude, seed):
+    """Factors ``1 + amplitude (2 u - 1)``, one per sample."""
+    draw = lcg(seed)
+    return 1 + amplitude * (2 * np.array([next(draw) for _ in range(K)]) - 1)
+
+
+def lcg_sphere(d, K, seed):
+    """Random unit vectors ``(K, d)``: normal numbers by Box and Muller, two draws for each."""
+    draw = lcg(seed)
+    u = np.array([next(draw) for _ in range(2 * K * d)]).reshape(K, d, 2)
+    x = np.sqrt(-2 * np.log(1 - u[..., 0])) * np.cos(2 * np.pi * u[..., 1])
+    return x / np.linalg.norm(x, axis=1, keepdims=True)
+
+
 def lcg_patch(seed, N, slope=0.8):
     draw = lcg(seed)
     x, y, sx, sy, a, p = np.array([[next(draw) for _ in range(6)] for _ in range(N)]).T
@@ -97,14 +112,19 @@ def lcg_patch(seed, N, slope=0.8):
 
 
 def arc_lengths(gen, args):
-    """Unrolled coordinates of the faces of ``cylinder_grid`` and ``cap_polar``."""
-    if gen == "cylinder_grid":
-        phi, x = _grid(
-            _mid(-args["alpha"], args["alpha"], args["nphi"]), _mid(-args["L"] / 2, args["L"] / 2, args["nx"])
-        )
-        return np.column_stack([x, args["R"] * phi])
-    t, phi = _grid(_mid(0, args["alpha"], args["nth"]), _mid(0, 2 * np.pi, args["nphi"]))
-    return args["R"] * t[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
+    """Unrolled coordinates ``(n, 2)`` of the faces of a generator's patch: lengths along its surface from the top."""
+    if gen == "cap_polar":
+        t, phi = _grid(_mid(0, args["alpha"], args["nth"]), _mid(0, 2 * np.pi, args["nphi"]))
+        return args["R"] * t[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
+    along = _mid(-args["L"] / 2, args["L"] / 2, args["nx"])
+    if gen == "wedge":
+        u, x = _grid(_mid(0, args["W"], args["nw"]), along)
+        return np.vstack([np.column_stack([x, side * u]) for side in (1, -1)])
+    if gen == "ellcyl_grid":
+        t, x = _grid(_mid(-args["tmax"], args["tmax"], args["nt"]), along)
+        return np.column_stack([x, args["b"] * ellipeinc(t, 1 - (args["a"] / args["b"]) ** 2)])
+    phi, x = _grid(_mid(-args["alpha"], args["alpha"], args["nphi"]), along)
+    return np.column_stack([x, args["R"] * phi])
 
 
 PATCHES = {

@@ -125,15 +125,30 @@ def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
 def elliptic_cylinder(model: str, a: float = 2.0, b: float = 1.0, tm: float = 1.0, L: float = 2.0) -> Form:
     S, F_N = 2 * L * b * ellipeinc(tm, 1 - (a / b) ** 2), 2 * L * b * sin(tm)
     curved = model == "curved"
-    tau = cylinder_torque(a, b, tm, L, not curved)
-    return Form(lambda n: ellcyl_grid(a, b, tm, L, n, n), S, F_N, S, F_N if curved else S, tau, 2.0, model)
+    tau = S * mean_distance(L, S / L) if model == "unrolled" else cylinder_torque(a, b, tm, L, not curved)
+
+    def arcs(n: int) -> np.ndarray:
+        return arc_lengths("ellcyl_grid", {"a": a, "b": b, "tmax": tm, "L": L, "nt": n, "nx": n})
+
+    patch = lambda n: ellcyl_grid(a, b, tm, L, n, n)  # noqa: E731
+    return Form(patch, S, F_N, S, F_N if curved else S, tau, 2.0, model, arcs if model == "unrolled" else None)
 
 
 def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
     """Two rectangles that meet in a ridge along x."""
     S, c = 2 * W * L, cos(tilt)
-    tau = {"curved": c * mean_distance(L, 2 * W), "flat": mean_distance(L, 2 * W * c)}[model] * S
-    return Form(lambda n: wedge(tilt, W, L, n, 2 * n), S, c * S, S, c * S if model == "curved" else S, tau, 2.0, model)
+    arm = {
+        "curved": c * mean_distance(L, 2 * W),
+        "flat": mean_distance(L, 2 * W * c),
+        "unrolled": mean_distance(L, 2 * W),
+    }[model]
+
+    def arcs(n: int) -> np.ndarray:
+        return arc_lengths("wedge", {"W": W, "L": L, "nw": n, "nx": 2 * n})
+
+    patch = lambda n: wedge(tilt, W, L, n, 2 * n)  # noqa: E731
+    f_y = c * S if model == "curved" else S
+    return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model, arcs if model == "unrolled" else None)
 
 
 def flat_cap(model: str, alpha: float = ALPHA) -> Form:
@@ -186,6 +201,8 @@ FORMS = {
     "cylinder, unrolled": cylinder("unrolled"),
     "elliptic cylinder": elliptic_cylinder("curved"),
     "elliptic cylinder, flat": elliptic_cylinder("flat"),
+    "elliptic cylinder, unrolled": elliptic_cylinder("unrolled"),
     "wedge": roof("curved"),
     "wedge, flat": roof("flat"),
+    "wedge, unrolled": roof("unrolled"),
 }

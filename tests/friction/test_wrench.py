@@ -1,4 +1,4 @@
-"""Friction wrenches: the compiled kernel, its hard cases, and what holds for every patch."""
+"""Friction wrenches: the compiled kernel, arguments, and properties that single patches show."""
 
 import math
 import time
