@@ -1,0 +1,129 @@
+"""Coordinates in which limit surfaces are fitted: within the span of the samples, with all axes of a like length."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsfit.flag import FitError, FitFlag
+from lsfit.geometry import directions
+from lsfit.surface import Image, LimitSurface
+
+FloatArray = NDArray[np.float64]
+Scaling = Literal["maxima", "whitened", "none"]
+
+FAR = 10.0
+"""Reach of a surface beyond its farthest sample from which it counts as endless."""
+
+
+class CollapsedFitError(FitError):
+    """The fitted surface does not pass near the samples, or nothing holds it in some direction."""
+
+
+class SpanSamples(NamedTuple):
+    """Samples in coordinates ``y`` of their span, ``w = B y``.
+
+    ``Y (m, r)`` are the wrenches and ``T (m, r)`` the unit motions, which change by ``B'`` so that powers stay the
+    same; ``B (d, r)`` has as many columns as the span has dimensions.
+    """
+
+    Y: FloatArray
+    T: FloatArray
+    B: FloatArray
+
+    @property
+    def rank(self) -> int:
+        """Dimension of the span."""
+        return self.B.shape[1]
+
+
+def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolerance: float = 1e-9) -> SpanSamples:
+    """Samples within their span, scaled.
+
+    A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Motions that meet no
+    friction (zero wrench) are left out.
+
+    Parameters
+    ----------
+    W, T : (m, d) array
+        Normalised wrenches and unit motions [-].
+    scaling : str
+        ``maxima`` divides every component by its largest magnitude (the published fits in six dimensions do), or every
+        principal direction if the samples do not span all components that they use; ``whitened`` makes the mean square
+        the same in all directions; ``none`` keeps the lengths.
+    tolerance : float
+        Components, and singular values of the scaled samples, below this share of the largest count as zero.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a value is not finite, all wrenches are zero, or the scaling has an unknown name.
+    """
+    W, T = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
+    if scaling not in get_args(Scaling):
+        raise ValueError(f"scaling is {scaling!r}: choose one of {', '.join(get_args(Scaling))}")
+    if W.shape != T.shape or not (np.isfinite(W).all() and np.isfinite(T).all()):
+        raise ValueError(f"wrenches {W.shape} and motions {T.shape} must be finite and of one shape (m, d)")
+    largest = np.abs(W).max(axis=0, initial=0.0)
+    if not largest.any():
+        raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
+    B = _map(W, largest, scaling, tolerance)
+    moving = np.abs(W).max(axis=1) > tolerance * largest.max()
+    Y, slip = W[moving] @ np.linalg.pinv(B).T, T[moving] @ B
+    return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B)
+
+
+def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float) -> FloatArray:
+    """Columns ``B (d, r)`` of the coordinates."""
+    used = np.flatnonzero(largest > tolerance * largest.max())
+    scale = largest[used]
+    # Rank is a property of the samples, not of the unit of a torque: judge it with all components of one size.
+    _, values, V = np.linalg.svd(W[:, used] / scale, full_matrices=False)
+    r = int((values > tolerance * values[0]).sum())
+    B = np.zeros((W.shape[1], r))
+    if r == len(used) and scaling != "whitened":
+        B[used] = np.diag(scale if scaling == "maxima" else np.ones(r))
+        return B
+    B[used] = scale[:, None] * V[:r].T
+    if scaling == "none":
+        return np.linalg.qr(B)[0]
+    if scaling == "maxima":
+        return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0)
+    return B * (values[:r] / np.sqrt(len(W)))
+
+
+def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
+    """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
+    d, r = samples.B.shape
+    if r < d:
+        return Image(surface, samples.B, surface.flag | FitFlag.RANK_DEFICIENT)
+    factors = np.diag(samples.B)
+    return surface.scaled(factors) if np.array_equal(samples.B, np.diag(factors)) else Image(surface, samples.B)
+
+
+def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
+    """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``, or is nearly endless."""
+    with np.errstate(divide="ignore"):
+        median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
+    if median > 2:
+        raise CollapsedFitError(
+            f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
+            f"{len(Y)} samples; lower lam, raise beta, or give more samples"
+        )
+    u = directions(Y.shape[1], 500)
+    # Shifted power iteration goes down to the smallest value on the sphere if the shift outweighs all curvature.
+    shift = surface.degree * (surface.degree - 1) * float(np.abs(surface.value(u)).max())
+    u = u[np.argsort(surface.value(u))[:5]]
+    for _ in range(30):
+        u = shift * u - surface.gradient(u)
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+    low = int(np.argmin(surface.value(u)))
+    P = float(surface.value(u)[low])
+    reach = np.inf if P <= 0 else P ** (-1 / surface.degree) / np.linalg.norm(Y, axis=1).max()
+    if reach > FAR:
+        raise CollapsedFitError(
+            f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u[low], 3).tolist()} (scaled "
+            "coordinates), where no sample holds it: sample more motions, or spread them over all directions"
+        )
