@@ -1,4 +1,4 @@
-"""Ellipsoids as limit surfaces."""
+"""Axis-aligned ellipsoids as limit surfaces, and the fits of ellipsoids."""
 
 from __future__ import annotations
 
@@ -7,12 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from lsfit.flag import FitFlag
+from lsfit.form import exponents, monomials
+from lsfit.samples import checked_wrenches, principal_frame
+from lsfit.sos import least_in_cone, quadratic_parts
+from lsfit.surface import LevelSet, checked_factors, rows
+from lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
+FAR = 10.0  # largest reach of a fitted ellipsoid, as a multiple of the samples' largest
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipsoid:
+class Ellipsoid(LevelSet):
     """Axis-aligned ellipsoid ``P(w) = sum (w_i / e_i)^2 <= 1``.
 
     A contact that cannot carry a load along an axis has the semi-axis 0 there: the body is a disc, a segment or a
@@ -22,16 +31,20 @@ class Ellipsoid:
     ----------
     semi_axes : (3,) array
         Largest ``(f_x, f_y, tau_z)``, in units of the caller's choice.
+    flag : FitFlag
+        What the reader should know.
 
     Examples
     --------
     >>> disc = Ellipsoid([1.0, 1.0, 0.0])
     >>> disc.rank, disc.volume, disc.holds([0.5, 0.5, 0.0]), disc.holds([0.0, 0.0, 1e-9])
-    (2, 0.0, True, False)
+    (2, 0.0, array([ True]), array([False]))
     """
 
-    semi_axes: FloatArray
+    semi_axes: FloatArray  # type: ignore[assignment]
+    flag: FitFlag = FitFlag.CLEAN
     degree = 2
+    dimension = 3
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""
@@ -47,6 +60,11 @@ class Ellipsoid:
         return int((self.semi_axes > 0).sum())
 
     @property
+    def span(self) -> FloatArray:
+        """Orthonormal directions ``(3, rank)`` in which the body extends."""
+        return np.eye(3)[:, self.semi_axes > 0]
+
+    @property
     def volume(self) -> float:
         """Volume ``4/3 pi e_1 e_2 e_3``."""
         return 4 / 3 * math.pi * float(self.semi_axes.prod())
@@ -58,26 +76,23 @@ class Ellipsoid:
 
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, 3) -> (m,)``; infinite for loads along an axis that carries none."""
-        return np.atleast_1d((self._over_axes(w) ** 2).sum(axis=-1))
+        w = rows(w, 3)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return (np.where((self.semi_axes == 0) & (w == 0), 0.0, w / self.semi_axes) ** 2).sum(axis=1)
 
     def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient ``2 w_i / e_i^2``, the direction of motion at ``w``, ``(m, 3) -> (m, 3)``."""
+        """Gradient ``2 w_i / e_i^2``, the direction of motion, ``(m, 3) -> (m, 3)``; 0 along an axis without load."""
         with np.errstate(divide="ignore"):
             inverse = np.where(self.semi_axes > 0, 1 / self.semi_axes, 0.0)
-        return 2 * np.atleast_2d(self._over_axes(w)) * inverse
+        return 2 * rows(w, 3) * inverse * inverse
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
-        return np.linalg.norm(np.atleast_2d(np.asarray(t, float)) * self.semi_axes, axis=1)
+        return np.linalg.norm(rows(t, 3) * self.semi_axes, axis=1)
 
-    def holds(self, w: ArrayLike) -> bool:
-        """Whether the wrench ``w (3,)`` lies in the body, surface included."""
-        return bool(self.value(w)[0] <= 1 + 1e-12)
-
-    def _over_axes(self, w: ArrayLike) -> FloatArray:
-        w = np.asarray(w, float)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where((self.semi_axes == 0) & (w == 0), 0.0, w / self.semi_axes)
+    def scaled(self, factors: ArrayLike) -> Ellipsoid:
+        """Image of the body under ``w -> factors * w``, ``(3,)``, factors not zero."""
+        return Ellipsoid(np.abs(checked_factors(factors, 3)) * self.semi_axes, self.flag)
 
 
 def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> Ellipsoid:
@@ -98,3 +113,88 @@ def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> 
     ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual patches.
     """
     return Ellipsoid(np.array([f_x, f_y, tau_z if tau_z > 1e-12 * rho * max(f_x, f_y) else 0.0]))
+
+
+def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
+    """Ellipsoid ``sum a_i w_i^2`` with the least mean square of ``P(w) - 1``, all ``a_i`` positive.
+
+    Parameters
+    ----------
+    W : (m, 3) array
+        Normalised wrenches [-].
+
+    Returns
+    -------
+    Ellipsoid
+        With the semi-axis 0 along components that no sample has. Samples that would make it endless (``a_i <= 0``)
+        give a semi-axis of `FAR` times their largest component, and the flag says so.
+
+    Raises
+    ------
+    ValueError
+        If a wrench is not finite, or all are zero.
+    """
+    W = checked_wrenches(W, 3)
+    B, _, flag = principal_frame(W)
+    reach = np.abs(W).max(axis=0)
+    used = reach > 1e-9 * reach.max()
+    X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
+    right = 1 - floor * X.sum(axis=1)
+    if B.shape[1] < used.sum() or len(W) < used.sum():  # squares may depend on each other: lean towards equal ones
+        X, right = np.vstack([X, 1e-5 * np.eye(X.shape[1])]), np.append(right, np.full(X.shape[1], 1e-5))
+    a, _ = nnls(X, right)
+    flag |= FitFlag.BOUNDED if (a == 0).any() else FitFlag.CLEAN
+    axes = np.zeros(3)
+    axes[used] = reach[used] / np.sqrt(a + floor)
+    return Ellipsoid(axes, flag)
+
+
+def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
+    """Ellipsoid ``w' A w`` with the least mean square of ``P(w) - 1``, in any number of dimensions.
+
+    Parameters
+    ----------
+    W : (m, d) array
+        Normalised wrenches [-].
+
+    Returns
+    -------
+    TiltedEllipsoid
+        Flat, and flagged, if the wrenches lie in a subspace. Where they do not determine ``A``, the ellipsoid nearest
+        to their principal axes; where they would make it endless, the best one that reaches at most `FAR` times as
+        far as they do.
+
+    Raises
+    ------
+    ValueError
+        If a wrench is not finite, or all are zero.
+    """
+    W = checked_wrenches(W)
+    B, Y, flag = principal_frame(W)
+    A, more = _quadratic_form(Y)
+    return TiltedEllipsoid.of_ball(B @ np.linalg.inv(np.linalg.cholesky(A)).T, flag | more)
+
+
+def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
+    """Matrix ``A (r, r)`` of the fit to samples with the mean squares 1, and what to know about it."""
+    m, r = Y.shape
+    E = exponents(r, 2)
+    M = monomials(Y, E)
+    ball = (E == 2).any(axis=1) / r
+    N, b = M.T @ M / m, M.mean(axis=0)
+    a, flag = nearest_solution(N, b, ball)
+    place, triangle = quadratic_parts(r)
+    A = (place @ a).reshape(r, r)
+    floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
+    if np.linalg.eigvalsh(A)[0] >= floor:
+        return A, flag
+    a = least_in_cone(N, b, triangle, floor)
+    return (place @ a).reshape(r, r), flag | FitFlag.BOUNDED
+
+
+def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[FloatArray, FitFlag]:
+    """Solution of the normal equations ``N x = b`` that is nearest to ``start`` if there are many, and a flag."""
+    values, V = np.linalg.eigh(N)
+    held = values > 1e-12 * values[-1]
+    x = start + V[:, held] @ ((V[:, held].T @ (b - N @ start)) / values[held])
+    return x, FitFlag.CLEAN if held.all() else FitFlag.UNDERDETERMINED

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from lsfit.samples import checked_motions
+from lsfit.surface import LimitSurface
+
+__all__ = ["LimitSurface", "Misfit", "misfit"]
 
 FloatArray = NDArray[np.float64]
-
-
-class LimitSurface(Protocol):
-    """Level set ``P(w) = 1`` of a homogeneous polynomial."""
-
-    @property
-    def degree(self) -> int:
-        """Degree of ``P``."""
-
-    def value(self, w: FloatArray) -> FloatArray:
-        """``P(w)``, ``(m, 3) -> (m,)``."""
-
-    def gradient(self, w: FloatArray) -> FloatArray:
-        """Gradient of ``P``, ``(m, 3) -> (m, 3)``."""
 
 
 class Misfit(NamedTuple):
@@ -37,14 +28,44 @@ class Misfit(NamedTuple):
     Edir: float
 
 
-def misfit(model: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
-    """Errors of ``model`` on wrenches ``W (m, 3)`` with unit motions ``T (m, 3)``."""
+def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
+    """Errors of ``model`` on wrenches ``W (m, d)`` with unit motions ``T (m, d)``.
+
+    Samples without a wrench say nothing about a surface and are left out. A flat model has the radius 0 (``Erad`` 1,
+    ``E1`` infinite) for wrenches out of its span, and is normal to every motion out of it: its angle is the one
+    between the motion and the nearest of its normals. Where the polynomial is not positive the radius is infinite.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite, a motion has not the length 1, or all wrenches are zero.
+    """
+    W, motions = checked_motions(W, T)
+    assert motions is not None
     P, G = model.value(W), model.gradient(W)
-    # The half-angle form keeps its digits where the arc cosine of a number near one loses them.
-    u = G / np.linalg.norm(G, axis=1, keepdims=True)
-    angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
+    with np.errstate(divide="ignore"):
+        radius = np.maximum(P, 0.0) ** (-1 / model.degree)
     return Misfit(
         float(np.abs(P - 1).mean()),
-        float(np.abs(P ** (-1 / model.degree) - 1).mean()),
-        float(np.degrees(angle).mean()),
+        float(np.abs(radius - 1).mean()),
+        float(np.degrees(_angles(G, motions, model.span)).mean()),
     )
+
+
+def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
+    """Angles ``(m,)`` between motions and gradients, or the gradients and all that is normal to the span."""
+    length = np.linalg.norm(G, axis=1, keepdims=True)
+    u = G / np.where(length > 0, length, 1.0)
+    if span.shape[1] < span.shape[0]:
+        across = T - T @ span @ span.T
+        ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
+        u = across + ahead * u
+        size = np.linalg.norm(u, axis=1, keepdims=True)
+        # A motion against the gradient is a right angle away from all that is normal to the span.
+        return np.where(size[:, 0] > 0, _angle(u / np.where(size > 0, size, 1.0), T), np.pi / 2)
+    return _angle(u, T)
+
+
+def _angle(u: FloatArray, t: FloatArray) -> FloatArray:
+    # The half-angle form keeps its digits where the arc cosine of a number near one loses them.
+    return 2 * np.arctan2(np.linalg.norm(u - t, axis=1), np.linalg.norm(u + t, axis=1))

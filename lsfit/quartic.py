@@ -1,159 +1,216 @@
-"""Quartics as limit surfaces."""
+"""Fits of quartic limit surfaces: least squares, and the best convex quartic with the proof that it is convex."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsfit.certificate import Certificate, certify, smallest_eigenvalue
+from lsfit.ellipsoid import full_ellipsoid, nearest_solution
 from lsfit.flag import FitError, FitFlag
-from lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
-from lsfit.geometry import ball_integral, directions, quartic_shadow, round_frame, supported_shadow
-from lsfit.newton import support_points
-from lsfit.surface import LevelSet, rows
+from lsfit.form import derivative, exponents, monomials, substitute
+from lsfit.quartic_surface import Quartic
+from lsfit.samples import checked_motions
+from lsfit.sos import MARGIN, convex_least_squares
+from lsfit.surface import Image
+
+__all__ = ["Quartic", "QuarticFit", "convex_quartic", "least_squares_quartic"]
 
 FloatArray = NDArray[np.float64]
+TILT = 1e3  # spread of a frame's directions from which coefficients in the wrench's own components lose digits
 
 
 @dataclass(frozen=True, eq=False)
-class Quartic(LevelSet):
-    """Level set ``P(w) = sum_k c_k w^E_k = 1`` of a homogeneous polynomial of degree 4.
+class QuarticFit:
+    """A convex quartic limit surface, and what is known about it.
 
     Parameters
     ----------
-    coefficients : (k,) array
-        ``c``, one for each monomial.
-    exponents : (k, d) array
-        ``E``, each row with the sum 4.
+    surface : Quartic or Image
+        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
+    certificate : Certificate
+        Proof that the quartic is convex.
+    objective : float
+        ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)`` over the samples.
+    least_objective : float
+        The same for the best quartic, convex or not; equal if that one is convex.
     flag : FitFlag
         What the reader should know.
     """
 
-    coefficients: FloatArray
-    exponents: NDArray[np.int64]
-    flag: FitFlag = FitFlag.CLEAN
-    degree = 4
-
-    def __post_init__(self) -> None:
-        """Bring the monomials into the order of `lsfit.form.exponents`, and refuse what is no quartic."""
-        c, E = np.array(self.coefficients, float), np.asarray(self.exponents, dtype=np.int64)
-        if E.ndim != 2 or len(E) == 0 or (E < 0).any() or (E.sum(axis=1) != 4).any():
-            raise ValueError("exponents: expected rows of whole numbers (k, d), none negative, each with the sum 4")
-        if c.shape != (len(E),) or not np.isfinite(c).all():
-            raise ValueError(
-                f"coefficients has shape {c.shape}: expected {len(E)} finite numbers, one for each monomial"
-            )
-        order = exponents(E.shape[1], 4)
-        if E is not order:
-            place = {tuple(row): n for n, row in enumerate(order.tolist())}
-            sorted_c = np.zeros(len(order))
-            np.add.at(sorted_c, [place[tuple(row)] for row in E.tolist()], c)
-            c = sorted_c
-        c.flags.writeable = False
-        object.__setattr__(self, "coefficients", c)
-        object.__setattr__(self, "exponents", order)
-
-    @property
-    def dimension(self) -> int:  # type: ignore[override]
-        """Number of components of a wrench."""
-        return self.exponents.shape[1]
+    surface: Quartic | Image
+    certificate: Certificate
+    objective: float
+    least_objective: float
+    flag: FitFlag
 
     @property
     def rank(self) -> int:
         """Dimension of the body."""
-        return self.dimension
+        return self.surface.rank
 
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends: all."""
-        return np.eye(self.dimension)
 
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``."""
-        return monomials(rows(w, self.dimension), self.exponents) @ self.coefficients
+class RoundSamples(NamedTuple):
+    """Samples in coordinates ``w = B y`` in which their ellipsoid is the unit ball.
 
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient of ``P``, ``(m, d) -> (m, d)``."""
-        cubic = monomials(rows(w, self.dimension), exponents(self.dimension, 3))
-        return cubic @ (derivative(self.dimension, 4) @ self.coefficients).T
+    ``Y (m, r)`` are wrenches, ``T (m, d)`` unit motions within the span or zero where a motion has no part in it,
+    ``B (d, r)`` the map and ``inverse (r, d)`` its pseudo-inverse.
+    """
 
-    def hessian(self, w: ArrayLike) -> FloatArray:
-        """Second derivatives of ``P``, ``(m, d) -> (m, d, d)``."""
-        W, d = rows(w, self.dimension), self.dimension
-        return ((W[:, :, None] * W[:, None, :]).reshape(-1, d * d) @ self.tensor.reshape(d * d, d * d)).reshape(
-            -1, d, d
+    Y: FloatArray
+    T: FloatArray | None
+    B: FloatArray
+    inverse: FloatArray
+    flag: FitFlag
+
+
+def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
+    """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
+    W, T = checked_motions(W, T)
+    ball = full_ellipsoid(W)
+    B = ball.F
+    assert B is not None
+    inverse = np.linalg.pinv(B)
+    if T is not None and ball.rank < ball.dimension:
+        T = T @ ball.span @ ball.span.T
+        length = np.linalg.norm(T, axis=1, keepdims=True)
+        T = np.where(length > 1e-9, T / np.maximum(length, 1e-9), 0.0)
+    # The ellipsoid's bound says nothing about the quartic's; its other flags do.
+    return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.BOUNDED & ~FitFlag.UNDERDETERMINED)
+
+
+class Residuals(NamedTuple):
+    """Rows of the least-squares problem: the mean of ``|rows v - right|^2`` over ``count`` samples is the objective."""
+
+    rows: FloatArray
+    right: FloatArray
+    count: int
+
+    def objective(self, v: FloatArray) -> float:
+        """Mean over the samples of the weighted squares."""
+        return float(((self.rows @ v - self.right) ** 2).sum()) / self.count
+
+    def normal(self) -> tuple[FloatArray, FloatArray]:
+        """Matrix ``N (k, k)`` and right side ``b (k,)`` of the normal equations."""
+        return self.rows.T @ self.rows / self.count, self.rows.T @ self.right / self.count
+
+
+def residuals(samples: RoundSamples, beta: float, gamma: float) -> Residuals:
+    """Rows ``sqrt(beta) (P - 1)`` and ``sqrt(gamma) (I - t t') grad P``, gradients in the wrench's components."""
+    m, r = samples.Y.shape
+    M = np.sqrt(beta) * monomials(samples.Y, exponents(r, 4))
+    right = np.full(m, np.sqrt(beta))
+    if gamma == 0:
+        return Residuals(M, right, m)
+    T = samples.T
+    if T is None:
+        raise ValueError(f"gamma is {gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
+    d, k = samples.inverse.shape[1], M.shape[1]
+    D = np.einsum("ri,rck->cik", samples.inverse, derivative(r, 4)).reshape(-1, d * k)
+    G = (monomials(samples.Y, exponents(r, 3)) @ D).reshape(m, d, k)
+    G -= T[:, :, None] * (T[:, None, :] @ G)
+    G *= np.sqrt(gamma) * T.any(axis=1)[:, None, None]
+    return Residuals(np.vstack([M, G.reshape(m * d, k)]), np.concatenate([right, np.zeros(m * d)]), m)
+
+
+def ball_coefficients(dimension: int) -> FloatArray:
+    """Coefficients of ``|y|^4``."""
+    squares = exponents(dimension, 2)
+    v = np.zeros(len(exponents(dimension, 4)))
+    place = {tuple(row): n for n, row in enumerate(exponents(dimension, 4).tolist())}
+    for i in np.flatnonzero((squares == 2).any(axis=1)):
+        for j in np.flatnonzero((squares == 2).any(axis=1)):
+            v[place[tuple((squares[i] + squares[j]).tolist())]] += 1.0
+    return v
+
+
+def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Image:
+    """Quartic with coefficients ``v`` of the round frame, in the wrench's components."""
+    d, r = samples.B.shape
+    E = exponents(r, 4)
+    if r < d:
+        return Image(Quartic(v, E), samples.B, flag)
+    reach = np.linalg.norm(samples.B, axis=1)
+    turn = samples.B / reach[:, None]
+    if np.linalg.cond(turn) > TILT:
+        return Image(Quartic(v, E), samples.B, flag)
+    return Quartic(substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1), E, flag)
+
+
+def least_squares_quartic(
+    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 1.0
+) -> Quartic | Image:
+    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, which may fail to be convex.
+
+    Parameters
+    ----------
+    W : (m, d) array
+        Normalised wrenches [-].
+    T : (m, d) array
+        Unit motions; needed unless ``gamma`` is 0 [-].
+    beta, gamma : float
+        Weights of wrenches and of motions. The gradient of ``P`` is four times as long as the wrench: with 1 and 1
+        the directions weigh more; with ``gamma = 0`` the errors of `lsfit.misfit` in the radius are least.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite, or all wrenches are zero.
+    """
+    samples = round_samples(W, T)
+    v, flag = nearest_solution(*residuals(samples, beta, gamma).normal(), ball_coefficients(samples.B.shape[1]))
+    return placed(v, samples, samples.flag | flag)
+
+
+def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 1.0) -> QuarticFit:
+    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
+
+    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
+    the semidefinite programme is solved, which asks for eigenvalues of at least `lsfit.sos.MARGIN`, so that rounding
+    cannot undo the proof.
+
+    Parameters
+    ----------
+    W, T, beta, gamma
+        As for `least_squares_quartic`.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite, or all wrenches are zero.
+    FitError
+        If the programme is not solved, or its result fails the certificate.
+    """
+    samples = round_samples(W, T)
+    r = samples.B.shape[1]
+    problem = residuals(samples, beta, gamma)
+    N, b = problem.normal()
+    ball = ball_coefficients(r)
+    v, flag = nearest_solution(N, b, ball)
+    least = problem.objective(v)
+    flag |= samples.flag
+    by = "least squares"
+    gram = certify(v, r)
+    if gram is None:
+        by = "semidefinite programme"
+        v, gram = convex_least_squares(N, b, ball, r, flag & FitFlag.UNDERDETERMINED != 0)
+    surface = placed(v, samples, flag)
+    values = np.linalg.eigvalsh(gram)
+    if values[0] < MARGIN / 4:
+        raise FitError(
+            f"the Gram matrix of the convex quartic has the eigenvalue {values[0]:.2e}: report these samples"
         )
+    certificate = Certificate(_smallest(surface), float(values[0]), gram, samples.B, by)
+    return QuarticFit(surface, certificate, problem.objective(v), least, flag)
 
-    @cached_property
-    def tensor(self) -> FloatArray:
-        """Symmetric ``Q (d, d, d, d)`` with the second derivatives ``H_ij(w) = Q_ijkl w_k w_l``."""
-        return hessian_tensor(self.coefficients, self.dimension)
 
-    @cached_property
-    def frame(self) -> FloatArray:
-        """Map ``L (d, d)`` from a body that is nearly round onto this one."""
-        return round_frame(self.value, self.dimension, 4)
-
-    @cached_property
-    def volume(self) -> float:
-        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-6 beyond."""
-        V = ball_integral(self._round.value, self.dimension, 4)
-        return abs(float(np.linalg.det(self.frame))) * V
-
-    @cached_property
-    def shadow_area(self) -> float:
-        """Area of the shadow on the plane of the first two components, for a convex quartic."""
-        if self.dimension == 3:
-            return quartic_shadow(self.coefficients, self.semi_axes)
-        if self.dimension == 2:
-            return self.volume
-        return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``, for a convex quartic; to 1e-12 of itself.
-
-        Raises
-        ------
-        FitError
-            If a search stops short, which a quartic that is not convex may cause.
-        """
-        T = rows(t, self.dimension)
-        return (T * self.support_points(T)).sum(axis=1)
-
-    def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of a convex surface where ``t`` is the outward normal, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
-        T = rows(t, self.dimension) @ self.frame
-        length = np.linalg.norm(T, axis=1)
-        T = T / np.where(length > 0, length, 1.0)[:, None]
-        Y = self._surface_points
-        start = np.empty_like(T)
-        for part in range(0, len(T), 10_000):
-            along = T[part : part + 10_000] @ Y.T
-            best = np.abs(along).argmax(axis=1)
-            start[part : part + 10_000] = Y[best] * np.sign(along[np.arange(len(best)), best])[:, None]
-        out = np.zeros_like(T)
-        moving = length > 0
-        found = np.empty((int(moving.sum()), self.dimension))
-        failed = support_points(self._round.tensor, T[moving], start[moving], found)
-        if failed:
-            raise FitError(f"{failed} of {len(T)} supports did not converge: the quartic may not be convex")
-        out[moving] = found @ self.frame.T
-        return out
-
-    def scaled(self, factors: ArrayLike) -> Quartic:
-        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        f = np.asarray(factors, float)
-        if f.shape != (self.dimension,) or not np.isfinite(f).all() or (f == 0).any():
-            raise ValueError(f"factors is {f.tolist()}: expected {self.dimension} finite numbers, none of them zero")
-        return Quartic(self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag)
-
-    @cached_property
-    def _round(self) -> Quartic:
-        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
-
-    @cached_property
-    def _surface_points(self) -> FloatArray:
-        u = directions(self.dimension, 30 * self.dimension**2)
-        return u * self._round.radius(u)[:, None]
+def _smallest(surface: Quartic | Image) -> float:
+    if isinstance(surface, Quartic):
+        return smallest_eigenvalue(surface.coefficients, surface.dimension)
+    R = np.linalg.qr(surface.B)[1]
+    inner = surface.inner
+    assert isinstance(inner, Quartic)
+    return smallest_eigenvalue(substitute(inner.coefficients, inner.exponents, np.linalg.inv(R)), inner.dimension)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsfit.flag import FitFlag
+
 FloatArray = NDArray[np.float64]
+THIN = 1e-3  # below this ratio of their principal lengths, samples are called thin
 
 
 def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
@@ -52,3 +55,57 @@ def sample_rank(W: ArrayLike, tolerance: float = 1e-9) -> int:
     """
     values = np.linalg.svd(np.asarray(W, float), compute_uv=False)
     return int((values > tolerance * values.max(initial=0.0)).sum())
+
+
+def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
+    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero.
+
+    Raises
+    ------
+    ValueError
+        If there are none, one is not finite, or they do not have ``dimension`` components.
+    """
+    W = np.asarray(W, float)
+    if W.ndim != 2 or len(W) == 0 or (dimension is not None and W.shape[1] != dimension):
+        raise ValueError(f"W has shape {W.shape}: expected wrenches as rows, (m, {dimension or 'd'})")
+    if not np.isfinite(W).all():
+        raise ValueError(f"W[{int(np.argmin(np.isfinite(W).all(axis=1)))}] is not finite: drop it or correct it")
+    if not W.any():
+        raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
+    return W[W.any(axis=1)]
+
+
+def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, FloatArray | None]:
+    """`checked_wrenches` with their motions ``(m, d)``, which must have the length 1, or without."""
+    if T is None:
+        return checked_wrenches(W), None
+    W, T = np.asarray(W, float), np.asarray(T, float)
+    if W.shape != T.shape:
+        raise ValueError(f"W has shape {W.shape} and T {T.shape}: every wrench needs its motion")
+    wrenches = checked_wrenches(W)
+    length = np.linalg.norm(T, axis=1)
+    if not np.allclose(length, 1, atol=1e-6):
+        n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
+        raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
+    return wrenches, T[W.any(axis=1)]
+
+
+def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
+    """Coordinates ``w = B y`` in the span of the samples, in which their components have the mean square 1.
+
+    Returns
+    -------
+    B : (d, r) array
+        Map onto the span; its rank is `sample_rank`.
+    Y : (m, r) array
+        The samples.
+    flag : FitFlag
+        Whether the samples are flat or thin.
+    """
+    U, values, V = np.linalg.svd(W, full_matrices=False)
+    r = int((values > 1e-9 * values[0]).sum())
+    flag = FitFlag.CLEAN if r == W.shape[1] else FitFlag.RANK_DEFICIENT
+    flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
+    size = np.sqrt(len(W))
+    V[np.abs(V) < 1e-15] = 0.0  # components that no sample has stay exactly zero
+    return V[:r].T * (values[:r] / size), U[:, :r] * size, flag

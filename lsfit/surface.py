@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -78,6 +77,14 @@ def rows(w: ArrayLike, dimension: int) -> FloatArray:
     return W
 
 
+def checked_factors(factors: ArrayLike, dimension: int) -> FloatArray:
+    """Factors of a change of units, ``(d,)``, refused if they do not keep the body's rank."""
+    f = np.asarray(factors, float)
+    if f.shape != (dimension,) or not np.isfinite(f).all() or (f == 0).any():
+        raise ValueError(f"factors is {f.tolist()}: expected {dimension} finite numbers, none of them zero")
+    return f
+
+
 class LevelSet:
     """What follows from ``value``, ``support`` and ``degree`` alike for every surface."""
 
@@ -100,11 +107,6 @@ class LevelSet:
     def holds(self, w: ArrayLike) -> NDArray[np.bool_]:
         """Whether wrenches lie in the body, surface included, ``(m, d) -> (m,)``."""
         return self.value(w) <= 1 + self.degree * ON_THE_SURFACE
-
-    @property
-    def semi_axes(self) -> FloatArray:
-        """Largest reach ``(d,)`` along each component."""
-        return self.support(np.eye(self.dimension))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +158,11 @@ class Image(LevelSet):
         return np.linalg.qr(self.B)[0]
 
     @property
+    def semi_axes(self) -> FloatArray:
+        """Largest reach ``(d,)`` along each component."""
+        return self.support(np.eye(self.dimension))
+
+    @property
     def volume(self) -> float:
         """Volume of the body; 0 if it is flat."""
         return abs(float(np.linalg.det(self.B))) * self.inner.volume if self.rank == self.dimension else 0.0
@@ -186,12 +193,7 @@ class Image(LevelSet):
 
     def scaled(self, factors: ArrayLike) -> Image:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return Image(self.inner, np.asarray(factors, float)[:, None] * self.B, self.flag)
+        return Image(self.inner, checked_factors(factors, self.dimension)[:, None] * self.B, self.flag)
 
     def _inner(self, W: FloatArray) -> FloatArray:
         return W @ np.linalg.pinv(self.B).T
-
-
-def unit_ball_volume(dimension: int) -> float:
-    """Volume of the unit ball."""
-    return math.pi ** (dimension / 2) / math.gamma(dimension / 2 + 1)

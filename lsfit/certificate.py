@@ -1,0 +1,94 @@
+"""Proofs that a quartic is convex: its Gram matrix, and the smallest curvature on the unit sphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lsfit.form import hessian_tensor
+from lsfit.geometry import directions
+from lsfit.sos import MARGIN, ball_freedom, gram_matrix, most_definite
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What proves a quartic ``P`` convex.
+
+    Parameters
+    ----------
+    smallest_eigenvalue : float
+        Smallest eigenvalue of the second derivative of ``P`` over unit wrenches (of a flat body, those in its span).
+        Searched from many starts; the proof is the Gram matrix.
+    gram_eigenvalue : float
+        Smallest eigenvalue of ``gram``. Not negative: ``P`` is convex.
+    gram : (r * r, r * r) array
+        ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the products ``z_i y_j``.
+    frame : (d, r) array
+        ``B``.
+    by : str
+        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
+    """
+
+    smallest_eigenvalue: float
+    gram_eigenvalue: float
+    gram: FloatArray
+    frame: FloatArray
+    by: str
+
+
+def certify(v: FloatArray, dimension: int) -> FloatArray | None:
+    """Gram matrix of the quartic with coefficients ``v`` if one is positive definite, else None.
+
+    Three ways in order of cost: the Gram matrix nearest to that of a ball; none if a direction of negative curvature
+    is found; the most definite one of the affine family.
+    """
+    gram = gram_matrix(v, ball_freedom(dimension), dimension)
+    if np.linalg.eigvalsh(gram)[0] >= MARGIN:
+        return gram
+    if smallest_eigenvalue(v, dimension) < 0:
+        return None
+    gram = gram_matrix(v, most_definite(gram, dimension) + ball_freedom(dimension), dimension)
+    return gram if np.linalg.eigvalsh(gram)[0] >= MARGIN else None
+
+
+def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
+    """Smallest eigenvalue of the second derivative over the unit sphere.
+
+    ``z' H(u) z`` is the same with ``u`` and ``z`` exchanged, so taking the softest direction in turn can only lower it;
+    this starts from the lowest of several hundred directions.
+
+    Parameters
+    ----------
+    v : (k,) array
+        Coefficients in the order of `lsfit.form.exponents`.
+    """
+    d = dimension
+    Q = hessian_tensor(v, d).reshape(d * d, d * d)
+    u = directions(d, 200 if d <= 3 else 1000)
+    H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+    u = u[np.argsort(lowest_eigenvalues(H))[:6]]
+    last = np.inf
+    for _ in range(500):
+        H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+        values, vectors = np.linalg.eigh(H)
+        low, u = float(values[:, 0].min()), vectors[:, :, 0]
+        if last - low <= 1e-12 * float(np.abs(values).max()):
+            break
+        last = low
+    return low
+
+
+def lowest_eigenvalues(H: FloatArray) -> FloatArray:
+    """Smallest eigenvalues of symmetric matrices, ``(m, d, d) -> (m,)``; in 3-D from the roots of the cubic."""
+    if H.shape[1] != 3:
+        return np.linalg.eigvalsh(H)[:, 0]
+    mean = (H[:, 0, 0] + H[:, 1, 1] + H[:, 2, 2]) / 3
+    a, b, c = H[:, 0, 0] - mean, H[:, 1, 1] - mean, H[:, 2, 2] - mean
+    f, g, h = H[:, 1, 2], H[:, 0, 2], H[:, 0, 1]
+    p = np.sqrt((a * a + b * b + c * c + 2 * (f * f + g * g + h * h)) / 6) + 1e-300
+    det = (a * (b * c - f * f) - h * (h * c - f * g) + g * (h * f - b * g)) / (2 * p**3)
+    return mean + 2 * p * np.cos((np.arccos(np.clip(det, -1, 1)) + 2 * np.pi) / 3)

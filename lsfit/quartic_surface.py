@@ -1,0 +1,162 @@
+"""Quartics as limit surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsfit.flag import FitError, FitFlag
+from lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
+from lsfit.geometry import ball_integral, directions, quartic_shadow, round_frame, supported_shadow
+from lsfit.newton import support_points
+from lsfit.surface import LevelSet, checked_factors, rows
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Quartic(LevelSet):
+    """Level set ``P(w) = sum_k c_k w^E_k = 1`` of a homogeneous polynomial of degree 4.
+
+    Parameters
+    ----------
+    coefficients : (k,) array
+        ``c``, one for each monomial.
+    exponents : (k, d) array
+        ``E``, each row with the sum 4.
+    flag : FitFlag
+        What the reader should know.
+    """
+
+    coefficients: FloatArray
+    exponents: NDArray[np.int64]
+    flag: FitFlag = FitFlag.CLEAN
+    degree = 4
+
+    def __post_init__(self) -> None:
+        """Bring the monomials into the order of `lsfit.form.exponents`, and refuse what is no quartic."""
+        c, E = np.array(self.coefficients, float), np.asarray(self.exponents, dtype=np.int64)
+        if E.ndim != 2 or len(E) == 0 or (E < 0).any() or (E.sum(axis=1) != 4).any():
+            raise ValueError("exponents: expected rows of whole numbers (k, d), none negative, each with the sum 4")
+        if c.shape != (len(E),) or not np.isfinite(c).all():
+            raise ValueError(
+                f"coefficients has shape {c.shape}: expected {len(E)} finite numbers, one for each monomial"
+            )
+        order = exponents(E.shape[1], 4)
+        if E is not order:
+            place = {tuple(row): n for n, row in enumerate(order.tolist())}
+            sorted_c = np.zeros(len(order))
+            np.add.at(sorted_c, [place[tuple(row)] for row in E.tolist()], c)
+            c = sorted_c
+        c.flags.writeable = False
+        object.__setattr__(self, "coefficients", c)
+        object.__setattr__(self, "exponents", order)
+
+    @property
+    def dimension(self) -> int:  # type: ignore[override]
+        """Number of components of a wrench."""
+        return self.exponents.shape[1]
+
+    @property
+    def rank(self) -> int:
+        """Dimension of the body."""
+        return self.dimension
+
+    @property
+    def span(self) -> FloatArray:
+        """Orthonormal directions ``(d, rank)`` in which the body extends: all."""
+        return np.eye(self.dimension)
+
+    def value(self, w: ArrayLike) -> FloatArray:
+        """``P(w)``, ``(m, d) -> (m,)``."""
+        return monomials(rows(w, self.dimension), self.exponents) @ self.coefficients
+
+    def gradient(self, w: ArrayLike) -> FloatArray:
+        """Gradient of ``P``, ``(m, d) -> (m, d)``."""
+        cubic = monomials(rows(w, self.dimension), exponents(self.dimension, 3))
+        return cubic @ (derivative(self.dimension, 4) @ self.coefficients).T
+
+    def hessian(self, w: ArrayLike) -> FloatArray:
+        """Second derivatives of ``P``, ``(m, d) -> (m, d, d)``."""
+        W, d = rows(w, self.dimension), self.dimension
+        return ((W[:, :, None] * W[:, None, :]).reshape(-1, d * d) @ self.tensor.reshape(d * d, d * d)).reshape(
+            -1, d, d
+        )
+
+    @cached_property
+    def tensor(self) -> FloatArray:
+        """Symmetric ``Q (d, d, d, d)`` with the second derivatives ``H_ij(w) = Q_ijkl w_k w_l``."""
+        return hessian_tensor(self.coefficients, self.dimension)
+
+    @cached_property
+    def frame(self) -> FloatArray:
+        """Map ``L (d, d)`` from a body that is nearly round onto this one."""
+        return round_frame(self.value, self.dimension, 4)
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-6 beyond."""
+        V = ball_integral(self._round.value, self.dimension, 4)
+        return abs(float(np.linalg.det(self.frame))) * V
+
+    @cached_property
+    def shadow_area(self) -> float:
+        """Area of the shadow on the plane of the first two components, for a convex quartic."""
+        if self.dimension == 3:
+            return quartic_shadow(self.coefficients, self.semi_axes)
+        if self.dimension == 2:
+            return self.volume
+        return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``, for a convex quartic; to 1e-12 of itself.
+
+        Raises
+        ------
+        FitError
+            If a search stops short, which a quartic that is not convex may cause.
+        """
+        T = rows(t, self.dimension)
+        return (T * self.support_points(T)).sum(axis=1)
+
+    @property
+    def semi_axes(self) -> FloatArray:
+        """Largest reach ``(d,)`` along each component."""
+        return self.support(np.eye(self.dimension))
+
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Points of a convex surface where ``t`` is the outward normal, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        T = rows(t, self.dimension) @ self.frame
+        length = np.linalg.norm(T, axis=1)
+        T = T / np.where(length > 0, length, 1.0)[:, None]
+        Y = self._surface_points
+        start = np.empty_like(T)
+        for part in range(0, len(T), 10_000):
+            along = T[part : part + 10_000] @ Y.T
+            best = np.abs(along).argmax(axis=1)
+            start[part : part + 10_000] = Y[best] * np.sign(along[np.arange(len(best)), best])[:, None]
+        out = np.zeros_like(T)
+        moving = length > 0
+        found = np.empty((int(moving.sum()), self.dimension))
+        failed = support_points(self._round.tensor, T[moving], start[moving], found)
+        if failed:
+            raise FitError(f"{failed} of {len(T)} supports did not converge: the quartic may not be convex")
+        out[moving] = found @ self.frame.T
+        return out
+
+    def scaled(self, factors: ArrayLike) -> Quartic:
+        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
+        f = checked_factors(factors, self.dimension)
+        return Quartic(self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag)
+
+    @cached_property
+    def _round(self) -> Quartic:
+        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
+
+    @cached_property
+    def _surface_points(self) -> FloatArray:
+        u = directions(self.dimension, 30 * self.dimension**2)
+        return u * self._round.radius(u)[:, None]
