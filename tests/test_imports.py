@@ -23,7 +23,7 @@ DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "h5py": {"study/store.py"},
     "pyvista": PICTURES,
-    "vtkmodules": PICTURES,
+    "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
 }
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 
