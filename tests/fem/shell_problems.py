@@ -13,7 +13,7 @@ import numpy as np
 from fem.shell_mesh import patch
 from fem.shell_model import Shell
 
-UX, UY, UZ = np.eye(6)[:3]  # one displacement of a node
+UX, UY, UZ = np.eye(6)[:3]  # a force on a node
 
 
 @dataclass
@@ -130,6 +130,44 @@ def pinched_cylinder(n):
     c.fixed[np.ix_(k[:, -1], [0, 2, 3, 5])] = True
     c.load[k[0, 0]] = -0.25 * UZ
     c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
+def pulled_cylinder(around=24, along=36):
+    """Eighth of a cylinder with free ends, pulled outwards by two opposing forces."""
+    t, y = np.meshgrid(np.linspace(0, np.pi / 2, around + 1), np.linspace(0, 5.175, along + 1), indexing="ij")
+    e = np.stack([np.sin(t), 0 * t, np.cos(t)], -1)
+    X = 4.953 * e
+    X[..., 1] = y
+    c, k = case(X, e, 0.094, 10.5e6, 0.3125), numbers(around, along)
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[-1], 2)
+    symmetric(c.fixed, k[:, 0], 1)
+    c.load[k[0, 0]] = 40e3 / 4 * UZ
+    c.probes = [(k[0, 0], 2, 1), (k[-1, 0], 0, -1), (k[-1, -1], 0, -1)]
+    return c
+
+
+def pinched_half_cylinder(n=40):
+    """Half of a half cylinder, clamped at one end, pressed down at the other's crown; the straight side slides."""
+    c, k = cylinder(101.6, 304.8, 3.0, (0, np.pi / 2), 2068.5, 0.3, n)
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[-1], 2)
+    c.fixed[k[:, 0]] = True
+    c.load[k[0, -1]] = -2000 / 2 * UZ
+    c.probes = [(k[0, -1], 2, -1)]
+    return c
+
+
+def crushed_cylinder(n=40):
+    """Eighth of a cylinder with rigid diaphragms, far into its collapse."""
+    c, k = cylinder(100.0, 100.0, 1.0, (0, np.pi / 2), 30e3, 0.3, n)
+    symmetric(c.fixed, k[0], 0)
+    symmetric(c.fixed, k[-1], 2)
+    symmetric(c.fixed, k[:, 0], 1)
+    c.fixed[np.ix_(k[:, -1], [0, 2, 3, 5])] = True
+    c.load[k[0, 0]] = -12000 / 4 * UZ
+    c.probes = [(k[0, 0], 2, -1), (k[-1, 0], 0, 1)]
     return c
 
 

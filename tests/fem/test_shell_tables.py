@@ -1,0 +1,133 @@
+"""Published answers of shells: nonlinear tables row by row, the linear course, guards on the number of iterations."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fem.errors import ConvergenceError
+from fem.path import follow
+from fem.shell_linear import LinearShell
+from fem.shell_solve import ShellProblem, load_steps
+from tests.fem import shell_problems
+
+TABLES = json.loads((Path(__file__).parents[1] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
+NONLINEAR = {
+    "cantilever_end_shear": shell_problems.cantilever,
+    "slit_annular_plate": shell_problems.annulus,
+    "hemisphere_18deg_hole": shell_problems.hemisphere,
+}
+LINEAR = {
+    "scordelis_lo": shell_problems.scordelis_lo,
+    "pinched_cylinder": shell_problems.pinched_cylinder,
+    "hemisphere": shell_problems.linear_hemisphere,
+}
+
+
+def problem(case, **options):
+    return ShellProblem(case.shell, case.fixed.ravel(), case.load.ravel(), **options)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["cantilever_end_shear", "hemisphere_18deg_hole", pytest.param("slit_annular_plate", marks=pytest.mark.long)],
+)
+def test_nonlinear_table(name):
+    table, case = TABLES[name], NONLINEAR[name]()
+    rows = np.array(table["table"])
+    states = list(load_steps(problem(case), rows[:, 0]))
+    found = np.array([case.read(state.q) for state in states])
+    # printed with three digits: half a unit of the last one is theirs
+    assert (np.abs(found - rows[:, 1:]) <= table["tol_rel"] * rows[:, 1:] + 0.0005).all()
+    assert sum(state.cuts for state in states) == 0
+
+
+@pytest.mark.parametrize("name", NONLINEAR)
+def test_full_load_in_one_step(name):
+    """Guard on the tangent of mixed integration points: the plain one takes hundreds of iterations, or fails."""
+    table, case = TABLES[name], NONLINEAR[name]()
+    (state,) = load_steps(problem(case), [1.0])
+    assert (state.iterations, state.cuts) <= (20, 0)
+    assert case.read(state.q) == pytest.approx(table["table"][-1][1:], rel=table["tol_rel"])
+
+
+def test_the_plain_tangent_finds_the_same_state():
+    case = shell_problems.hemisphere(8)
+    ((mixed,), (plain,)) = (list(load_steps(problem(case, mixed=kind), [0.1])) for kind in (True, False))
+    assert mixed.q == pytest.approx(plain.q, abs=1e-9 * np.abs(plain.q).max())
+    assert plain.iterations > mixed.iterations
+
+
+def test_hinged_roof_past_both_limit_points():
+    case, table = shell_problems.hinged_roof(12.7), TABLES["hinged_roof_12.7"]
+    path = [(0.0, 0.0)]
+    for state in follow(problem(case), 0.05, longest=10.0):
+        path.append((case.read(state.q)[0], state.factor))
+        if state.factor > 1:
+            break
+    w, P = np.array(path).T
+    rows = np.array(table["table"])
+    assert np.abs(np.interp(rows[:, 1], w, P) - rows[:, 0]).max() < table["tol_abs_P"]
+
+
+def test_thin_hinged_roof_snaps_back():
+    """Largest load .1953 at 12.892, smallest -.1288 at 15.778, and in between the middle moves back up."""
+    case = shell_problems.hinged_roof(6.35)
+    path = [(0.0, 0.0)]
+    for state in follow(problem(case), 0.05, longest=10.0):
+        path.append((case.read(state.q)[0], state.factor))
+        if state.factor > 0.3:
+            break
+    w, P = np.array(path).T
+    top = int(np.argmax(P * (w < 14.5)))
+    low = int(np.argmin(P))
+    assert P[top] == pytest.approx(0.1953, abs=0.003)
+    assert P[low] == pytest.approx(-0.1288, abs=0.003)
+    assert (np.diff(w[: low + 1]) < 0).any()
+
+
+def test_load_steps_that_fail_even_when_cut_say_where():
+    case = shell_problems.hemisphere(4)
+    with pytest.raises(ConvergenceError, match="load factor 0 on the way to 1"):
+        list(load_steps(problem(case), [1.0], iterations=1))
+
+
+def test_a_driven_displacement_needs_the_force_that_moves_it_as_far():
+    """Up to the limit, and beyond it, where no load steps lead."""
+    case = shell_problems.hinged_roof(12.7, 8)
+    (loaded,) = load_steps(problem(case), [0.5])
+    path = np.zeros(case.shell.size)
+    path[2] = loaded.q[2]
+    driven = problem(case, path=path)
+    driven.load = 0 * driven.load
+    first, beyond = load_steps(driven, [1.0, 2.5], tolerance=1e-6)
+    assert first.reaction[2] == pytest.approx(0.5 * case.load[0, 2], rel=1e-6)
+    assert first.q == pytest.approx(loaded.q, abs=1e-6 * np.abs(loaded.q).max())
+    assert -beyond.q[2] == pytest.approx(-2.5 * loaded.q[2])
+    assert 0 < beyond.reaction[2] / case.load[0, 2] < 0.75
+    with pytest.raises(ValueError, match="tolerance"):
+        next(load_steps(driven, [1.0]))
+
+
+@pytest.mark.parametrize("name", LINEAR)
+@pytest.mark.parametrize("n", [4, 8, 16, pytest.param(32, marks=pytest.mark.long)])
+def test_linear_course(name, n):
+    case, table = LINEAR[name](n), TABLES["linear"][name]
+    q = LinearShell(case.shell, case.fixed.ravel()).solve(case.load.ravel())
+    assert case.read(q)[0] / table["ref"] == pytest.approx(table["measured_Q4"][str(n)][1], abs=2e-4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "levels", "expected", "tolerance"),
+    [
+        ("pulled_cylinder", [1.0], [2.768, 4.551, 3.269], 0.01),
+        ("pinched_half_cylinder", np.linspace(0.05, 1, 20), [171.505], 0.01),
+        ("crushed_cylinder", np.linspace(0.05, 1, 20), [83.10, 34.27], 0.06),  # wrinkles, which depend on the mesh
+    ],
+)
+def test_other_problems_at_full_load(name, levels, expected, tolerance):
+    case = getattr(shell_problems, name)()
+    *_, last = load_steps(problem(case), levels)
+    assert case.read(last.q) == pytest.approx(expected, rel=tolerance)
