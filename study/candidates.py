@@ -38,15 +38,13 @@ def candidates(scene: Scene) -> list[Candidate]:
     where = scene.candidates
     if where.poses:
         return [
-            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), pose.label or f"pose {i}")
-            for i, pose in enumerate(where.poses)
+            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), label)
+            for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
+    places = product(where.station_values, where.angles)
     return [
-        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll), f"{s:g} mm, {a:g} deg")
-        for (station, s), (angle, a) in product(
-            zip(where.station_values, where.station_values_mm, strict=True),
-            zip(where.angles, where.angles_deg, strict=True),
-        )
+        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll), label)
+        for (station, angle), label in zip(places, where.labels, strict=True)
     ]
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +16,19 @@ from friction.patch import ContactPatch
 from friction.wrench import FrictionLimits, friction_limits
 from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from study.model import Finger
-from study.quantities import MODELS
+from study.quantity import MODELS
 from study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-ANTIPODAL = np.radians(5.0)  # beyond this misalignment the antipodal score is flagged
+ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS = 6  # loaded ones, below which it is coarse too
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as study.quantities says
 REMARKS = {
     SLIPS: "the line between the contacts leaves a friction cone, the grasp slips",
-    NOT_ANTIPODAL: "contacts more than 5 deg from antipodal, the score is approximate",
+    NOT_ANTIPODAL: "contacts more than 5 deg from antipodal",
     PADS_MEET: "the pads run into each other beside the object, which is not simulated",
     COARSE: "the mesh is coarse for this contact",
     NODAL_INSTEAD: "weighted gaps had no solution, nodal gaps were taken",
@@ -36,7 +38,10 @@ UNSTABLE = "foam lost ellipticity, strains may localise"
 
 
 class Contact:
-    """One finger at one force: patch in the pad's frame, contact frame, friction limits and limit surface per model."""
+    """One finger at one force: patch in the pad's frame, contact frame, friction limits and ellipsoid per model.
+
+    ``unit_limits`` are the friction limits for mu = 1, ``ellipsoids`` go through the three motions of ``limits``.
+    """
 
     def __init__(self, scene: Scene, finger: Finger, state: Pressed) -> None:
         self.finger, self.state, self.symmetry = finger, state, state.pad.symmetry
@@ -44,18 +49,32 @@ class Contact:
         self.patch: ContactPatch = extract(state.pad, state)
         self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
         self.local: ContactPatch = in_frame(self.patch, self.frame)
+        self.rho = contact_length(self.local)
+        mu = scene.friction.mu
+        self.unit_limits: dict[str, FrictionLimits] = {name: friction_limits(self.local, 1.0, name) for name in MODELS}
         self.limits: dict[str, FrictionLimits] = {
-            name: friction_limits(self.local, scene.friction.mu, name) for name in MODELS
+            name: replace(found, f_x=mu * found.f_x, f_y=mu * found.f_y, tau_z=mu * found.tau_z)
+            for name, found in self.unit_limits.items()
         }
-        rho = contact_length(self.local)
-        self.surfaces: dict[str, Ellipsoid] = {
-            name: three_motion_ellipsoid(*found.per_unit_force, rho) for name, found in self.limits.items()
+        self.ellipsoids: dict[str, Ellipsoid] = {
+            name: three_motion_ellipsoid(*found.per_unit_force, self.rho) for name, found in self.limits.items()
         }
+
+    def of(self, finger: Finger) -> Contact:
+        """The same contact of another finger, which stands where the object looks the same."""
+        other = copy(self)
+        other.finger = finger
+        return other
 
     @property
     def origin(self) -> FloatArray:
         """Origin of the contact frame in the object's frame ``(3,)`` [m]."""
         return self.finger.pose.to_object(self.frame.origin[None])[0]
+
+    @property
+    def axes(self) -> FloatArray:
+        """Rows x, y, N of the contact frame in the object's frame ``(3, 3)``."""
+        return self.frame.axes @ self.finger.pose.rotation.T
 
     @property
     def normal(self) -> FloatArray:

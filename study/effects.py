@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import nan
 from typing import Any
 
+import numpy as np
+
+from study.limit_surface import dropped_share
 from study.quantities import REASONS
 from study.scene import Scene
 
-ONLY, FORCED, SYMMETRY = (REASONS.index(r) for r in (REASONS[0], "forced by the scene", "exact by symmetry"))
+ONLY, FORCED, SYMMETRY, DEFAULT = (REASONS.index(r) for r in (REASONS[0], REASONS[1], REASONS[4], REASONS[5]))
+SURFACES = {
+    "three_motions": "ellipsoid from three motions",
+    "axis_aligned": "fitted ellipsoid",
+    "full": "fitted ellipsoid",
+    "quartic": "convex quartic",
+}
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
-def effects_of(scene: Scene, contacts: Sequence[Any]) -> dict[str, tuple[str, float, int]]:
+def effects_of(
+    scene: Scene, contacts: Sequence[Any], bounds: Sequence[Mapping[str, Any]]
+) -> dict[str, tuple[str, float, int]]:
     """Level, indicator and reason of every effect of one case; keys and levels as in ``study.quantities.EFFECTS``.
 
     The indicators are those that a choice between levels is made by: the largest strain for the pad, the share of the
-    normal force that the tilt of the loaded normals takes away for the friction model.
+    normal force that the tilt of the loaded normals takes away for the friction model, the mean share of the three
+    dropped components for the wrench, the radial misfit for the limit surface.
     """
     wanted = scene.effects
 
@@ -26,6 +38,10 @@ def effects_of(scene: Scene, contacts: Sequence[Any]) -> dict[str, tuple[str, fl
 
     strain = max(c.state.checks.max_strain for c in contacts)
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
+    curved = [own["curved"] for own in bounds]
+    dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
+    radial = float(np.max([b.misfit.Erad for b in curved]))
+    six = "3-D" if wanted.wrench == "auto" else wanted.wrench
     size = MODEL_SIZES[min(sum(c.symmetry) for c in contacts)]
     return {
         "object": ("rigid", nan, only("object")),
@@ -34,7 +50,7 @@ def effects_of(scene: Scene, contacts: Sequence[Any]) -> dict[str, tuple[str, fl
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": ("two", nan, only("fingers")),
         "friction": ("curved", 1.0 - F_N / S, only("friction")),
-        "wrench": ("3-D", nan, only("wrench")),
-        "limit_surface": ("ellipsoid from three motions", nan, only("limit_surface")),
+        "wrench": (six, dropped, DEFAULT if wanted.wrench == "auto" else FORCED),
+        "limit_surface": (SURFACES[scene.limit_surface.model], radial, FORCED),
         "friction_pressure_coupling": ("none", nan, ONLY),
     }

@@ -8,18 +8,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from study.quantities import EFFECTS, FINGERS, MODELS, PATCH, REASONS, Quantity, definitions, quantities
+from study.datasets import MESSAGE as MESSAGE
+from study.datasets import MISSING as MISSING
+from study.datasets import ROOT as ROOT
+from study.datasets import Column, Dataset, columns_of, datasets_of
+from study.finger_quantities import PATCH
+from study.quantities import definitions, quantities
+from study.quantity import FINGERS, MODELS, NEEDS, Quantity
 
-PROGRAM, VERSION = "softjaw", 1
-MISSING, DONE, FAILED = 0, 1, 2
-MESSAGE, LABEL, SESSIONS = 240, 80, 256
-ROOT = "/study"
+PROGRAM, VERSION = "softjaw", 2
+DONE, FAILED = 1, 2
+LABEL, SESSIONS = 80, 256
 SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
      ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
@@ -53,38 +58,12 @@ class Derived:
 
 
 @dataclass(frozen=True)
-class Dataset:
-    """One dataset: where, how large, what it is filled with, its attributes and the scale along each dimension."""
-
-    path: str
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    fill: Any
-    attributes: dict[str, Any] = field(default_factory=dict)
-    scales: tuple[str, ...] = ()
-
-    @property
-    def nbytes(self) -> int:
-        """Size on disk."""
-        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
-
-
-@dataclass(frozen=True)
-class Column:
-    """One case's share of a dataset; ``counted`` columns enter the row's checksum, timings do not."""
-
-    key: str
-    path: str
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    fill: Any
-    counted: bool = True
-    flat: bool = False
-
-
-@dataclass(frozen=True)
 class Layout:
-    """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options."""
+    """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
+
+    ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
+    for the candidates ``sampled``, counted over stations and angles.
+    """
 
     axes: tuple[Any, ...]
     faces: int
@@ -93,6 +72,9 @@ class Layout:
     derived: tuple[Derived, ...] = ()
     cor_grid: int = 0
     planar: str = "flat"
+    has: tuple[str, ...] = ()
+    samples: int = 0
+    sampled: tuple[int, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -102,7 +84,8 @@ class Layout:
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """All per-case quantities of this file but the patch."""
-        return quantities(self.meshes, self.cor_grid)
+        has = (*self.has, *[NEEDS[0]] * (self.meshes > 1))
+        return quantities(has, self.cor_grid, self.samples if self.sampled else 0)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -122,20 +105,23 @@ class Layout:
     @property
     def counters(self) -> dict[str, int]:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
-        parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "component_2": 3, "session": SESSIONS}
+        parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": 15, "session": SESSIONS}
+        parts |= {"component_2": 3, **({"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {})}
         if self.cor_grid:
             parts["cor"] = self.cor_grid**2
+        if self.sampled:
+            parts |= {"sampled": len(self.sampled), "sample": self.samples}
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """All columns of a row, in the order of the checksum."""
-        return tuple(_columns(self))
+        return tuple(columns_of(self))
 
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
         """All datasets but axes, texts and sessions."""
-        return tuple(_datasets(self))
+        return tuple(datasets_of(self))
 
     @property
     def nbytes(self) -> int:
@@ -143,10 +129,26 @@ class Layout:
         count = len(self.datasets) + len(self.axes) + 16
         return sum(d.nbytes for d in self.datasets) + SESSIONS * SESSION.itemsize + 4096 * count + 2**16
 
+    @cached_property
+    def _slots(self) -> dict[int, int]:
+        return {candidate: slot for slot, candidate in enumerate(self.sampled)}
+
+    def places(self, row: int) -> list[tuple[int, ...] | None]:
+        """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
+        index = tuple(int(i) for i in np.unravel_index(row, self.shape))
+        slot = self._slots.get(index[-3] * self.shape[-2] + index[-2])
+        among = None if slot is None else (*index[:-3], slot, index[-1])
+        return [(row,) if c.flat else among if c.sampled else index for c in self.columns]
+
+    def definitions(self) -> str:
+        """The definitions of all quantities of this layout, derived ones included."""
+        derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in self.derived]
+        return definitions((*self.quantities, *PATCH)) + "".join(derived)
+
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar")
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled")
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -163,117 +165,10 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         cor_grid, planar = int(options["cor_grid"]), options["planar"]
         if not 0 <= cor_grid <= 1000 or planar not in MODELS[1:]:
             raise ValueError(f"cor_grid {cor_grid}, planar {planar!r}")
-        return Layout(tuple(axes), faces, meshes, bool(options["patches"]), derived, cor_grid, planar)
+        has, sampled, samples = tuple(options["has"]), tuple(map(int, options["sampled"])), int(options["samples"])
+        if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
+            raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
+        patches = bool(options["patches"])
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
-
-
-def _columns(layout: Layout):
-    f8 = np.dtype("<f8")
-    for q in layout.quantities:
-        if q.group == "maps" and q.by_model:
-            for model in MODELS:
-                yield Column(f"{q.key}/{model}", f"{ROOT}/{q.name}/{model}", (), f8, np.nan)
-        elif q.group == "maps":
-            yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", (), f8, np.nan)
-        else:
-            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, counted=q.group != "work")
-    for name in EFFECTS:
-        for part, dtype, fill in (("level", "i1", -1), ("indicator", "<f8", np.nan), ("reason", "i1", -1)):
-            yield Column(f"effects/{name}_{part}", f"{ROOT}/effects/{name}_{part}", (), np.dtype(dtype), fill)
-    if layout.patches:
-        for q in PATCH:
-            shape = (FINGERS, layout.faces, *q.shape)
-            yield Column(q.key, f"{ROOT}/{q.key}", shape, f8, np.nan, flat=True)
-    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
-
-
-def _datasets(layout: Layout):
-    described = {q.key: q for q in layout.quantities + PATCH}
-    for c in layout.columns:
-        q = described.get(c.key) or described.get(c.key.rpartition("/")[0])
-        attributes = _describe(q, c.key) if q else _describe_effect(c.key)
-        lead, scales = ((layout.rows,), ("row",)) if c.flat else (layout.shape, layout.names)
-        yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, attributes, scales + _labels(q, c))
-    state = {"long_name": "state of the case", "meaning": "0 missing, 1 done, 2 failed", "units": ""}
-    yield Dataset(f"{ROOT}/status/code", layout.shape, np.dtype("u1"), MISSING, state, layout.names)
-    crc = {"long_name": "crc32 of the row, timings left out", "units": ""}
-    yield Dataset(f"{ROOT}/status/crc", layout.shape, np.dtype("<u4"), 0, crc, layout.names)
-    tries = {"long_name": "times this case was begun", "units": ""}
-    yield Dataset(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"), 0, tries, layout.names)
-    lengths = dict(zip(layout.names, layout.shape, strict=True))
-    for d in layout.derived:
-        attributes = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
-        axes = tuple(name.replace(".", "_") for name in d.axes)
-        shape = tuple(lengths[name] for name in axes) + d.shape
-        scales = axes if not d.shape else ()
-        yield Dataset(f"{ROOT}/derived/{d.name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
-
-
-def _describe(q, key: str) -> dict[str, str]:
-    model = key.rpartition("/")[2] if key != q.key else ""
-    label = f"{q.long_name}, {model}" if model else q.long_name
-    long_name = f"{label} [{q.units}]" if q.units else label
-    attributes = {"units": q.units, "long_name": long_name, "definition": q.definition}
-    if q.by_model and not model:
-        attributes["models"] = ", ".join(MODELS)
-    return attributes
-
-
-def _describe_effect(key: str) -> dict[str, str]:
-    if key == "status/message":
-        return {"long_name": "why a case failed, or what to know about a result", "units": ""}
-    name, _, part = key.removeprefix("effects/").rpartition("_")
-    meaning = {"level": EFFECTS[name], "reason": REASONS}.get(part)
-    attributes = {"long_name": f"{part} of the effect '{name}'", "units": ""}
-    if meaning:
-        attributes["meaning"] = ", ".join(f"{i} {text}" for i, text in enumerate(meaning))
-    return attributes
-
-
-def _labels(q, column: Column) -> tuple[str, ...]:
-    if not column.shape:
-        return ()
-    finger = ("finger",) if q.per == "finger" else ()
-    face = ("face",) if q.group == "patch" else ()
-    labels = finger + face + (("model",) if q.by_model else ()) + (("cor",) if q.name == "cor_wrench" else ())
-    return labels + ("component", "component_2")[: len(column.shape) - len(labels)]
-
-
-def view_slice(layout: Layout) -> list[str]:
-    """Which two axes a viewer shows first (``.``) and where it stands on the others: the highest force, else 0."""
-    names, shape = layout.names, layout.shape
-    preference = [n for n in ("station", "angle", *names) if n in names]
-    shown = [n for n in dict.fromkeys(preference) if shape[names.index(n)] > 1][:2] or list(names[-1:])
-    last = {"normal_force": shape[-1] - 1}
-    return ["." if n in shown else str(last.get(n, 0)) for n in names]
-
-
-def groups(layout: Layout) -> dict[str, dict[str, Any]]:
-    """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
-    # silx takes an axis of exactly two values for a linear calibration and draws nothing: no axis is better there.
-    names, shape = layout.names, layout.shape
-    plot = {
-        "NX_class": "NXdata",
-        "axes": ["." if k == 2 else n for n, k in zip(names, shape, strict=True)],
-        "default_slice": view_slice(layout),
-        **{f"{n}_indices": i for i, (n, k) in enumerate(zip(names, shape, strict=True)) if k != 2},
-    }
-    found: dict[str, dict[str, Any]] = {}
-    for q in layout.quantities:
-        if q.group != "maps":
-            continue
-        several = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])}
-        signal = several if q.by_model else {"signal": q.name}
-        found[q.name] = {**plot, **signal, "title": q.long_name, "definition": q.definition}
-    found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
-    collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in layout.quantities}]
-    collections += ["patch"] * layout.patches + ["derived"] * bool(layout.derived)
-    found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
-    return found
-
-
-def definitions_text(layout: Layout) -> str:
-    """The definitions of all quantities of this layout, derived ones included."""
-    derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in layout.derived]
-    return definitions(layout.meshes, layout.cor_grid) + "".join(derived)

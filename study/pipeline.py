@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from fem.errors import CheckError, ConvergenceError
 from fem.press import Press, Pressed, Settings
-from friction.frame import contact_length
 from friction.motion import cor_grid
 from friction.wrench import friction_wrench
-from scoring.score import score
 from study import model
 from study.build import build_object, pad_shape
 from study.candidates import turn_of_pose
 from study.contact import Contact, angles, flags, remark
 from study.effects import effects_of
-from study.quantities import MODELS
+from study.grasp import grasp_values
+from study.limit_surface import Bound, bound, surface_values
+from study.quantity import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
 
@@ -47,14 +47,17 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
                 yield k, outcome
                 continue
             start = time.perf_counter()
-            # an image finger has its partner's states; only its place differs
-            states = [outcome[0], outcome[0] if shared else outcome[1]]
-            contacts = [[Contact(scene, f, state) for state in own] for f, own in zip(fingers, states, strict=True)]
-            values = _values(scene, obj, [fine for fine, *_ in contacts])
+            contacts = [[Contact(scene, f, state) for state in own] for f, own in zip(fingers, outcome, strict=False)]
+            bounds = [_bounds(scene, fine) for fine, *_ in contacts]
+            if shared:  # an image finger has its partner's states; only its place differs
+                contacts.append([c.of(fingers[1]) for c in contacts[0]])
+                bounds *= 2
+            values = _values(scene, obj, [fine for fine, *_ in contacts], bounds)
             if scene.accuracy.meshes == 2:
                 values |= _mesh_errors(*zip(*contacts, strict=True))
             seconds = time.perf_counter() - start
-            yield k, _result(scene, values, contacts, [s for own in outcome for s in own], seconds)
+            effects = effects_of(scene, [fine for fine, *_ in contacts], bounds)
+            yield k, _result(values, contacts, [s for own in outcome for s in own], seconds, effects)
     finally:
         for press in (p for own in presses for p in own):
             press.destroy()
@@ -94,7 +97,13 @@ def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
     return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, settings)
 
 
-def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
+def _bounds(scene: Scene, contact: Contact) -> dict[str, Bound]:
+    """Limit surface of one finger in every friction model."""
+    choice = scene.limit_surface
+    return {m: bound(contact.local, contact.rho, contact.unit_limits[m], m, choice) for m in MODELS}
+
+
+def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, Bound]]) -> dict[str, Any]:
     """Maps and per-finger values of one case, keyed as in ``study.quantities``."""
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
@@ -102,11 +111,9 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
     }
     S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
     distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
-    scores = [_score(scene, obj, contacts, m, distance) for m in MODELS]
+    scores, score_flag = grasp_values(scene, obj, contacts, bounds)
     areas = [float(c.patch.area[c.patch.pressure > 0].sum()) for c in contacts]
     values = {
-        "maps/quality": [s.quality for s in scores],
-        "maps/epsilon": [s.epsilon for s in scores],
         "maps/S": S.mean(),
         "maps/F_N": F_N.mean(),
         "maps/travel": np.mean([c.state.travel for c in contacts]),
@@ -115,7 +122,7 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         "maps/contact_distance": distance,
         "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
         "maps/misalignment": max(angles(*contacts)),
-        "maps/flags": flags(contacts, scene.friction.mu, int(scores[0].flag)),
+        "maps/flags": flags(contacts, scene.friction.mu, score_flag),
         "fingers/S": S,
         "fingers/F_N": F_N,
         "fingers/travel": [c.state.travel for c in contacts],
@@ -126,7 +133,7 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         "fingers/pose_origin": np.array([c.finger.pose.origin for c in contacts]),
     }
     for name in ("semi_axes", "rank"):
-        values[f"limit_surface/{name}"] = [[getattr(c.surfaces[m], name) for m in MODELS] for c in contacts]
+        values[f"limit_surface/{name}"] = [[getattr(c.ellipsoids[m], name) for m in MODELS] for c in contacts]
     for name, key in LIMITS:
         values[f"maps/{key}"] = limits[name].min(axis=0)
         values[f"fingers/{key}"] = limits[name]
@@ -134,22 +141,13 @@ def _values(scene: Scene, obj, contacts: list[Contact]) -> dict[str, Any]:
         values[f"maps/{key}"] = limits[key].min(axis=0)
     if scene.friction.cor_grid:
         values["fingers/cor_wrench"] = [_cor_wrenches(scene, c) for c in contacts]
+    values |= scores | surface_values(scene, contacts, bounds)
     return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
-
-
-def _score(scene: Scene, obj, contacts: list[Contact], name: str, distance: float):
-    """Score with the limit surface of one friction model, the ellipsoid from three motions, per unit normal force."""
-    object_length = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
-    contact_length = scene.score.contact_length or scene.gripper.pad_length
-    if scene.score.torque_scale == "object":
-        contact_length = object_length
-    one, two = (c.surfaces[name].semi_axes for c in contacts)
-    return score(one, two, distance, object_length, contact_length)
 
 
 def _cor_wrenches(scene: Scene, contact: Contact) -> FloatArray:
     """Friction wrenches ``(f_x, f_y, tau_z)`` for the paper's grid of centres of rotation."""
-    twists = cor_grid(scene.friction.cor_grid, contact_length(contact.local))
+    twists = cor_grid(scene.friction.cor_grid, contact.rho)
     return friction_wrench(contact.local, twists, scene.friction.mu)[:, [0, 1, 5]]
 
 
@@ -174,7 +172,7 @@ def _mesh_errors(fine: Sequence[Contact], coarse: Sequence[Contact]) -> dict[str
 
 
 def _result(
-    scene: Scene, values: dict[str, Any], contacts: list[list[Contact]], states: list[Pressed], friction: float
+    values: dict[str, Any], contacts: list[list[Contact]], states: list[Pressed], friction: float, effects: dict
 ) -> CaseResult:
     """Values, checks, work and patches of one case."""
     fine = [c for c, *_ in contacts]
@@ -187,4 +185,4 @@ def _result(
     values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values | checks, patch, remark(values["maps/flags"], fine), effects_of(scene, fine))
+    return CaseResult(values | checks, patch, remark(values["maps/flags"], fine), effects)

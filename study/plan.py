@@ -64,8 +64,17 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         tuple(derived(scene)),
         scene.friction.cor_grid,
         scene.friction.model,
+        has(scene),
+        scene.limit_surface.samples,
+        scene.sampled,
     )
     return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.object.axis_symmetry)))
+
+
+def has(scene: Any) -> tuple[str, ...]:
+    """Which of `study.quantity.NEEDS` besides two meshes a scene asks for."""
+    asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    return tuple(name for name, wanted in asked.items() if wanted)
 
 
 def by_cost(costs: Sequence[float]) -> list[int]:

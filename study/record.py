@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from study.layout import MESSAGE, Layout
-from study.quantities import EFFECTS, MODELS
+from study.quantities import EFFECTS
+from study.quantity import MODELS
 from study.result import CaseResult
 
 
@@ -64,7 +65,8 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
     return given
 
 
-def crc32(layout: Layout, row: Sequence[np.ndarray]) -> int:
-    """Checksum of everything in the row but timings."""
-    counted = zip(layout.columns, row, strict=True)
-    return zlib.crc32(b"".join(np.asarray(value, c.dtype).tobytes() for c, value in counted if c.counted))
+def crc32(layout: Layout, row: int, values: Sequence[np.ndarray]) -> int:
+    """Checksum of everything that is stored of a row but timings."""
+    stored = zip(layout.columns, values, layout.places(row), strict=True)
+    counted = [np.asarray(value, c.dtype) for c, value, place in stored if c.counted and place is not None]
+    return zlib.crc32(b"".join(value.tobytes() for value in counted))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,14 +14,17 @@ import numpy as np
 from study.layout import DONE
 
 DISPLAY = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / np.pi)}  # what people read; programs get SI
-COLUMNS = (
-    ("quality", "curved"),
-    ("e_n", "curved"),
-    ("e_n", "planar"),
-    ("f_x_max", "curved"),
-    ("f_y_max", "curved"),
-    ("tau_z_max", "curved"),
+COLUMNS = (  # map, friction model ("" where it has none), unit
+    ("quality", "curved", ""),
+    ("quality_fitted", "curved", ""),
+    ("misfit", "", ""),
+    ("e_n", "curved", "m"),
+    ("e_n", "planar", "m"),
+    ("f_x_max", "curved", "N"),
+    ("f_y_max", "curved", "N"),
+    ("tau_z_max", "curved", "N m"),
 )
+SOMETIMES = (("safety_factor", "curved", ""), ("e_n_error", "", ""))  # columns of files that have the map
 LOST = 1024 | 2048  # flags of a grasp that does not hold as it was computed
 FLAGS = (  # as study.quantities defines them
     (1, "no torque", "a contact carries no torque about its normal"),
@@ -30,14 +33,14 @@ FLAGS = (  # as study.quantities defines them
     (4 + 16, "frame", "the contact frame came from a rule for degenerate patches"),
     (32, "mixed", "normals of a patch point to opposite sides: its normal force and frame cannot be trusted"),
     (64, "overhang", "some loaded faces of a patch are turned more than 90 deg from the contact normal"),
-    (256, "approx.", "contacts more than 5 deg from antipodal, where the score's closed form is an approximation"),
+    (256, "askew", "contacts more than 5 deg from antipodal"),
     (512, "nodal", "solved with nodal gaps, because weighted ones had no solution"),
     (1024, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"),
     (2048, "overlap", "the fingers' pads run into each other beside the object"),
     (4096, "coarse", "the mesh is coarse for this contact: take more elements before trusting the numbers"),
 )
+HEADS = {"quality_fitted": "fitted", "safety_factor": "safety"}  # names that are too long for a line of text
 Columns = tuple[tuple[str, str], ...]  # names and units
-UNITS = {"quality": "", "e_n": "m", "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "e_n_error": ""}
 
 
 @dataclass(frozen=True)
@@ -66,32 +69,34 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
     """
     forces = result.axes[-1].values
     k = len(forces) - 1 if force is None else int(np.abs(forces - force).argmin())
-    planar = result.layout.planar
-    columns = [(name, planar if model == "planar" else model) for name, model in COLUMNS]
-    maps = {column: result.map(*column)[..., k].ravel() for column in columns}
-    score = maps[columns[0]] if np.isfinite(maps[columns[0]]).any() else maps[columns[1]]
+    maps = {(name, units): found[..., k].ravel() for name, units, found in _maps(result)}
+    score = next(maps[c] for c in (("quality", ""), ("e_n", "m")) if c[0] == "e_n" or np.isfinite(maps[c]).any())
     done = np.flatnonzero(result.status[..., k].ravel() == DONE)
-    extra = [("e_n_error", "")] if result.layout.meshes > 1 else []
-    error = result.map("e_n_error")[..., k].ravel() if extra else None
     flags = np.nan_to_num(result.map("flags")[..., k].ravel())
     order = done[ranking(score[done], flags[done])]
     labels = np.broadcast_to(result.labels, result.layout.shape[:-1]).ravel()
     named = [("label", "")] if has_poses(result) else []
     head = [(axis.name, axis.units) for axis in result.axes[:-1]]
-    quantities = [(name if model == "curved" else f"{name}_{model}", UNITS[name]) for name, model in columns]
-    titles = (("rank", ""), *head, *quantities, *extra, ("flags", ""), *named)
+    titles = (("rank", ""), *head, *maps, ("flags", ""), *named)
 
     def row(rank: int, i: int) -> tuple[Any, ...]:
         index = np.unravel_index(i, result.layout.shape[:-1])
         place = [float(axis.values[j]) for axis, j in zip(result.axes[:-1], index, strict=True)]
         values = [float(column[i]) for column in maps.values()]
-        errors = [] if error is None else [float(error[i])]
-        return (rank, *place, *values, *errors, int(flags[i]), *([str(labels[i])] * len(named)))
+        return (rank, *place, *values, int(flags[i]), *([str(labels[i])] * len(named)))
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     nearest = "" if force is None or np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
     return Table(f"{what} at {forces[k]:g} N{nearest}", titles, tuple(rows))
+
+
+def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Name, unit and values of the columns between the place and the flags."""
+    there = {q.name for q in result.layout.quantities}
+    for name, model, units in (*COLUMNS, *(column for column in SOMETIMES if column[0] in there)):
+        model = result.layout.planar if model == "planar" else model
+        yield f"{name}_{model}" if model not in ("", "curved") else name, units, result.map(name, model or None)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
@@ -112,7 +117,8 @@ def as_text(table: Table) -> str:
         return table.title
     shown = [DISPLAY.get(units, (units, 1.0)) for _, units in table.columns]
     names, flags = [name for name, _ in table.columns], 0
-    head = [f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(names, shown, strict=True)]
+    short = [HEADS.get(name, name) for name in names]
+    head = [f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(short, shown, strict=True)]
     body: list[list[str]] = []
     for before, row in zip((None, *table.rows), table.rows, strict=False):
         cells = _cells(row, table.columns)

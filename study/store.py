@@ -17,6 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from friction.motion import fibonacci_twists
 from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
 from study.layout import (
     DONE,
@@ -31,9 +32,8 @@ from study.layout import (
     Dataset,
     Header,
     Layout,
-    definitions_text,
-    groups,
 )
+from study.plots import groups
 from study.reading import Result, text_of
 from study.record import blank, crc32, text_bytes
 
@@ -103,7 +103,7 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
-    for name, text in (("scene", header.scene), ("definitions", definitions_text(layout))):
+    for name, text in (("scene", header.scene), ("definitions", layout.definitions())):
         data = text.encode() or b" "
         study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
@@ -114,6 +114,9 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     labels[: len(header.labels)] = [text_bytes(label, LABEL) for label in header.labels]
     named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
     _attach_scales(named, layout.names[-3:-1])
+    if layout.sampled:
+        study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
+        study["wrenches/candidate"][...] = layout.sampled
 
 
 def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
@@ -176,16 +179,21 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
 def torn_rows(path: Path, layout: Layout) -> list[int]:
     """Rows that are marked done but do not match their checksum."""
     with h5py.File(path, "r") as file:
-        views = [_mapped(path, file[c.path], (layout.rows, *c.shape), c.dtype) for c in layout.columns]
+        views = [_mapped(path, file[c.path], c.dtype) for c in layout.columns]
         done = np.flatnonzero(file[f"{ROOT}/status/code"][()].ravel() == DONE)
         crc = file[f"{ROOT}/status/crc"][()].ravel()
-    return [int(row) for row in done if crc32(layout, [view[row] for view in views]) != crc[row]]
+
+    def stored(row: int) -> list[Any]:
+        pairs = zip(views, layout.places(row), strict=True)
+        return [None if place is None else view[place] for view, place in pairs]
+
+    return [int(row) for row in done if crc32(layout, row, stored(row)) != crc[row]]
 
 
-def _mapped(path: Path, dataset: h5py.Dataset, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+def _mapped(path: Path, dataset: h5py.Dataset, dtype: np.dtype) -> np.ndarray:
     if dataset.size == 0:
-        return np.empty(shape, dtype)
-    return np.memmap(path, dtype, "r", dataset.id.get_offset(), shape)
+        return np.empty(dataset.shape, dtype)
+    return np.memmap(path, dtype, "r", dataset.id.get_offset(), dataset.shape)
 
 
 # --- parallel writing ----------------------------------------------------------------------------------------------
@@ -234,12 +242,15 @@ class ResultWriter:
         index = self._index(row)
         if self._code[index] == DONE:
             raise ValueError(f"row {row} is done already and must not be written again")
-        for column, dataset, value in zip(self.layout.columns, self._columns, values, strict=True):
+        places = self.layout.places(row)
+        for column, dataset, value, place in zip(self.layout.columns, self._columns, values, places, strict=True):
+            if place is None:
+                continue
             if column.dtype.kind == "S":
                 dataset[index] = value.astype(dataset.dtype)  # with its encoding
             elif value.size:
-                _write_block(dataset, (row,) if column.flat else index, value)
-        self._crc[index] = crc32(self.layout, values)
+                _write_block(dataset, place, value)
+        self._crc[index] = crc32(self.layout, row, values)
         self._code[index] = state
 
     def _index(self, row: int) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ from study.report import background, curvature, curves, words
 from study.report import maps as report_maps
 from study.report import patch as report_patch
 from study.report import side as report_side
+from study.report import surface as report_surface
 from study.report.data import Data
 from study.report.outline import read_scene
 from study.report.page import Picture, heading, page, paragraph, picture
@@ -60,6 +61,8 @@ def build(result: Any) -> tuple[str, bytes]:
         sections.append(("models", "Friction models compared", _models(data, data.best, mu)))
         if patch := report_patch.patch_picture(data, data.best):
             sections.append(("patch", "Contact patch of the best case", _pictures([patch])))
+        if drawn := _surfaces(data, data.best):
+            sections.append(("surface", "Limit surface of the best case", _pictures(drawn)))
     sections += [
         ("cases", "Cases and checks", words.cases(data) + words.checks(data)),
         ("effects", "What was simulated", background.effects(data)),
@@ -89,6 +92,13 @@ def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:
         html += heading(f"Over the {data.name(data.axes[position])}, all else as in the best case")
         html += picture(curves.model_curves(data, position, best, mu, own))
     return html
+
+
+def _surfaces(data: Data, best: tuple[int, ...]) -> list[Picture]:
+    """Limit surfaces of the best case, and how well they fit along an axis of several values."""
+    over = next((p for p in [*reversed(_worth_a_curve(data)), len(best) - 1] if data.shape[p] > 1), None)
+    curve = None if over is None else report_surface.misfit_curves(data, over, best)
+    return [*report_surface.surface_pictures(data, best), *([curve] if curve else [])]
 
 
 def _worth_a_curve(data: Data) -> list[int]:

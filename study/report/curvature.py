@@ -10,7 +10,7 @@ import numpy as np
 
 from study import pictures
 from study.layout import DONE
-from study.quantities import MODELS
+from study.quantity import MODELS
 from study.report.data import Data, number, shown
 from study.report.outline import swept_object
 from study.report.page import Picture

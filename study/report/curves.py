@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from study import pictures
-from study.quantities import MODELS
+from study.quantity import MODELS
 from study.report.data import Data, shown
 from study.report.page import Picture
 

@@ -15,10 +15,10 @@ CAVEAT = (
     "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
     "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
 )
-COLUMNS = ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max")
+COLUMNS = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 HEADS = {
-    "quality": "quality", "e_n": "e_n [mm]", "f_x_max": "max f_x [N]", "f_y_max": "max f_y [N]",
-    "tau_z_max": "max tau_z [N mm]",
+    "quality": "quality", "quality_fitted": "quality, fitted", "e_n": "e_n [mm]", "f_x_max": "max f_x [N]",
+    "f_y_max": "max f_y [N]", "tau_z_max": "max tau_z [N mm]",
 }  # fmt: skip
 
 

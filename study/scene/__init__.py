@@ -17,8 +17,10 @@ from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, SceneError, key_text
 from study.scene.file_checks import mesh_file
 from study.scene.gripper_checks import warnings
+from study.scene.limit_surface_checks import LEVELS
 from study.scene.loading import checked_sections, flat, known_keys, with_overrides
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
+from study.scene.score_sections import LimitSurface, Score, Task
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output
 from study.scene.shapes import Mesh, Object, Section
 from study.scene.sweeps import NOT_SWEPT, put, sweep_findings
 from study.scene.text import key_lines, parse_toml, read_text, toml_text
@@ -35,7 +37,9 @@ class Scene(Section):
     friction: Friction = Field(default_factory=Friction)
     candidates: Candidates
     load: Load
+    limit_surface: LimitSurface = Field(default_factory=LimitSurface)
     score: Score = Field(default_factory=Score)
+    task: Task = Field(default_factory=Task)
     effects: Effects = Field(default_factory=Effects)
     accuracy: Accuracy = Field(default_factory=Accuracy)
     output: Output = Field(default_factory=Output)
@@ -58,6 +62,14 @@ class Scene(Section):
     def warnings(self) -> tuple[str, ...]:
         """Sentences about values that are allowed but seldom meant."""
         return tuple(warnings(self.gripper, self.friction, self.load, self.accuracy))
+
+    @property
+    def sampled(self) -> tuple[int, ...]:
+        """Numbers of the candidates whose sampled wrenches are stored, rising."""
+        wanted, labels = self.limit_surface.wrench_samples, self.candidates.labels
+        if isinstance(wanted, str):
+            return tuple(range(len(labels))) if wanted == "all" else ()
+        return tuple(sorted({labels.index(w) if isinstance(w, str) else w for w in wanted}))
 
     @property
     def cases(self) -> int:
@@ -153,6 +165,9 @@ def _flatten_sweep(data: dict[str, Any], lines: dict[KeyPath, int]) -> None:
 def _fill_in(data: dict[str, Any], path: Path) -> None:
     """Fill in what depends on the scene file or on the sweep: result file, place of the mesh, values that are swept."""
     output, shape, sweep = data.setdefault("output", {}), data.get("object"), data.get("sweep")
+    effects, surface = data.get("effects"), data.setdefault("limit_surface", {})
+    if isinstance(effects, dict) and isinstance(surface, dict) and (level := effects.get("limit_surface")) in LEVELS:
+        surface.setdefault("model", LEVELS[level][0])
     if isinstance(output, dict):
         output.setdefault("file", f"results/{path.stem}.hdf")
     if isinstance(shape, dict) and isinstance(shape.get("mesh"), str) and shape["mesh"]:

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, closest, shown
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Score
+from study.scene.score_sections import LimitSurface, Score, Task
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output
 from study.scene.sentences import model_findings
 from study.scene.shapes import SHAPES, Section
 
@@ -20,7 +21,9 @@ SECTIONS: dict[str, type[Section]] = {
     "friction": Friction,
     "candidates": Candidates,
     "load": Load,
+    "limit_surface": LimitSurface,
     "score": Score,
+    "task": Task,
     "effects": Effects,
     "accuracy": Accuracy,
     "output": Output,

@@ -122,6 +122,13 @@ class Candidates(Section):
         return tuple(s / 1000 for s in self.station_values_mm)
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the candidates: stations, then angles at each."""
+        if self.poses:
+            return tuple(pose.label or f"pose {i}" for i, pose in enumerate(self.poses))
+        return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
+
+    @property
     def count(self) -> int:
         """Number of candidates."""
         return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
@@ -141,22 +148,6 @@ class Load(Section):
         return tuple(sorted(values))
 
 
-class Score(Section):
-    """How torques are made comparable with forces in the grasp quality."""
-
-    torque_scale: Literal["contact", "object"] = Field(
-        "contact",
-        description="soft torques over the contact length (the paper's choice), or all over the object length",
-    )
-    object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
-        "auto", description="length that scales torque arms; auto is the object's largest extent"
-    )
-    contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
-        "auto", description="length that scales soft torques; auto is the pad's length"
-    )
-    object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
-
-
 class Effects(Section):
     """What is simulated; ``auto`` takes the cheapest level that the scene allows."""
 
@@ -166,8 +157,12 @@ class Effects(Section):
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
     friction: Literal["auto", "curved"] = Field("auto", description="friction model behind the score")
-    limit_surface: Literal["auto", "ellipsoid"] = Field("auto", description="form of the limit surface")
-    wrench: Literal["auto", "3-D"] = Field("auto", description="components of the friction wrench")
+    limit_surface: Literal["auto", "three_motions", "fitted_ellipsoid", "quartic"] = Field(
+        "auto", description="form of the limit surface; auto is that of [limit_surface]"
+    )
+    wrench: Literal["auto", "3-D", "6-D"] = Field(
+        "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"
+    )
 
 
 class Accuracy(Section):

@@ -24,8 +24,7 @@ EXAMPLES = {
 }  # fmt: skip
 LATER_LEVELS = {
     "object": ("linear_shell", "nonlinear_shell", "shell"), "pad": ("linear",), "sheet": ("elastic", "elastic_plate"),
-    "fingers": ("one",), "limit_surface": ("fitted", "fitted_ellipsoid", "quartic", "convex_quartic"),
-    "wrench": ("6-D",), "friction": ("coupled",),
+    "fingers": ("one",), "friction": ("coupled",),
 }  # fmt: skip
 
 

@@ -24,6 +24,8 @@ class Shape(Section):
     """What all shapes share. The object's axis is z."""
 
     name: str = Field("", max_length=100, description="name for titles and tables")
+    mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
+    mass = si("mass_g")
 
     @property
     def axis_symmetry(self) -> int:

@@ -26,6 +26,8 @@ class Unit(NamedTuple):
 UNITS = {
     **{name: Unit("length", times, over, "m", name) for name, (times, over) in LENGTHS.items()},
     "um": Unit("length", 1, 1e6, "m", "um"),
+    "kg": Unit("mass", 1, 1, "kg", "kg"),
+    "g": Unit("mass", 1, 1000, "kg", "g"),
     "n": Unit("force", 1, 1, "N", "N"),
     "kn": Unit("force", 1000, 1, "N", "kN"),
     "pa": Unit("pressure", 1, 1, "Pa", "Pa"),

@@ -15,7 +15,7 @@ from study import pipeline
 from study.build import build_object
 from study.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
 from study.environment import launch_environment
-from study.quantities import MODELS
+from study.quantity import MODELS
 from study.result import CaseFailure
 from study.scene import parse_scene
 from study.sweep import units

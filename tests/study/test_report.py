@@ -91,7 +91,7 @@ def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", m
             values = record(layout, solved(layout, index, message, **changes)) if done else blank(layout, what)
             for column, value in zip(layout.columns, values, strict=True):
                 file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-            file["study/status/crc"][index] = crc32(layout, values)
+            file["study/status/crc"][index] = crc32(layout, row, values)
             file["study/status/code"][index] = 1 if done else 2
     return path
 

@@ -78,9 +78,26 @@ WRONG_LINES = [
     ("[effects]\nobject = 'linear_shell'", 12, "effects.object", '"linear_shell"', '"auto", "rigid"',
      "does not simulate it"),
     ("[effects]\npad = 'linear'", 12, "effects.pad", '"linear"', '"hyperelastic"', "does not simulate it"),
-    ("[effects]\nlimit_surface = 'quartic'", 12, "effects.limit_surface", '"quartic"', '"ellipsoid"',
-     "does not simulate"),
-    ("[effects]\nwrench = '6-D'", 12, "effects.wrench", '"6-D"', '"3-D"', "does not simulate"),
+    ("[effects]\nlimit_surface = 'cubic'", 12, "effects.limit_surface", '"cubic"', '"three_motions"', "choose one of"),
+    ("[effects]\nwrench = '6D'", 12, "effects.wrench", '"6D"', '"3-D", "6-D"', 'did you mean "6-D"?'),
+    ("[effects]\nlimit_surface = 'quartic'\n[limit_surface]\nmodel = 'full'", 12, "effects.limit_surface", '"quartic"',
+     'limit_surface.model, which is "full"', '`model = "quartic"` in [limit_surface]'),
+    ("[limit_surface]\nmodel = 'quartik'", 12, "limit_surface.model", '"quartik"', '"full", "quartic"',
+     'did you mean "quartic"?'),
+    ("[limit_surface]\nmodel = 'axis_aligned'\nobjective = 'zhou'", 13, "limit_surface.objective", '"axis_aligned"',
+     "full or quartic", "least_squares"),
+    ("[limit_surface]\nsamples = 10", 12, "limit_surface.samples", "10", ">= 50", "default is 500"),
+    ("[limit_surface]\nwrench_samples = 'some'", 12, "limit_surface.wrench_samples", '"some"', '"none", "all"',
+     "choose one of"),
+    ("[limit_surface]\nwrench_samples = [0, 2]", 12, "limit_surface.wrench_samples[1]", "2", "0 to 1", "angles"),
+    ("[limit_surface]\nwrench_samples = [-1]", 12, "limit_surface.wrench_samples[0]", "-1", "0 to 1", "angles"),
+    ("[limit_surface]\nwrench_samples = [\n'0 mm, 9 deg']", 13, "limit_surface.wrench_samples[0]", '"0 mm, 9 deg"',
+     'as "0 mm, 0 deg"', 'did you mean "0 mm, 90 deg"?'),
+    ("[task]\nweight_direction = [0, 0, 0]", 12, "task.weight_direction", "[0.0, 0.0, 0.0]", "a direction",
+     "[0, 0, -1]"),
+    ("[task]\nmass_g = 5", 12, "task.mass_g", "unknown key", "[task]", "belongs to [object]"),
+    ("[sweep]\n'limit_surface.samples' = [60, 80]", 12, 'sweep."limit_surface.samples"', "cannot be swept", "single",
+     "size of the results"),
     ("[accuracy]\nmeshes = 3", 12, "accuracy.meshes", "3", "<= 2", "default is 1"),
     ("[accuracy]\nmeshes = true", 12, "accuracy.meshes", "true", "whole number", "default is 1"),
     ("[output]\nfile = 'a.h5'", 12, "output.file", '"a.h5"', ".hdf", '"a.hdf"'),
@@ -498,3 +515,24 @@ def test_meshes_come_in_the_units_that_lengths_come_in():
     for name, (times, over) in LENGTHS.items():
         mesh = Mesh(shape="mesh", mesh="a.stl", unit=name)
         assert mesh.unit_length == times / over == in_si(f"a_{name}", 1.0)
+
+
+def test_a_forced_limit_surface_and_the_model_are_one_choice():
+    for level, model in (("three_motions", "three_motions"), ("fitted_ellipsoid", "full"), ("quartic", "quartic")):
+        scene = parse_scene(BALL, "ball.toml", [f"effects.limit_surface={level}"])
+        assert scene.limit_surface.model == model
+        assert parse_scene(scene.effective_toml()) == scene
+    assert parse_scene(BALL).limit_surface.model == "quartic"
+
+
+def test_candidates_whose_wrenches_are_stored_go_by_number_or_label():
+    wanted = {"'none'": (), "'all'": (0, 1), "[1]": (1,), "['0 mm, 90 deg', 0, 1]": (0, 1), "['0 mm, 0 deg']": (0,)}
+    for text, numbers in wanted.items():
+        assert parse_scene(BALL, "ball.toml", [f"limit_surface.wrench_samples={text}"]).sampled == numbers
+
+
+def test_a_mass_is_given_in_grams_and_the_centre_of_mass_in_mm():
+    scene = parse_scene(BALL, "ball.toml", ["object.mass_g=250", "task.centre_of_mass_mm=[0, 0, 5]"])
+    assert scene.object.mass == 0.25
+    assert scene.task.centre_of_mass == (0.0, 0.0, 0.005)
+    assert parse_scene(BALL).task.centre_of_mass is None

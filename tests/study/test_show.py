@@ -33,7 +33,7 @@ def study(quality, flags=0.0, labels=None, status=DONE):
     )
     return SimpleNamespace(
         axes=axes,
-        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1),
+        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1, quantities=MAPS[:4]),
         status=np.full(shape, status),
         messages=np.full(shape, "no contact at this force" if status == FAILED else ""),
         labels=np.array(labels).reshape(-1, 1) if labels else np.full((stations, angles), ""),

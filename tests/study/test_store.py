@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.layout import Derived, Header, Layout, groups, layout_from_options, view_slice
+from study.layout import Derived, Header, Layout, layout_from_options
 from study.lock import Lock, holder
-from study.quantities import MAPS, MODELS, quantities
+from study.plots import groups, view_slice
+from study.quantities import MAPS, quantities
+from study.quantity import MODELS
 from study.reading import StoredAxis
 from study.record import blank, crc32, record, text_bytes
 from study.result import CaseResult
@@ -44,9 +46,10 @@ def put(path, layout, row, values):
     """A done row, written without MPI."""
     with h5py.File(path, "r+") as file:
         index = np.unravel_index(row, layout.shape)
-        for column, value in zip(layout.columns, values, strict=True):
-            file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-        file["study/status/crc"][index] = crc32(layout, values)
+        for column, value, place in zip(layout.columns, values, layout.places(row), strict=True):
+            if place is not None:
+                file[column.path][place] = value.astype(file[column.path].dtype)
+        file["study/status/crc"][index] = crc32(layout, row, values)
         file["study/status/code"][index] = 1
 
 
@@ -73,7 +76,7 @@ def test_what_was_written_is_read(path):
         assert read.title == "Flasche"
         assert list(read.labels.ravel()[:3]) == ["left", "ötken", ""]
         for q in MAPS:
-            assert (q.key in read.definitions) != q.only_with_two_meshes
+            assert (q.key in read.definitions) != bool(q.needs)
 
 
 def test_a_fresh_file_is_empty_everywhere(path):
@@ -158,6 +161,30 @@ def test_damage_in_a_done_row_is_found_and_timings_do_not_count(path):
         file["study/status/message"][1, 0, 1] = b"other"
         file["study/patch/area"][29, 1, 3] = 0.0
     assert torn_rows(path, layout) == [7, 29]
+
+
+def test_wrenches_are_stored_for_the_candidates_that_were_named(tmp_path):
+    """Candidates 3 (station 1, angle 1) and 8 (station 4, angle 0) have places, the others cost nothing."""
+    layout, path = small(samples=7, sampled=(3, 8)), tmp_path / "w.hdf"
+    create(path, layout, HEADER)
+    wrench = np.random.default_rng(0).random((2, 3, 7, 3))
+    for row in (10, 25, 0):  # force 1 of both, and a candidate that has no place
+        put(path, layout, row, record(layout, CaseResult({"maps/S": 1.0, "wrenches/wrench": wrench + row})))
+    with open_result(path) as read:
+        found = read.read("wrenches/wrench")
+        assert found.shape == (2, 3, 2, 3, 7, 3)
+        assert np.array_equal(found[0, 1], wrench + 10)
+        assert np.array_equal(found[1, 1], wrench + 25)
+        assert np.isnan(found[:, [0, 2]]).all()
+        assert read.read("wrenches/candidate").tolist() == [3, 8]
+        assert np.linalg.norm(read.read("wrenches/motion"), axis=1) == pytest.approx(1.0)
+        assert "wrenches/wrench" in read.definitions
+    assert torn_rows(path, layout) == []
+    with h5py.File(path, "r+") as file:
+        file["study/wrenches/wrench"][0, 1, 0, 0, 0, 0] += 1
+    assert torn_rows(path, layout) == [10]
+    assert layout_from_options(layout.axes, layout.options()) == layout
+    assert "wrenches" not in {d.path.split("/")[2] for d in small(samples=7).datasets}
 
 
 def test_a_result_that_does_not_fit_the_tables_is_a_bug():
@@ -263,9 +290,7 @@ def evil_type(file, _):
     file.create_dataset("study/e_n/curved", (5, 2, 3), "<f4")
 
 
-@pytest.mark.parametrize(
-    "evil", [evil_external_data, evil_link, evil_soft_link, evil_virtual, evil_shape, evil_type]
-)
+@pytest.mark.parametrize("evil", [evil_external_data, evil_link, evil_soft_link, evil_virtual, evil_shape, evil_type])
 def test_data_from_elsewhere_are_not_read(path, tmp_path, evil):
     secret = tmp_path / "secret"
     secret.write_bytes(b"s" * 400)

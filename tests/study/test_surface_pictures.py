@@ -1,0 +1,113 @@
+"""Limit surfaces in a report: rebuilt from what a file holds, drawn as shadows and in space."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lsfit.ellipsoid import Ellipsoid
+from lsfit.form import exponents, monomials
+from lsfit.quartic import Quartic
+from study import pictures
+from study.finger_quantities import MONOMIALS
+from study.layout import Layout
+from study.report.data import Data
+from study.report.stored_surface import circle, shadow_outline, stored_surface
+from study.report.surface import misfit_curves, surface_pictures
+from study.store import open_result
+from tests.study.test_report import axes, make, patch
+
+MU, RHO = 0.5, 0.02
+SEMI = np.array([1.0, 0.9, 0.3])
+
+
+def squared_ellipsoid(semi):
+    """Coefficients of ``(w A w)^2`` with ``A = diag(1 / semi^2)``, from the expansion of the square."""
+    E, found = exponents(3, 4).tolist(), np.zeros(15)
+    for i in range(3):
+        for j in range(3):
+            power = [0, 0, 0]
+            power[i] += 2
+            power[j] += 2
+            found[E.index(power)] += (semi[i] * semi[j]) ** -2.0
+    return found
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Two stations whose contacts carry the patch of the report's tests, and a quartic that is an ellipsoid."""
+    S = float((patch()["pressure"] * patch()["area"])[0].sum())
+    scale = np.array([1.0, 1.0, RHO])
+    values = {
+        "limit_surface/semi_axes": np.broadcast_to(MU * SEMI * scale, (2, 3, 3)),
+        "limit_surface/rho": [RHO, RHO],
+        "limit_surface/coefficients": np.broadcast_to(squared_ellipsoid(SEMI), (2, 3, 15)),
+        "fingers/S": [S, S],
+        "fingers/f_x_max": np.full((2, 3), MU * S),
+        "fingers/tau_z_max": np.full((2, 3), 0.01),
+        "maps/misfit": 0.002,
+        "maps/misfit_ellipsoid": 0.013,
+    }
+    layout = Layout(axes(stations=(0.0, 0.01), angles=(0.0,), forces=(1.0,)), 24)
+    return make(tmp_path_factory.mktemp("surface") / "s.hdf", layout, **values)
+
+
+def test_monomials_are_named_in_the_order_of_the_fits():
+    w = np.array([[2.0, 3.0, 5.0]])
+    named = [
+        np.prod([{"x": 2.0, "y": 3.0, "t": 5.0}[f[0]] ** int(f[2:] or 1) for f in name.split()]) for name in MONOMIALS
+    ]
+    assert monomials(w, exponents(3, 4))[0] == pytest.approx(named)
+
+
+@pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
+def test_shadows_of_ellipsoids_are_ellipses(i, j):
+    for surface in (Ellipsoid(SEMI), Quartic(squared_ellipsoid(SEMI), exponents(3, 4))):
+        outline = shadow_outline(surface, i, j, 120)
+        assert ((outline / SEMI[[i, j]]) ** 2).sum(axis=1) == pytest.approx(1.0, rel=1e-7)
+
+
+def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file(file):
+    with open_result(file) as result:
+        data = Data(result)
+        flat, curved = (stored_surface(data, (1, 0, 0), 1, model) for model in ("flat", "curved"))
+    assert flat.unit == pytest.approx(MU * patch_S() * np.array([1.0, 1.0, RHO]))
+    assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
+    assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)
+    # a plane contact slides alike in every direction, and turning it takes no more than all its load at the rim
+    sliding = flat.wrenches(circle(0, 1, 24))
+    assert np.linalg.norm(sliding[:, :2], axis=1) == pytest.approx(1.0, rel=1e-9)
+    assert flat.outline(0, 1) == pytest.approx(circle(0, 1, 90)[:, :2], abs=1e-9)
+    assert 0 < flat.wrenches(np.array([[0.0, 0.0, 1.0]]))[0, 2] * RHO < 0.01 * np.sqrt(2)
+    assert curved.samples(50).sum(axis=0) == pytest.approx(0.0, abs=1e-12)
+    assert len(curved.samples(50)) == 100
+
+
+def patch_S():
+    return float((patch()["pressure"] * patch()["area"])[0].sum())
+
+
+def test_pictures_tell_what_they_show_and_stay_small(file):
+    with open_result(file) as result, pictures.style():
+        data = Data(result)
+        shadows, space = surface_pictures(data, (0, 0, 0))
+        curve = misfit_curves(data, 0, (0, 0, 0))
+    assert "0.2 % fitted, 1.3 % from three motions" in shadows.caption
+    assert "exact wrenches" in shadows.caption
+    assert "300 slip motions" in space.caption
+    assert "misfit of the limit surfaces over station" in curve.alt.lower()
+    assert len(shadows.svg) + len(space.svg) + len(curve.svg) < 600_000
+
+
+def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_picture(tmp_path, file):
+    layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0, patches=False)
+    with open_result(file) as result:
+        data = Data(result)
+        names = ("semi_axes", "rho", "coefficients")
+        values = {f"limit_surface/{n}": data.values(f"limit_surface/{n}")[0, 0, 0] for n in names}
+        values |= {f"fingers/{n}": data.values(f"fingers/{n}")[0, 0, 0] for n in ("S", "f_x_max")}
+    with open_result(make(tmp_path / "bare.hdf", layout, **values)) as result, pictures.style():
+        (shadows,) = surface_pictures(Data(result), (0, 0, 0))
+        assert "exact" not in shadows.caption
+    with open_result(make(tmp_path / "none.hdf", layout)) as result:
+        assert surface_pictures(Data(result), (0, 0, 0)) == []
