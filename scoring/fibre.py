@@ -1,0 +1,223 @@
+"""What one soft contact adds to the volume of a grasp of two, seen along the plane T in which their spans meet.
+
+The contact's cone is ``K = conv(0, N + E)`` in its span of 4 dimensions, and U is the plane of the span across T.
+For every u of U the fibre ``{t in T : t + u in K}`` is a convex figure; their integral over U is the figure S. Only
+its sides matter. The sides of a fibre lie in the facets of K, so the side of S with a given normal collects, from all
+facets whose normal has that part in T, volume times length of that part (coarea formula): the sides of S are the parts
+in T of the facets' normals, each as long as its facet is large. The facets are the base ``N + E`` and the cones over
+the pieces of the surface of E. In coordinates ``(l, e)`` of normal force and load a triangle (a, b, c) of that surface
+has the normal ``(-det(a, b, c), (b - a) x (c - a)) / 6``, and maps turn normals by their cofactors.
+
+For an ellipsoid, image of the unit ball under A, that is ``(P v - c) / 3`` per area at the point v of the unit sphere.
+P has rank 2, so only the part of v in a plane counts, where the sphere has the density ``2 / sqrt(1 - |v|^2)``
+(Archimedes) on the disc. All depends on one number, the distance ``rho`` at which ``P v0 = c``. With ``rho >= 1`` the
+boundary of S is a curve in closed form, with ``rho < 1`` its density over the angle about v0 is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scoring.boundary import ellipsoid_matrix, surface_mesh
+from scoring.contact import Body
+from scoring.plane import fan_area, polygon_area
+
+FloatArray = NDArray[np.float64]
+SHADOW = 512  # directions in which a body without closed form is asked for its shadow
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """A contact's span of 4 dimensions, split along T.
+
+    Parameters
+    ----------
+    C : (6, 4) array
+        Wrench map of the contact.
+    T : (6, 2) array
+        Orthonormal basis of the plane T.
+    U : (6, 2) array
+        Orthonormal basis of the rest of the span, across T.
+    """
+
+    C: FloatArray
+    T: FloatArray
+    U: FloatArray
+
+    @property
+    def M(self) -> FloatArray:
+        """Shadow along T of ``(l, e)``, ``(2, 4)``."""
+        return self.U.T @ self.C
+
+    @property
+    def facet_map(self) -> FloatArray:
+        """Part in T of a facet's normal given in ``(l, e)``, ``(2, 4)``."""
+        G = np.hstack([self.T, self.U]).T @ self.C
+        return abs(np.linalg.det(G)) * np.linalg.inv(G)[:, :2].T
+
+
+class Fibre(Protocol):
+    """One contact's part in the volume of a grasp."""
+
+    exact: bool
+
+    def measures(self, level: int) -> tuple[float, float]:
+        """Volume of the cone K and area of its shadow along T."""
+
+    def sides(self, level: int, split: FloatArray) -> FloatArray:
+        """Sides of S that come from the cone's flank, ``(m, 2)``; no side mixes both sides of the line ``split``."""
+
+    def base(self, level: int) -> FloatArray:
+        """The side of S that comes from the cone's base, ``(2,)``."""
+
+    def ridge(self, level: int, away: FloatArray) -> float:
+        """Area in U of the points below the edge of the flank that is farthest in the direction ``away``."""
+
+
+def fibre_of(body: Body, span: Span) -> Fibre:
+    """Closed form for ellipsoids, triangles for other bodies."""
+    A = ellipsoid_matrix(body)
+    return MeshFibre(body, span) if A is None else EllipsoidFibre(A, span)
+
+
+class EllipsoidFibre:
+    """Parts of an ellipsoid in closed form; only the sides are divided into ``128 * 2**level`` pieces."""
+
+    exact = False
+
+    def __init__(self, A: FloatArray, span: Span) -> None:
+        F = span.facet_map
+        e = np.linalg.eigh(A)
+        cofactor = (e[1] * [e[0][1] * e[0][2], e[0][0] * e[0][2], e[0][0] * e[0][1]]) @ e[1].T
+        volume = float(np.prod(e[0]))
+        self.c = volume * F[:, 0]
+        W, s, self.sphere = np.linalg.svd(F[:, 1:] @ cofactor)
+        self.W = W * np.maximum(s, 1e-200)
+        self.v0 = (W.T @ self.c) / np.maximum(s, 1e-200)
+        self.rho = math.hypot(*self.v0)
+        self.shadow_map, self.centre = span.M[:, 1:] @ A, span.M[:, 0]
+        self.volume = math.pi / 3 * volume * abs(np.linalg.det(np.hstack([span.T, span.U]).T @ span.C))
+
+    def measures(self, level: int) -> tuple[float, float]:
+        """Volume of the cone and area of the hull of an ellipse and 0."""
+        W, s, _ = np.linalg.svd(self.shadow_map)
+        d = s[0] * s[1]
+        b = math.hypot(*(W.T @ self.centre * s[::-1]))
+        # Outside the ellipse two tangents from 0 close the figure.
+        area = math.pi * d if b <= d else math.sqrt(b * b - d * d) + d * (math.pi - math.acos(d / b))
+        return self.volume, area
+
+    def base(self, level: int) -> FloatArray:
+        """The base has the volume ``4/3 pi det A``."""
+        return 4 / 3 * math.pi * self.c
+
+    def sides(self, level: int, split: FloatArray) -> FloatArray:
+        """Pieces of the curve or of the density."""
+        return self._inside(level, split) if self.rho < 1 else self._outside(level, split)
+
+    def _inside(self, level: int, split: FloatArray) -> FloatArray:
+        """Integral of ``2 t^2 / (3 sqrt(1 - |v0 + t e|^2))`` along each ray from v0."""
+        n = 128 << level
+        turned = np.linalg.solve(self.W, split) if abs(np.linalg.det(self.W)) > 0 else np.array([1.0, 0.0])
+        phi = math.atan2(turned[1], turned[0]) + (np.arange(n) + 0.5) * 2 * math.pi / n
+        e = np.column_stack([np.cos(phi), np.sin(phi)])
+        t = -e @ self.v0
+        w = np.sqrt(np.maximum(1 - self.rho**2 + t**2, 1e-300))
+        q = math.sqrt(1 - self.rho**2)
+        f = (t**2 + w**2 / 2) * (math.pi / 2 + np.arcsin(np.clip(t / w, -1, 1))) + 1.5 * t * q
+        return (2 / 3 * f * 2 * math.pi / n)[:, None] * (e @ self.W.T)
+
+    def _outside(self, level: int, split: FloatArray) -> FloatArray:
+        """Steps of the curve, ``xi`` being ``rho`` times the sine of the angle at v0."""
+        beta, e = 1 / self.rho, self.v0 / self.rho
+        across = self.W @ np.array([-e[1], e[0]])
+        psi = np.linspace(-math.pi / 2, math.pi / 2, (128 << level) + 1)
+        crossing = _cross(across, split)
+        if crossing != 0:
+            g = _cross(self.c, split) / crossing
+            xi = g / math.sqrt(1 + (beta * g) ** 2)
+            if abs(xi) < 1:
+                psi = np.sort(np.append(psi, math.asin(xi)))
+        xi, rest = np.sin(psi), np.cos(psi) ** 2
+        s = np.sqrt(1 - (beta * xi) ** 2)
+        along = (2 + beta**2) * xi - beta**2 * xi**3
+        return -math.pi / 3 * np.diff(np.outer(along, self.c) + np.outer(s * rest, across), axis=0)
+
+    def ridge(self, level: int, away: FloatArray) -> float:
+        """Area swept by the circle of the sphere on which ``P v - c`` has the direction ``away``."""
+        w = np.linalg.solve(self.W, away)
+        w = w / math.hypot(*w)
+        nearest = _cross(w, self.v0)
+        if abs(nearest) >= 1:
+            return 0.0
+        r, first = math.sqrt(1 - nearest**2), float(self.v0 @ w)
+        if first >= r:
+            return 0.0
+        psi = math.pi if first <= -r else math.acos(first / r)
+        ends = np.array([w, [-w[1], w[0]]]) @ self.sphere[:2]
+        centre = self.shadow_map @ (nearest * ends[1]) + self.centre
+        a, b = r * self.shadow_map @ ends[0], r * self.shadow_map @ self.sphere[2]
+        # Twice the area, 0 to arc: (m + a cos + b sin) x d(a cos + b sin).
+        return 0.5 * abs(2 * psi * _cross(a, b) + 2 * math.sin(psi) * _cross(centre, b))
+
+
+class MeshFibre:
+    """Parts of a body with a mesh of triangles; exact for polytopes, an error of order h^2 for others."""
+
+    def __init__(self, body: Body, span: Span) -> None:
+        self.body, self.span = body, span
+        self.exact = hasattr(body, "vertices")
+        self.det = abs(np.linalg.det(np.hstack([span.T, span.U]).T @ span.C))
+        self.meshes: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
+
+    def _mesh(self, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points, corners of the triangles and the sides they make."""
+        level = 0 if self.exact else level + 2
+        if level not in self.meshes:
+            points, triangles = surface_mesh(self.body, level)
+            a, b, c = (points[triangles[:, i]] for i in range(3))
+            det = np.einsum("mi,mi->m", a, np.cross(b, c))
+            normals = np.column_stack([-det, np.cross(b - a, c - a)]) / 6
+            self.meshes[level] = points, triangles, normals
+        return self.meshes[level]
+
+    def measures(self, level: int) -> tuple[float, float]:
+        """Volume of the cone from the triangles, its shadow from the vertices or from the support function."""
+        points, _, normals = self._mesh(level)
+        volume = -self.det * normals[:, 0].sum() / 4
+        M = self.span.M
+        if self.exact:
+            return volume, polygon_area(points @ M[:, 1:].T + M[:, 0])
+        phi = 2 * math.pi * np.arange(SHADOW) / SHADOW
+        u = np.column_stack([np.cos(phi), np.sin(phi)]) @ M
+        return volume, fan_area(u[:, 0] + self.body.support(u[:, 1:]))
+
+    def base(self, level: int) -> FloatArray:
+        """The base has the volume of the body."""
+        return -self._mesh(level)[2][:, 0].sum() * self.span.facet_map[:, 0]
+
+    def sides(self, level: int, split: FloatArray) -> FloatArray:
+        """One side per triangle."""
+        return self._mesh(level)[2] @ self.span.facet_map.T
+
+    def ridge(self, level: int, away: FloatArray) -> float:
+        """Sum over the edges where the triangles' sides pass the direction ``away``."""
+        points, triangles, _ = self._mesh(level)
+        n = self.sides(level, away)
+        x, y = n @ away, n @ np.array([-away[1], away[0]])
+        edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        order = np.lexsort((edges[:, 1], edges[:, 0]))
+        one, two = order[0::2] % len(triangles), order[1::2] % len(triangles)
+        between = ((y[one] < 0) != (y[two] < 0)) & ((x[one] * y[two] - x[two] * y[one]) * (y[two] - y[one]) > 0)
+        v = points @ self.span.M[:, 1:].T + self.span.M[:, 0]
+        a, b = v[edges[order[0::2]][between, 0]], v[edges[order[0::2]][between, 1]]
+        return 0.5 * float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def _cross(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])

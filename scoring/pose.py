@@ -1,0 +1,128 @@
+"""Volume of the grasp wrench space of two soft contacts in any pose.
+
+Derivation, L-infinity. The cones ``K_1, K_2`` span 4 dimensions each, so their spans meet in a plane T at least; if in
+more, the space is flat. With the rest of each span in planes ``U_1, U_2`` across T, the points of ``K_1 + K_2`` over
+``(u_1, u_2)`` are the sum of the two fibres, of area ``|F_1| + 2 V(F_1, F_2) + |F_2|``. The mixed area V is linear in
+each, so the integral is
+
+    J (|K_1| a_2 + a_1 |K_2| + 2 V(S_1, S_2)),
+
+``a_i`` the area of the shadow of ``K_i`` along T, ``S_i`` the integral of its fibres, J the volume between the planes.
+
+Derivation, L1. Let ``a_i . t`` be the normal force of contact i that the wrench t of T stands for, and
+``delta = a_1 - a_2``. Of all ways to divide a wrench among the contacts the one with the least sum of normal forces has
+the first share as far as it goes along ``-delta``: at the edge of cone 1 while share 2 is anywhere in its cone, or at
+the edge of cone 2, or both on the flanks of their cones, with delta between the normals ``-n_1`` and ``n_2``. With the
+areas ``R_i`` below those edges and normal forces that sum to 1 at most, the three parts are
+
+    J ((|K_1| R_2 + R_1 |K_2|) / 15 + sum |n_1 x n_2| / 20)
+
+over these pairs of sides of ``S_1, S_2`` (integrals of ``(1 - l)^4 l`` and of ``9 l_1^2 l_2^2``). Facing contacts give
+7/12 and 1/30 of `scoring.volume`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scoring.contact import Body, SoftContact
+from scoring.fibre import Fibre, Span, fibre_of
+from scoring.plane import joint_pairs, mixed_area
+
+FloatArray = NDArray[np.float64]
+LEVELS = 6
+TURN = 1e-9  # keeps a direction off sides that are parallel to it, where the share of least force is not unique
+
+
+class PoseVolume(NamedTuple):
+    """Volumes of the grasp wrench space and how far they may be off."""
+
+    linf: float
+    l1: float
+    relative_error: float
+
+
+def pose_volume(
+    contact1: SoftContact,
+    contact2: SoftContact,
+    object_length: float,
+    contact_length: float,
+    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+    relative_error: float = 1e-5,
+) -> PoseVolume:
+    """Volumes of the L-infinity and L1 grasp wrench spaces of two contacts.
+
+    Parameters
+    ----------
+    contact1, contact2 : SoftContact
+        In any pose; ellipsoids are fastest, polytopes exact.
+    object_length, contact_length : float
+        Lengths by which arms and torques about the normals are divided [m].
+    centre_of_mass : (3,) array
+        Point about which torques are taken [m]; the volumes do not depend on it.
+    relative_error : float
+        Pieces of surface are divided until two divisions agree so far, or 6 times.
+
+    Returns
+    -------
+    PoseVolume
+        Both volumes [-], extrapolated, and the difference left between divisions.
+    """
+    com = np.asarray(centre_of_mass, float)
+    C1, C2 = (c.wrench_map(object_length, contact_length, com) for c in (contact1, contact2))
+    return cone_volume(C1, contact1.body, C2, contact2.body, relative_error)
+
+
+def cone_volume(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body, relative_error: float = 1e-5) -> PoseVolume:
+    """Volumes for contacts given by their wrench maps ``(6, 4)``; parameters as in `pose_volume`."""
+    spans = _spans(C1, body1, C2, body2)
+    if spans is None:
+        return PoseVolume(0.0, 0.0, 0.0)
+    fibres = fibre_of(body1, spans[0]), fibre_of(body2, spans[1])
+    J = abs(float(np.linalg.det(np.hstack([spans[0].T, spans[0].U, spans[1].U]))))
+    a1, a2 = (np.linalg.lstsq(span.C, span.T, rcond=None)[0][0] for span in spans)
+    delta = a1 - a2
+    if math.hypot(*delta) <= 1e-9 * (math.hypot(*a1) + math.hypot(*a2)):
+        delta = np.array([1.0, 0.0])
+    delta = delta + TURN * np.array([-delta[1], delta[0]])
+    coarse = _volumes(fibres, delta, 0)
+    if all(fibre.exact for fibre in fibres):
+        return PoseVolume(*(J * coarse).tolist(), 1e-9)
+    for level in range(1, LEVELS + 1):
+        fine = _volumes(fibres, delta, level)
+        # Errors go with the square of the size of the pieces.
+        better = fine + (fine - coarse) / 3
+        error = float(np.abs(better - fine).max() / max(np.abs(better).max(), 1e-300))
+        if error <= relative_error:
+            break
+        coarse = fine
+    return PoseVolume(*(J * better).tolist(), error)
+
+
+def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int) -> FloatArray:
+    """Both volumes over J, ``(2,)``."""
+    one, two = fibres
+    (K1, A1), (K2, A2) = one.measures(level), two.measures(level)
+    n1, n2 = one.sides(level, delta), two.sides(level, delta)
+    V = mixed_area(np.vstack([n1, one.base(level)]), np.vstack([n2, two.base(level)]))
+    edges = K1 * two.ridge(level, delta) + one.ridge(level, -delta) * K2
+    return np.array([K1 * A2 + A1 * K2 + 2 * V, edges / 15 + joint_pairs(n1, n2, delta) / 20])
+
+
+def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Span, Span] | None:
+    """The two spans, split along the plane in which they meet; None if they meet in more."""
+    scaled = []
+    for C, body in ((C1, body1), (C2, body2)):
+        reach = np.append(1.0, body.support(np.eye(3)))
+        D = C * np.where(reach > 0, reach, 1.0)
+        scaled.append(D / np.linalg.norm(D, axis=0))
+    values, vectors = np.linalg.svd(np.hstack([scaled[0], -scaled[1]]))[1:]
+    if values[5] <= 1e-13 * values[0]:
+        return None
+    T = np.linalg.qr(scaled[0] @ vectors[6:, :4].T)[0]
+    U1, U2 = (np.linalg.qr(np.hstack([T, np.linalg.svd(D - T @ (T.T @ D))[0][:, :2]]))[0][:, 2:] for D in scaled)
+    return Span(C1, T, U1), Span(C2, T, U2)
