@@ -147,8 +147,9 @@ class Grip:
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
                 work if k == 0 else Work(), part,
             ))  # fmt: skip
-        q, load = problem.state(x), problem.wall_load(x)
-        worst = residual[: len(problem.free)].max(initial=0.0)
+        load = problem.wall_load(x)
+        q = problem.model.state(x[: problem.model.size], load)
+        worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(BALANCE, self.settings.residual) * force:
             raise CheckError(
                 f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "

@@ -1,6 +1,6 @@
 """Frictionless contact of one or two pads with a thin-walled object, as one mixed complementarity problem.
 
-Unknowns ``x = [q | pad 1 | pad 2]``: the free numbers of the wall (``fem.shell_model``) and, per pad,
+Unknowns ``x = [q | pad 1 | pad 2]``: those of the wall (``fem.wall_model``) and, per pad,
 ``[u | delta | l]`` as in ``fem.contact``. With the pads' points facing the deformed wall (``fem.facing``) the residual
 is::
 
@@ -15,6 +15,7 @@ All rows are forces [N]. Both pads press with the same force, each with a travel
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +27,8 @@ from fem.foam import Foam, gather
 from fem.pad import Pad
 from fem.pattern import Pattern, add_up
 from fem.pose import FloatArray, Pose
-from fem.shell_model import Shell
 from fem.wall_kernel import contact_forces, contact_tangent
+from fem.wall_model import WallModel
 
 IntArray = NDArray[np.int32]
 LONGEST_TRAVEL = 1e-3  # of one iteration [m]
@@ -41,12 +42,14 @@ class Finger:
     pad : Pad
     pose : Pose
         The pad's frame at first touch of the undeformed wall.
+    wall : Wall
+        The part of the outer face that it can touch.
     offset : int
         Its first unknown.
     """
 
-    def __init__(self, pad: Pad, pose: Pose, offset: int) -> None:
-        self.pad, self.pose, self.offset = pad, pose, offset
+    def __init__(self, pad: Pad, pose: Pose, wall: Wall, offset: int) -> None:
+        self.pad, self.pose, self.wall, self.offset = pad, pose, wall, offset
         self.foam = Foam(pad)
         self.own = slice(offset, offset + pad.size)
         self.travel = offset + pad.travel_dof
@@ -85,32 +88,24 @@ class GripProblem:
 
     Parameters
     ----------
-    shell : Shell
-    wall : Wall
-        Outer face of its mesh.
-    fixed : (6 k,) array of bool
-        Numbers of the shell that supports and planes of symmetry hold.
-    pads : sequence of (Pad, Pose)
-        One where a plane of symmetry lies between the fingers, else two.
+    model : WallModel
+        The wall; its unknowns come first.
+    pads : sequence of (Pad, Pose, Wall)
+        One where a plane of symmetry lies between the fingers, else two; with what each can touch.
     """
 
     complementarity = False
 
-    def __init__(self, shell: Shell, wall: Wall, fixed: FloatArray, pads: list[tuple[Pad, Pose]]) -> None:
-        self.shell, self.wall = shell, wall
-        self.free = np.flatnonzero(~np.asarray(fixed, dtype=bool))
-        self.unknown = np.full(shell.size, -1, dtype=np.int32)
-        self.unknown[self.free] = np.arange(len(self.free), dtype=np.int32)
-        numbers = self.unknown.reshape(-1, 6)
-        self.first, self.second = np.ascontiguousarray(numbers[:, :3]), np.ascontiguousarray(numbers[:, 3:])
+    def __init__(self, model: WallModel, pads: Sequence[tuple[Pad, Pose, Wall]]) -> None:
+        self.model = model
         self.fingers: list[Finger] = []
-        self.size = len(self.free)
-        for pad, pose in pads:
-            self.fingers.append(Finger(pad, pose, self.size))
+        self.size = model.size
+        for pad, pose, wall in pads:
+            self.fingers.append(Finger(pad, pose, wall, self.size))
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.pad.node_area.sum() for f in self.fingers)
         self.control = Control(travel=0.0)
-        self.places = [self.wall.places(f.points(np.zeros(self.size))[1]) for f in self.fingers]
+        self.places = [f.wall.places(f.points(np.zeros(self.size))[1]) for f in self.fingers]
         self._build_pattern()
 
     @property
@@ -125,11 +120,11 @@ class GripProblem:
     def _build_pattern(self) -> None:
         """Everything but the couplings between pads and wall, which come as pads touch."""
         rows, columns = [], []
-        for part in (self.shell.entries(self.unknown), *map(self._own_entries, self.fingers)):
+        for part in (self.model.entries(), *map(self._own_entries, self.fingers)):
             rows.append(part[0])
             columns.append(part[1])
         self.pattern = Pattern(self.size, np.concatenate(rows), np.concatenate(columns))
-        self._wall_slots = self.pattern.slots(*self.shell.entries(self.unknown))
+        self._wall_slots = self.pattern.slots(*self.model.entries())
         self._foam_slots = [self.pattern.slots(*self._foam_entries(f)) for f in self.fingers]
         self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
         if len(self.fingers) == 2:
@@ -151,23 +146,16 @@ class GripProblem:
             columns = np.concatenate([columns, back, [f.travel]])
         return rows.astype(np.int32), columns.astype(np.int32)
 
-    def state(self, x: FloatArray) -> FloatArray:
-        """State of the wall ``(6 k,)``, see ``fem.shell_model``."""
-        q = np.zeros(self.shell.size)
-        q[self.free] = x[: len(self.free)]
-        return q
-
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """No bounds: the complementarity is in the residual."""
         return np.full(self.size, -np.inf), np.full(self.size, np.inf)
 
     def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[_Evaluated]:
         """Evaluate the contact of all fingers; adds to the forces on the wall's nodes."""
-        parts = self.state(x).reshape(-1, 6)
-        v, w = parts[:, :3] + parts[:, 3:], np.ascontiguousarray(parts[:, 3:])
+        v, w = self.model.outer(x[: self.model.size])
         found = []
         for f, places in zip(self.fingers, self.places, strict=True):
-            facing = face(self.wall, f.points(x)[1], places, v, w)
+            facing = face(f.wall, f.points(x)[1], places, v, w)
             pad, lam = f.pad, f.pressure(x)[f.nodes]
             weighted, force = np.empty(f.nodes.shape), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
             contact_forces(
@@ -181,13 +169,12 @@ class GripProblem:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
-        R, wall_force = np.zeros(self.size), np.zeros((self.shell.nodes, 3))
+        R, wall_force = np.zeros(self.size), self._no_force()
         try:
             contacts = self._contact(x, wall_force)
         except ArithmeticError:
             return np.full(self.size, np.nan)
-        inner = self.shell.residual(self.state(x)).reshape(-1, 6) + np.hstack([wall_force, wall_force])
-        R[: len(self.free)] = inner.ravel()[self.free]
+        R[: self.model.size] = self.model.residual(x[: self.model.size], wall_force)
         for f, c in zip(self.fingers, contacts, strict=True):
             own, smallest = f.foam.force(x[f.own])
             if not smallest > 0.0:
@@ -213,10 +200,10 @@ class GripProblem:
 
     def tangent(self, x: FloatArray) -> FloatArray:
         """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
-        q = self.state(x)
-        wall = self.shell.tangent(q, self._before)
+        q = x[: self.model.size].copy()
+        wall = self.model.tangent(q, self._before)
         self._before = q
-        contacts = self._contact(x, np.zeros((self.shell.nodes, 3)))
+        contacts = self._contact(x, self._no_force())
         for f, values in zip(self.fingers, self._values, strict=True):
             f.foam.stiffness(x[f.own], values)
         while True:
@@ -253,7 +240,8 @@ class GripProblem:
         pad, facing, pattern = f.pad, c.facing, self.pattern
         return contact_tangent(
             pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
-            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressures, self.first, self.second,
+            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressures, self.model.first,
+            self.model.second, self.model.both,
             pattern.start, pattern.column, pattern.values,
         )  # fmt: skip
 
@@ -267,10 +255,11 @@ class GripProblem:
             pick = near[faces] & (c.facing.gap < FAR)
             own = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressures], axis=1)[faces[pick]]
             nodes = c.facing.nodes[pick]
-            other = np.concatenate([self.first[nodes], self.second[nodes]], axis=2).reshape(len(nodes), -1)
+            other = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2).reshape(len(nodes), -1)
             pair = [a.ravel() for a in np.broadcast_arrays(own[:, :, None], other[:, None, :])]
-            rows += pair
-            columns += pair[::-1]
+            among = [a.ravel() for a in np.broadcast_arrays(other[:, :, None], other[:, None, :])]
+            rows += [*pair, among[0]]
+            columns += [*pair[::-1], among[1]]
         moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
         if moved is None:
             raise AssertionError("the contact has entries that its pattern cannot hold; this is a bug")
@@ -287,18 +276,21 @@ class GripProblem:
         return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_TRAVEL) for f in self.fingers)
 
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
-        """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature points."""
+        """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
         f = self.fingers[number]
-        c = self._contact(x, np.zeros((self.shell.nodes, 3)))[number]
+        c = self._contact(x, self._no_force())[number]
         own, _ = f.points(x)
         normal = np.where(c.facing.gap[:, None] < FAR, c.facing.normal @ f.R, [0.0, 0.0, -1.0]).reshape(own.shape)
         gap = c.facing.gap.reshape(own.shape[:2])
         load = np.where(gap < FAR, f.pad.face_area * (c.lam @ f.pad.face_N.T), 0.0)
         return f.pressure(x), c.weighted / f.pad.node_area, ContactPoints(own, normal, gap, load)
 
+    def _no_force(self) -> FloatArray:
+        return np.zeros((len(self.model.first), 3))
+
     def wall_load(self, x: FloatArray) -> FloatArray:
         """Contact forces on the wall's nodes ``(k, 3)`` [N]."""
-        force = np.zeros((self.shell.nodes, 3))
+        force = self._no_force()
         self._contact(x, force)
         return -force
 

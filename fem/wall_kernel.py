@@ -4,8 +4,9 @@ At a point with the pressure ``p = sum N_i lam_i`` the pad's node ``b`` gets ``-
 gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Derivatives are those of
 ``fem.facing``. Pad quantities are in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
 
-A node of the wall has unknowns ``first`` and ``second``: both move its outer face, ``second`` alone its director. (A
-shell element's are the displacement of the middle and the change of the director.)
+A node of the wall has unknowns ``first``, which move its outer face, and ``second``, which change its director and, if
+``both`` is set, move the outer face as well. (A shell element's are the displacement of the middle and the change of
+the director: both move the outer face.)
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, p
 
 @njit(cache=True)
 def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wall_N, H, G, A, R, pad_dofs, pressures,
-                    first, second, start, column, values):  # fmt: skip
+                    first, second, both, start, column, values):  # fmt: skip
     """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.
 
     Parameters
@@ -70,6 +71,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
     pad_dofs, pressures : (faces, 3, k), (faces, k) arrays
         Unknowns in the whole problem, -1 where fixed.
     first, second : (wall nodes, 3) arrays
+    both : bool
     start, column, values : arrays
         Compressed rows, columns ascending.
     """
@@ -93,7 +95,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
             p = 0.0
             for i in range(k):
                 p += N[q, i] * lam[f, i]
-            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
+            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, both, D, dn, dA)
             w = area[f, q]
             for j in range(t + 24):
                 for c in range(3):
@@ -126,7 +128,9 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
             for r in range(t + 24 + k):
                 if row_dof[r] < 0:
                     continue
-                # the wall's first and second unknowns carry the same force
+                if t + 12 <= r < t + 24 and not both:
+                    continue
+                # what moves the outer face carries the same force
                 local = r if r < t + 12 else r - 12
                 gap_row = r >= t + 24
                 if gap_row and not active[f, r - t - 24]:
@@ -144,7 +148,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
 
 
 @njit(cache=True)
-def _changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
+def _changes(N, gap, nodes, wall_N, H, G, A, R, both, D, dn, dA):
     """Changes with every local unknown: relative position ``D``, normal ``dn`` and nodal shares ``dA = d(N_a n)``."""
     k = N.size
     t = 3 * k
@@ -156,7 +160,7 @@ def _changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
         for c in range(3):
             for d in range(3):
                 D[d, t + 3 * a + c] = -wall_N[a] if c == d else 0.0
-                D[d, t + 12 + 3 * a + c] = D[d, t + 3 * a + c] - gap * wall_N[a] * G[d, c]
+                D[d, t + 12 + 3 * a + c] = (D[d, t + 3 * a + c] if both else 0.0) - gap * wall_N[a] * G[d, c]
     for j in range(t + 24):
         for d in range(3):
             dn[d, j] = H[d, 0] * D[0, j] + H[d, 1] * D[1, j] + H[d, 2] * D[2, j]
