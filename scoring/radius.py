@@ -1,0 +1,176 @@
+"""Certified radius of the ball in the grasp wrench space of ellipsoidal contacts, by a semidefinite programme.
+
+The ball of radius ``r`` fits if ``sum_i s_i >= r |u|`` wherever ``s_i >= 0`` and ``l_i = (s_i - c_i . u, D_i u)`` lies
+in the Lorentz cone. With ``v = (u, s)`` this holds if
+
+    (sum_i s_i)^2 - r^2 |u|^2 = p(v) + non-negative multiples of products that are non-negative there,
+
+with a positive semidefinite form ``p``. The products are ``s_i s_j``, the Lorentz square of ``l_i``, ``s_i (a . l_j)``
+with ``a`` in the Lorentz cone, and ``l_i^T Z l_j`` with a matrix ``Z`` that is positive on pairs of Lorentz vectors.
+A Lorentz vector of four is a Hermitian 2 x 2 matrix without negative eigenvalues, and forms positive on pairs of those
+are sums of a positive 4 x 4 matrix and the partial transpose of another (E. Stoermer 1963, S. L. Woronowicz 1976), so
+these ``Z`` are known completely. The largest ``r^2`` is found by Newton's method along a logarithmic barrier; every
+point inside proves its own ``r``. The inverse of ``p`` tends to the moments of the weakest wrenches ``v``.
+
+Where the proof leaves a gap the wrenches are split by a plane ``g . v = 0`` between those the moments mix up; on its
+sides ``g s_i``, ``g (a . l_i)`` and the products of several such forms are further products that are not negative.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+_LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
+_SIGMA = np.array([[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+_PAIRS = np.einsum("apq,brs->abprqs", _SIGMA, _SIGMA).reshape(16, 4, 4)
+_TRANSPOSED = np.array([1.0, 1.0, -1.0, 1.0])  # transposing a Hermitian matrix turns its second Pauli coordinate
+_NEWTON_STEPS = 300
+
+
+class Proof(NamedTuple):
+    """A radius proved up to rounding for the wrenches on one side of some planes, and what it leaves open."""
+
+    radius: float
+    directions: FloatArray  # (k, 6), candidates for the weakest wrench, unit vectors of both signs
+    planes: FloatArray  # (p, 6 + k): the wrenches with planes @ v >= 0 were looked at
+    split: FloatArray  # (6 + k,), a plane that would tell the candidates apart
+
+
+def certified_radius(
+    c: FloatArray, D: FloatArray, kind: str = "linf", planes: FloatArray | None = None, tolerance: float = 2e-6
+) -> Proof:
+    """Radius of a ball around 0 inside the grasp wrench space.
+
+    Parameters
+    ----------
+    c, D : (n, 6), (n, 3, 6) array
+        Contacts as in `scoring.gauge`; 0 has to be an inner point of their grasp wrench space.
+    kind : str
+        "linf" or "l1".
+    planes : (p, 6 + k) array, optional
+        Sides of planes, to which the proof is limited.
+    tolerance : float
+        Gap of the programme, relative to the radius squared, at which it stops.
+    """
+    programme = _Programme(c, D, kind, planes)
+    x = programme.start()
+    mu = 1.0
+    for _ in range(_NEWTON_STEPS):
+        step, decrement = programme.newton_step(x, mu)
+        length = 1.0 if np.isfinite(decrement) else 0.0
+        while length > 1e-8 and not programme.inside(x + length * step):
+            length *= 0.7
+        if length <= 1e-8:
+            break
+        x = x + (length if length == 1 else 0.9 * length) * step
+        if decrement < 0.5:
+            if mu * programme.parameter <= tolerance * max(x[0], 1e-9):
+                break
+            mu *= 0.2
+    return Proof(float(np.sqrt(max(x[0], 0.0))), *programme.outlook(x))
+
+
+class _Programme:
+    """Maximise ``x_0 = r^2`` subject to ``A0 + sum_k x_k A_k`` and the multipliers staying in their cones."""
+
+    def __init__(self, c: FloatArray, D: FloatArray, kind: str, planes: FloatArray | None) -> None:
+        n = len(c)
+        k = 1 if kind == "l1" else n
+        d = 6 + k
+        s = np.eye(k, d, 6)
+        L = np.zeros((n, 4, d))
+        L[:, 0, :6], L[:, 1:, :6] = -c, D
+        L[:, 0] += s[np.arange(n) % k]
+        self.planes = np.zeros((0, d)) if planes is None else planes
+        lines = np.vstack([s, self.planes])
+        squares = np.einsum("a,iad,iae->ide", _LORENTZ, L, L)
+        pairs = [np.outer(g, s_) for i, g in enumerate(lines) for s_ in lines[:i]]
+        groups = [
+            np.diag([1.0] * 6 + [0.0] * k)[None],
+            squares,
+            np.reshape(pairs, (-1, d, d)),
+            np.einsum("id,jae->ijade", lines, L).reshape(-1, d, d),
+            *(
+                np.einsum("ad,be,b->abde", L[i], L[j], flip).reshape(16, d, d)
+                for i in range(n)
+                for j in range(i)
+                for flip in (np.ones(4), _TRANSPOSED)
+            ),
+        ]
+        A = -np.concatenate(groups)
+        self.A = (A + A.swapaxes(1, 2)) / 2
+        self.A0 = np.outer(s.sum(axis=0), s.sum(axis=0))
+        ends = np.cumsum([len(g) for g in groups])
+        self.single = np.arange(1, ends[2])
+        self.mixed = np.arange(ends[1], ends[1] + k * (k - 1) // 2)
+        self.lorentz = np.arange(ends[2], ends[3]).reshape(-1, 4)
+        self.matrices = np.arange(ends[3], ends[-1]).reshape(-1, 16)
+        self.parameter = d + len(self.single) + 2 * len(self.lorentz) + 4 * len(self.matrices)
+
+    def start(self) -> FloatArray:
+        """A point inside: small multipliers, and a negative square of the radius."""
+        x = np.zeros(len(self.A))
+        x[np.concatenate([self.single, self.lorentz[:, 0], self.matrices[:, 0]])] = 1e-2 / max(len(self.lorentz), 4)
+        x[self.mixed] = 2.0  # the form of the s_i becomes diagonal
+        x[0] = -1.0
+        while not self.inside(x):
+            x[0] *= 4
+        return x
+
+    def inside(self, x: FloatArray) -> bool:
+        """Whether the form and all multipliers are inside their cones."""
+        a = x[self.lorentz]
+        if (x[self.single] <= 0).any() or (a[:, 0] <= 0).any() or ((a * a) @ _LORENTZ <= 0).any():
+            return False
+        try:
+            np.linalg.cholesky(self._form(x))
+            np.linalg.cholesky(np.tensordot(x[self.matrices], _PAIRS, 1))
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def newton_step(self, x: FloatArray, mu: float) -> tuple[FloatArray, float]:
+        """Newton step of ``-x_0 / mu`` plus the logarithmic barrier, and its decrement."""
+        m = len(x)
+        T = np.linalg.inv(self._form(x)) @ self.A
+        g = -np.einsum("kii->k", T)
+        H = T.reshape(m, -1) @ T.swapaxes(1, 2).reshape(m, -1).T
+        g[0] -= 1 / mu
+        g[self.single] -= 1 / x[self.single]
+        H[self.single, self.single] += 1 / x[self.single] ** 2
+        a = x[self.lorentz]
+        q = ((a * a) @ _LORENTZ)[:, None]
+        slope = -2 * a * _LORENTZ / q
+        g[self.lorentz] += slope
+        _add(H, self.lorentz, slope[:, :, None] * slope[:, None, :] - 2 * np.diag(_LORENTZ) / q[:, None])
+        P = np.linalg.inv(np.tensordot(x[self.matrices], _PAIRS, 1))[:, None] @ _PAIRS
+        g[self.matrices] -= np.einsum("pkii->pk", P).real
+        flat = P.reshape(-1, 16, 16), P.swapaxes(2, 3).reshape(-1, 16, 16)
+        _add(H, self.matrices, (flat[0] @ flat[1].swapaxes(1, 2)).real)
+        size = 1 / np.sqrt(np.diag(H))
+        step = -size * np.linalg.solve(H * size[:, None] * size + 1e-14 * np.eye(m), size * g)
+        return step, float(-g @ step)
+
+    def outlook(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unit wrenches along the principal axes of the moments, the planes, and one that splits the moments."""
+        moments = np.linalg.inv(self._form(x))
+        axes = np.linalg.eigh(moments[:6, :6])[1][:, ::-1].T
+        total = np.sqrt(self.A0.diagonal())  # sum_i s_i, which is positive wherever u is not 0
+        mean = moments @ total / (total @ moments @ total)
+        spread = moments / (total @ moments @ total) - np.outer(mean, mean)
+        split = np.zeros(len(total))
+        split[:6] = np.linalg.eigh(spread[:6, :6])[1][:, -1]
+        split -= (split @ mean) * total
+        return np.vstack([axes, -axes]), self.planes, split / np.abs(split).max()
+
+    def _form(self, x: FloatArray) -> FloatArray:
+        return self.A0 + np.tensordot(x, self.A, 1)
+
+
+def _add(H: FloatArray, index: NDArray[np.int64], blocks: FloatArray) -> None:
+    H[index[:, :, None], index[:, None, :]] += blocks
