@@ -1,0 +1,230 @@
+"""Does a grasp hold this load: the weight of the object, or any other wrench, at given normal forces?
+
+The load ``w`` is held if the contacts can answer with ``-w``. How the normal forces behave is a choice:
+
+* "up_to": each lies anywhere between 0 and its grip force. A parallel gripper that is pushed along its closing line
+  unloads one finger while its drive or its self-locking gear keeps the other within the limit.
+* "fixed": each is its grip force, whatever happens. Fingers driven by constant force hold no load along their common
+  line, and contacts whose normal forces do not balance may hold only a heavy enough load.
+
+Forces are in N and torques in N m about the origin of the contacts' frame. The safety factor, the largest multiple of
+the load that is held, is a ratio along one line of wrenches, so it depends neither on the point torques refer to nor on
+a length that would make them comparable with forces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scoring.contact import SoftContact
+from scoring.reach import Reach, reach
+
+FloatArray = NDArray[np.float64]
+
+GRAVITY = 9.80665
+_KINDS = {"up_to": "linf", "fixed": "fixed"}
+_NOTHING = 1e-9  # relative size below which a part of a wrench counts as rounding
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """What a grasp makes of a load.
+
+    Parameters
+    ----------
+    safety_factor : float
+        Largest multiple of the load that is held [-], as proved; 0 if none is.
+    gap : float
+        How much larger it could be at most [-].
+    lowest_factor : float
+        Smallest multiple that is held [-]; 0 unless fixed normal forces need a load to balance them.
+    holds : bool
+        Whether the load itself is held.
+    motion : (6,) array
+        Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size.
+    limits : tuple of str
+        What each contact does then.
+    """
+
+    safety_factor: float
+    gap: float
+    lowest_factor: float
+    holds: bool
+    motion: FloatArray
+    limits: tuple[str, ...]
+
+
+def weight_wrench(
+    mass: float,
+    direction: ArrayLike,
+    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+    acceleration: ArrayLike = (0.0, 0.0, 0.0),
+) -> FloatArray:
+    """Weight of an object and, if the gripper accelerates, its inertia: ``(6,)``, forces [N] then torques [N m].
+
+    Parameters
+    ----------
+    mass : float
+        Mass [kg].
+    direction : (3,) array
+        Direction of gravity in the contacts' frame, of any length.
+    centre_of_mass : (3,) array
+        Where the weight acts [m].
+    acceleration : (3,) array
+        Acceleration of gripper and object, without rotation [m/s^2].
+
+    Examples
+    --------
+    >>> weight_wrench(1.0, [0, 0, -1], [0.5, 0, 0])[[2, 4]].tolist()
+    [-9.80665, 4.903325]
+    """
+    down = _vector("direction", direction, 3)
+    if not 0 < mass < math.inf:
+        raise ValueError(f"mass is {mass}: it must be a positive number of kilograms")
+    if not down.any():
+        raise ValueError("direction is zero: give the direction in which gravity pulls")
+    force = mass * (GRAVITY * down / np.linalg.norm(down) - _vector("acceleration", acceleration, 3))
+    return np.concatenate([force, np.cross(_vector("centre_of_mass", centre_of_mass, 3), force)])
+
+
+def hold_task(
+    contacts: Sequence[SoftContact], normal_forces: ArrayLike, wrench: ArrayLike, normal: str = "up_to"
+) -> TaskResult:
+    """Whether the grasp holds a load, and with how much to spare.
+
+    Parameters
+    ----------
+    contacts : sequence of SoftContact
+        One or more, in any pose.
+    normal_forces : float or (n,) array
+        Grip force of each contact [N].
+    wrench : (6,) array
+        Load on the object: force [N] and torque about the origin [N m]; `weight_wrench` gives that of its weight.
+    normal : str
+        "up_to" or "fixed", see above.
+    """
+    if normal not in _KINDS:
+        raise ValueError(f"normal is {normal!r}: take 'up_to' or 'fixed'")
+    if not len(contacts):
+        raise ValueError("contacts is empty: a grasp needs at least one contact")
+    F = np.broadcast_to(np.asarray(normal_forces, float), (len(contacts),))
+    if not (np.isfinite(F).all() and (F > 0).all()):
+        raise ValueError(f"normal_forces is {F.tolist()}: grip forces must be positive newtons")
+    load = _vector("wrench", wrench, 6)
+    if not load.any():
+        raise ValueError("wrench is zero: any grasp holds that; give the load to hold")
+    # Torques about the middle of the contacts, by their own length, keep the numbers of one size.
+    middle = np.mean([contact.position for contact in contacts], axis=0)
+    spread = max(np.linalg.norm(contact.position - middle) for contact in contacts)
+    grip = max(float(np.max(contact.body.support(np.diag([0.0, 0.0, 1.0])))) for contact in contacts)
+    length = max(spread, grip) or 1.0
+    C = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
+    w = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
+    lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
+    factor = max(found.lower, 0.0)
+    u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
+    holds = bool(factor >= 1 and lowest <= 1)
+    return TaskResult(factor, max(found.upper - factor, 0.0), lowest, holds, -u, _limits(contacts, C, found.u))
+
+
+def least_grip_force(
+    contacts: Sequence[SoftContact],
+    wrench: ArrayLike,
+    safety_factor: float = 1.0,
+    normal: str = "up_to",
+    shares: ArrayLike = 1.0,
+) -> float:
+    """Least grip force that holds a load times a safety factor [N]; infinite if none does.
+
+    Parameters
+    ----------
+    contacts, wrench, normal
+        As for `hold_task`.
+    safety_factor : float
+        Multiple of the load to hold.
+    shares : float or (n,) array
+        Normal forces of the contacts by the grip force; 1 for two fingers that press against each other.
+
+    Notes
+    -----
+    All wrenches grow with the grip force, so one programme for a grip force of 1 N is enough.
+    """
+    if not 0 < safety_factor < math.inf:
+        raise ValueError(f"safety_factor is {safety_factor}: it must be a positive number")
+    unit = hold_task(contacts, shares, wrench, normal)
+    return safety_factor / unit.safety_factor if unit.safety_factor > _NOTHING * unit.gap else math.inf
+
+
+def _range_up_to(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
+    """Multiples of ``w`` in the sum of the contacts' cones: from 0 to the reach."""
+    U = _span([Ci @ np.diag([1.0, *_axes(contact)]) for Ci, contact in zip(C, contacts, strict=True)])
+    off = w - U @ (U.T @ w)
+    if np.linalg.norm(off) > _NOTHING * np.linalg.norm(w):
+        return 0.0, Reach(0.0, 0.0, off / (off @ w))
+    found = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
+    return 0.0, found._replace(u=U @ found.u)
+
+
+def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
+    """Multiples of ``w`` among the wrenches of contacts with given normal forces."""
+    bodies = [contact.body for contact in contacts]
+    U = _span([Ci[:, 1:] * _axes(contact) for Ci, contact in zip(C, contacts, strict=True)])
+    b = C[:, :, 0].sum(axis=0)
+    off_w, off_b = (a - U @ (U.T @ a) for a in (w, b))
+    small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
+    if small_w and np.linalg.norm(off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum():
+        C, w = U.T @ C, U.T @ w
+        forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
+        return max(-back.lower, 0.0), forth._replace(u=U @ forth.u)
+    # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
+    s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
+    rest = s * w - b
+    balanced = np.linalg.norm(s * off_w - off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum()
+    if balanced and s >= 0 and np.linalg.norm(rest) > _NOTHING * np.linalg.norm(b):
+        friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
+        balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1
+    s = s if balanced and s >= 0 else 0.0
+    u = off_w if not small_w else off_b
+    return s, Reach(s, s, u / max(abs(u @ w), 1e-300))
+
+
+def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tuple[str, ...]:
+    """What the contacts do when the object escapes: its motion there, weighed by the loads it works against."""
+    felt = np.array([Ci.T @ u for Ci in C])  # along N, x, y and about N
+    felt[:, 1:] *= [_axes(contact) for contact in contacts]
+    size = np.linalg.norm(felt, axis=1)
+    said = []
+    for part, friction in zip(felt, np.linalg.norm(felt[:, 1:], axis=1), strict=True):
+        if np.linalg.norm(part) <= 1e-6 * size.max():
+            said.append("stays in place")
+        elif part[0] + friction <= 1e-6 * size.max():
+            said.append("lets go")
+        elif friction <= 1e-6 * size.max():
+            said.append("is pushed back along its normal")
+        else:
+            said.append(("slides along x", "slides along y", "turns about its normal")[np.abs(part[1:]).argmax()])
+    return tuple(said)
+
+
+def _axes(contact: SoftContact) -> FloatArray:
+    """Loads that the contact can carry one by one, ``(3,)``."""
+    ends = contact.body.support(np.vstack([np.eye(3), -np.eye(3)]))
+    return np.maximum(ends[:3], ends[3:])
+
+
+def _span(maps: Sequence[FloatArray]) -> FloatArray:
+    """Orthonormal columns that span the wrenches."""
+    U, size, _ = np.linalg.svd(np.hstack(list(maps)), full_matrices=False)
+    return U[:, size > _NOTHING * max(size[0], 1e-300)]
+
+
+def _vector(name: str, value: ArrayLike, length: int) -> FloatArray:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (length,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} is {vector.tolist()}: expected {length} finite numbers")
+    return vector
