@@ -14,7 +14,7 @@ import numpy as np
 from fem.errors import ConvergenceError
 from fem.petsc import NonlinearSolver
 from fem.shell_model import FloatArray
-from fem.shell_solve import TOLERANCE, Equilibrium, ShellProblem, load_steps
+from fem.shell_solve import Equilibrium, ShellProblem, default_tolerance, load_steps
 
 DESIRED = 6  # iterations of a step: longer steps follow easier ones
 LARGEST_TURN = np.radians(60.0)  # of the secant from step to step; more means that the path has been lost
@@ -85,7 +85,7 @@ def follow(
     yield state
     arc = ArcProblem(problem)
     solver = NonlinearSolver(arc, {}, "path_")
-    tolerance = TOLERANCE * float(np.linalg.norm(arc.load[arc.free]))
+    tolerance = default_tolerance(problem)
     x = np.append(state.q[arc.free], first)
     along = x.copy()
     shortest = SHORTEST * arc.length(along)

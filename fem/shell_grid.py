@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +11,7 @@ from fem.outer_surface import OuterSurface
 from fem.pose import FloatArray
 
 SAMPLES = 4000  # of the wanted element size along a line
-TURN = np.radians(20.0)  # largest turn of the outline within one element
+TURN = np.radians(25.0)  # largest turn of the outline within one element
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class MeshSize:
     around: float = 0.0015
     along: float = 0.0025
     coarse: float = 0.006
-    growth: float = 0.15
+    growth: float = 0.25
 
     def __post_init__(self) -> None:
         """Refuse sizes that are no sizes."""
@@ -52,22 +51,23 @@ class MeshSize:
             raise ValueError(f"heights must be (low, high), found {self.heights}")
 
 
-def graded(
-    start: float, end: float, size: Callable[[FloatArray], FloatArray], growth: float, multiple: int = 1
-) -> FloatArray:
-    """Ascending places from ``start`` to ``end`` whose distances follow ``size`` and grow by at most ``growth``.
+def limited(x: FloatArray, h: FloatArray, growth: float) -> FloatArray:
+    """Largest sizes below ``h (n,)`` at the even places ``x (n,)`` that grow by at most ``growth`` per length."""
+    drift = growth * x
+    rising = np.minimum.accumulate(h - drift) + drift
+    return np.minimum(rising, np.minimum.accumulate((h + drift)[::-1])[::-1] - drift)
 
-    Their number of intervals is a multiple of ``multiple``.
+
+def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: int = 1) -> FloatArray:
+    """Ascending places from ``start`` to ``end`` whose distances follow the sizes ``h (n,)`` given at ``x (n,)``.
+
+    The number of intervals is a multiple of ``multiple``.
     """
-    x = np.linspace(start, end, SAMPLES)
-    h, step = size(x), growth * (x[1] - x[0])
-    for order in (range(1, len(x)), range(len(x) - 2, -1, -1)):
-        for k in order:
-            before = k - 1 if order.step > 0 else k + 1
-            h[k] = min(h[k], h[before] + step)
-    count = np.concatenate([[0.0], np.cumsum(0.5 * (1 / h[1:] + 1 / h[:-1]) * np.diff(x))])
+    fine = np.linspace(start, end, SAMPLES)
+    density = 1.0 / np.interp(fine, x, h)
+    count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
     n = multiple * max(1, int(np.ceil((count[-1] - 1e-6) / multiple)))
-    places = np.interp(np.arange(n + 1) * count[-1] / n, count, x)
+    places = np.interp(np.arange(n + 1) * count[-1] / n, count, fine)
     places[[0, -1]] = start, end
     return places
 
@@ -76,21 +76,16 @@ def along(surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bo
     """Grid lines along the outline, with one on the edge of each flat lid."""
     begin = surface.wall[0] if open_bottom else hole
     end = surface.wall[1] if open_top else surface.end
-    if not begin < surface.wall[1]:
-        raise ValueError(f"the hole of radius {hole:g} m is larger than the bottom")
+    if hole > 0 and not (hole < surface.flat[0] and not open_bottom):
+        raise ValueError(f"a hole of radius {hole:g} m needs a flat bottom that is larger")
     low, high = (surface.station(z) for z in size.heights)
-    bend = np.abs(surface.curve.curvature(np.linspace(begin, end, SAMPLES)))
-    at = np.linspace(begin, end, SAMPLES)
-
-    def wanted(x: FloatArray) -> FloatArray:
-        off = np.maximum(np.maximum(low - x, x - high), 0.0)
-        return np.minimum(
-            np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(np.interp(x, at, bend), 1e-9)
-        )
-
-    edges = [x for x in surface.flat if begin + 1e-9 < x < end - 1e-9]
-    places = [begin, *edges, end]
-    runs = [graded(a, b, wanted, size.growth) for a, b in pairwise(places)]
+    x = np.linspace(begin, end, SAMPLES)
+    off = np.maximum(np.maximum(low - x, x - high), 0.0)
+    bend = np.abs(surface.curve.curvature(x))
+    h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
+    h = limited(x, h, size.growth)
+    edges = [edge for edge in surface.flat if begin + 1e-9 < edge < end - 1e-9]
+    runs = [divided(a, b, x, h) for a, b in pairwise([begin, *edges, end])]
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
 
@@ -109,11 +104,10 @@ def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -
     turn = np.interp(0.0, fine, arc) - np.interp(-2 * np.pi, fine, arc)
     middles = np.interp(np.mod(size.angles, 2 * np.pi), fine, arc)
 
-    def wanted(x: FloatArray) -> FloatArray:
-        off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
-        return np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
-
-    places = graded(*np.interp([begin, end], fine, arc), wanted, size.growth, 4 >> sum(symmetry))
-    theta = np.interp(places, arc, fine)
+    ends = np.interp([begin, end], fine, arc)
+    x = np.linspace(*ends, SAMPLES)
+    off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
+    h = np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
+    theta = np.interp(divided(*ends, x, h, 4 >> sum(symmetry)), arc, fine)
     theta[[0, -1]] = begin, end
     return theta

@@ -13,6 +13,7 @@ from fem.petsc import NonlinearSolver
 from fem.shell_model import FloatArray, IntArray, Shell
 
 TOLERANCE = 1e-7  # of the residual, relative to the load
+ROUNDING = 16.0 * np.finfo(float).eps  # of the thickness stresses, relative to E: the residual gets no smaller
 SMALLEST_STEP = 1 / 256  # of the step that was asked for
 EASY = 8  # a step that takes no more iterations may be followed by a longer one
 GROWTH = 1.5
@@ -146,7 +147,8 @@ def load_steps(
     iterations : int
         Newton iterations after which a step is given up.
     tolerance : float, optional
-        Largest norm of the residual [N]; by default 1e-7 of the load's. Needed where only displacements are driven.
+        Largest norm of the residual [N]; by default 1e-7 of the load's, or that of rounding errors. Needed where only
+        displacements are driven.
     options : dict, optional
         PETSc options with the prefix ``shell_``.
 
@@ -157,8 +159,8 @@ def load_steps(
     """
     solver = NonlinearSolver(problem, options or {}, "shell_")
     if tolerance is None:
-        tolerance = TOLERANCE * float(np.linalg.norm(problem.load[problem.free]))
-        if tolerance == 0.0:
+        tolerance = default_tolerance(problem)
+        if not problem.load[problem.free].any():
             raise ValueError("nothing loads the shell; give the tolerance in newtons where displacements are driven")
     x, at = np.zeros(problem.size), 0.0
     try:
@@ -183,6 +185,13 @@ def load_steps(
             yield _equilibrium(problem, x, spent, cuts)
     finally:
         solver.destroy()
+
+
+def default_tolerance(problem: ShellProblem) -> float:
+    """Norm of the residual [N] that counts as zero under this problem's load."""
+    shell, load = problem.shell, problem.load[problem.free]
+    noise = ROUNDING * shell.young_modulus * float(np.linalg.norm(shell.node_area))
+    return max(TOLERANCE * float(np.linalg.norm(load)), noise)
 
 
 def _solve(

@@ -1,0 +1,250 @@
+"""Thin-walled bodies: the outer surface and its derivatives, meshes, symmetry, supports, stresses, materials."""
+
+import numpy as np
+import pytest
+
+from fem.outer_surface import Section, of_revolution, of_sections
+from fem.revolution import Revolution
+from fem.shell_body import body_mesh
+from fem.shell_grid import MeshSize, divided, limited
+from fem.shell_linear import LinearShell
+from fem.shell_solve import ShellProblem, load_steps
+from fem.shell_stress import faces, largest
+from fem.shell_support import supported
+from fem.wall_material import WallMaterial, wall_material
+
+FLASK = Revolution(
+    np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3
+)
+SQUARE = [
+    Section(0.0, 0.030, 0.020, 4.0),
+    Section(0.03, 0.030, 0.020, 4.0),
+    Section(0.07, 0.030, 0.020, 4.0),
+    Section(0.09, 0.026, 0.018, 3.0, (0.002, 0.0)),
+    Section(0.12, 0.012, shift=(0.004, 0.0)),
+    Section(0.14, 0.012, shift=(0.004, 0.0)),
+]
+SURFACES = {"flask": of_revolution(FLASK), "square": of_sections(SQUARE)}
+COARSE = MeshSize(heights=(0.03, 0.05), around=0.004, along=0.006, coarse=0.012)
+RNG = np.random.default_rng(5)
+PET = wall_material("pet")
+WHOLE, HALF_Y, HALF_X, QUARTER = (False, False), (False, True), (True, False), (True, True)
+
+
+def test_a_revolved_wall_and_the_rigid_body_are_the_same():
+    surface = SURFACES["flask"]
+    theta, s = RNG.uniform(-4, 7, 200), RNG.uniform(0, surface.end, 200)
+    gap, normal, _ = FLASK.gap(surface.jets(theta, s)[:, 0])
+    assert np.abs(gap).max() < 1e-15
+    assert np.abs(normal - surface.normals(theta, s)).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_derivatives_of_the_surface(name):
+    """Central differences of fourth order, away from joints; exponents above 2 bend sharply at their flat sides."""
+    surface, h = SURFACES[name], np.array([1e-3, 2e-6])
+    joints = np.concatenate([surface.curve.breaks, [surface.station(p.z) for p in SQUARE[:-1]]])
+    s = RNG.uniform(1e-3, surface.end - 1e-3, 300)
+    s = s[np.abs(s[:, None] - joints).min(axis=1) > 1e-5]
+    theta = RNG.uniform(0.2, np.pi / 2 - 0.2, len(s)) + np.pi / 2 * RNG.integers(-2, 5, len(s))
+    if name == "flask":
+        theta[:8] = np.pi / 2 * np.arange(8)
+    D = surface.jets(theta, s)
+    for axis, pairs in ((0, ((0, 1), (1, 3), (2, 4))), (1, ((0, 2), (1, 4), (2, 5)))):
+        dt, ds = h * (np.arange(2) == axis)
+        near, far = (
+            surface.jets(theta + k * dt, s + k * ds) - surface.jets(theta - k * dt, s - k * ds) for k in (1, 2)
+        )
+        found = (8 * near - far) / (12 * h[axis])
+        for of, derivative in pairs:
+            scale = np.abs(D[:, derivative]).max()
+            assert np.abs(found[:, of] - D[:, derivative]).max() < 1e-6 * scale
+
+
+def test_sections_have_the_shape_that_was_asked_for():
+    surface = SURFACES["square"]
+    theta = RNG.uniform(0, 7, 50)
+    for p in SQUARE[1:5]:
+        x, y, z = surface.jets(theta, surface.station(p.z))[:, 0].T
+        assert z == pytest.approx(p.z, abs=1e-12)
+        b = p.a if p.b is None else p.b
+        size = np.abs((x - p.shift[0]) / p.a) ** p.exponent + np.abs((y - p.shift[1]) / b) ** p.exponent
+        assert size == pytest.approx(1, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("top", [True, False])
+def test_the_outer_face_lies_on_the_surface_and_the_middle_half_a_wall_inside(name, top):
+    surface = SURFACES[name]
+    mesh = body_mesh(surface, [(0.0, 8e-4), (0.1, 4e-4)], COARSE, open_top=top)
+    theta, s = (grid.ravel() for grid in np.meshgrid(mesh.theta, mesh.s, indexing="ij"))
+    assert np.abs(mesh.outer[mesh.number.ravel()] - surface.jets(theta, s)[:, 0]).max() < 1e-15
+    z = mesh.outer[:, 2]
+    assert mesh.thickness == pytest.approx(np.interp(z, [0, 0.1], [8e-4, 4e-4]), rel=1e-12)
+    assert np.abs(np.cross(mesh.D[mesh.number.ravel()], surface.normals(theta, s))).max() < 1e-18
+    low = mesh.number[0, 0]
+    assert (mesh.number[:, 0] == low).all()
+    assert mesh.D[low] == pytest.approx([0, 0, -4e-4], abs=1e-12)
+
+
+def test_grid_lines_are_fine_where_asked():
+    mesh = body_mesh(SURFACES["flask"], 4e-4, MeshSize(heights=(0.03, 0.05), half_width=0.01))
+    arc, z = 0.03 * np.diff(mesh.theta), mesh.outer[mesh.number[0]][:, 2]
+    middle = 0.5 * (mesh.theta[1:] + mesh.theta[:-1])
+    near = np.abs((0.03 * middle + 0.03 * np.pi / 2) % (0.03 * np.pi) - 0.03 * np.pi / 2) < 0.01
+    assert arc[near].max() <= 0.0015
+    assert arc.max() > 0.0035
+    assert np.abs(mesh.theta - np.pi).min() < 1e-6
+    steps = np.diff(mesh.s)
+    assert steps[(z[:-1] >= 0.03) & (z[1:] <= 0.05)].max() <= 0.0025 * 1.001
+    assert np.abs(np.diff(np.log(steps))).max() < 0.5
+    assert mesh.s[np.abs(mesh.s - mesh.surface.flat[0]).argmin()] == mesh.surface.flat[0]
+    assert mesh.outer[mesh.foot, 2] == pytest.approx(mesh.outer[:, 2].min(), abs=1e-12)
+
+
+def test_sizes_grow_no_faster_than_asked():
+    x = np.linspace(0, 2, 201)
+    assert limited(x, np.where(np.abs(x - 1) < 1e-9, 0.1, 9.0), 0.25) == pytest.approx(0.1 + 0.25 * np.abs(x - 1))
+    assert divided(1.0, 3.0, x, np.full(201, 0.25)) == pytest.approx(np.linspace(1, 3, 9), abs=1e-12)
+    assert len(divided(1.0, 3.0, x, np.full(201, 0.25), 3)) == 10
+
+
+def test_values_between_nodes_are_bilinear_in_the_parameters():
+    mesh = body_mesh(SURFACES["square"], 4e-4, COARSE)
+    theta, s = RNG.uniform(-9, 9, 100), RNG.uniform(mesh.s[1], mesh.s[-1], 100)
+    nodes, N, dN = mesh.locate(theta, s)
+    grid_s = np.full(len(mesh.X), np.nan)
+    grid_s[mesh.number.ravel()] = np.broadcast_to(mesh.s, mesh.number.shape).ravel()
+    assert np.einsum("ni,ni->n", N, grid_s[nodes]) == pytest.approx(s, rel=1e-12)
+    assert np.einsum("nki,ni->nk", dN, grid_s[nodes]) == pytest.approx(np.tile([0.0, 1.0], (100, 1)), abs=1e-9)
+    h = 1e-7
+    moved = mesh.locate(theta + h, s)
+    same = (moved[0] == nodes).all(axis=1)
+    assert (moved[1] - N)[same] / h == pytest.approx(dN[same, 0], rel=1e-4, abs=1e-4)
+
+
+def pinched(symmetry, support="standing", surface="flask"):
+    """One newton of each of two forces towards the axis at angles 0 and pi."""
+    mesh = body_mesh(SURFACES[surface], 4e-4, COARSE, symmetry, base_thickness=1e-3)
+    body = supported(mesh, PET, support)
+    load = np.zeros((len(mesh.X), 6))
+    j = np.abs(mesh.s - mesh.surface.station(0.04)).argmin()
+    for angle, towards in ((0.0, -1.0), (np.pi, 1.0)):
+        i = np.abs(mesh.theta - angle).argmin()
+        if abs(mesh.theta[i] - angle) < 1e-6:
+            load[mesh.number[i, j], [0, 3]] = towards * (0.5 if symmetry[1] else 1.0)
+    return mesh, body, load.ravel(), mesh.number[np.abs(mesh.theta).argmin(), j]
+
+
+def test_quarter_half_and_whole_are_the_same():
+    found = []
+    for symmetry in (WHOLE, HALF_Y, HALF_X, QUARTER):
+        mesh, body, load, node = pinched(symmetry)
+        (state,) = load_steps(ShellProblem(body.shell, body.fixed, load), [1.0])
+        found.append([*body.shell.displacement(state.q)[node], *largest(body.shell, state.q).values()])
+        assert np.abs(body.reaction(state.q)).max() < 1e-7
+        assert body.shell.node_area.sum() / mesh.share == pytest.approx(0.024, rel=0.1)
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-5, abs=1e-9)
+    assert found[0][0] < -1e-4
+
+
+def test_small_loads_agree_with_the_linear_shell():
+    _, body, load, _ = pinched(QUARTER)
+    (state,) = load_steps(ShellProblem(body.shell, body.fixed, 1e-4 * load), [1.0])
+    linear = LinearShell(body.shell, body.fixed).solve(1e-4 * load)
+    assert linear == pytest.approx(state.q, abs=1e-4 * np.abs(state.q).max())
+
+
+def test_compliance_is_what_single_forces_do():
+    _, body, _, node = pinched(QUARTER)
+    nodes = np.array([node, node + 1, node + 7])
+    linear = LinearShell(body.shell, body.fixed)
+    C, W = linear.compliance(nodes)
+    assert np.abs(C - C.T).max() < 1e-10 * np.abs(C).max()
+    load = np.zeros((body.shell.nodes, 6))
+    load[node + 7, [1, 4]] = 2.0
+    q = linear.solve(load.ravel())
+    assert 2 * C[:, 7] == pytest.approx(body.shell.displacement(q)[nodes].ravel(), rel=1e-12)
+    assert 2 * W[:, 7] == pytest.approx(q.reshape(-1, 6)[nodes, 3:].ravel(), rel=1e-12)
+
+
+@pytest.mark.parametrize("support", ["free", "standing", "clamped"])
+def test_the_support_carries_what_is_left_over(support):
+    """A pull along the axis, spread over the wall: springs, the foot or the bottom hold it."""
+    mesh, body, _, _ = pinched(HALF_Y, support)
+    load = np.zeros((len(mesh.X), 6))
+    load[:, 2] = 1e-3 * body.shell.node_area / body.shell.node_area.sum()
+    q = LinearShell(body.shell, body.fixed).solve(load.ravel())
+    assert body.reaction(q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
+    rise = body.shell.displacement(q)[:, 2].mean()
+    assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
+
+
+def test_weak_springs_do_not_matter_in_a_balanced_grasp():
+    _, soft, load, node = pinched(QUARTER, "free")
+    stiff = supported(soft.shell.mesh, PET, "free", 10.0)
+    one, other = (LinearShell(body.shell, body.fixed).solve(load)[6 * node] for body in (soft, stiff))
+    assert one == pytest.approx(other, rel=1e-4)
+
+
+def test_a_tube_under_pressure():
+    """Hoop stress p R / t on average, p R^2 / (E t) wider; the same on all of a long tube with free ends."""
+    tube = of_revolution(Revolution(np.array([[0.0, 0.03], [0.02, 0.03], [0.04, 0.03]])))
+    mesh = body_mesh(tube, 5e-4, MeshSize(heights=(0.01, 0.03), half_width=1.0), QUARTER, open_bottom=True)
+    body, p, R = supported(mesh, PET), 10.0, 0.03 - 2.5e-4
+    load = np.zeros((len(mesh.X), 6))
+    load[:, :3] = p * body.shell.node_area[:, None] * mesh.D / 2.5e-4
+    load = np.where(mesh.symmetric.reshape(-1, 6), 0, load).ravel()
+    q = LinearShell(body.shell, body.fixed).solve(load)
+    wider = np.einsum("nk,nk->n", q.reshape(-1, 6)[:, :3], mesh.D) / 2.5e-4
+    assert wider == pytest.approx(p * R**2 / (PET.young_modulus * 5e-4), rel=2e-3)
+    outer, inner = faces(body.shell, q)
+    middle = 0.5 * (outer.stress + inner.stress)
+    assert np.abs(middle).max(axis=2) == pytest.approx(p * R / 5e-4, rel=5e-3)
+    # the faces differ by the order of thickness / radius, which the element leaves out
+    assert outer.von_mises == pytest.approx(p * R / 5e-4, rel=0.02)
+    low, high = np.moveaxis(outer.principal_strain, -1, 0)
+    assert high == pytest.approx(p * R / 5e-4 / PET.young_modulus, rel=0.02)
+    assert low == pytest.approx(-0.38 * p * R / 5e-4 / PET.young_modulus, rel=0.05)
+
+
+def test_a_hole_in_the_bottom_leaves_no_triangles():
+    mesh = body_mesh(SURFACES["flask"], 4e-4, COARSE, QUARTER, hole=0.0015)
+    assert len(np.unique(mesh.number)) == mesh.number.size
+    assert np.hypot(*mesh.outer[mesh.number[:, 0], :2].T) == pytest.approx(0.0015, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"symmetry": QUARTER}, "shifted along x"),
+        ({"thickness": -1e-4}, "positive everywhere"),
+        ({"thickness": 5e-3}, "round it more"),
+        ({"hole": 0.05}, "flat bottom that is larger"),
+        ({"size": MeshSize(heights=(0.03, 0.5))}, "no point at 0.5 m"),
+    ],
+)
+def test_bodies_that_cannot_be_meshed_are_refused(arguments, message):
+    given = {"surface": SURFACES["square"], "thickness": 4e-4, "size": COARSE} | arguments
+    with pytest.raises(ValueError, match=message):
+        body_mesh(**given)
+
+
+def test_sections_that_make_no_body_are_refused():
+    with pytest.raises(ValueError, match="bottom to top"):
+        of_sections(SQUARE[::-1])
+    with pytest.raises(ValueError, match="section 2 needs an exponent"):
+        of_sections([SQUARE[0], Section(0.05, 0.02, exponent=1.5)])
+
+
+def test_wall_materials():
+    assert wall_material("PP").young_modulus == 1.3e9
+    assert wall_material("pet", young_modulus=2.8e9) == WallMaterial(2.8e9, 0.38, 57e6)
+    assert wall_material(young_modulus=1e9, poisson_ratio=0.4).yield_strength is None
+    with pytest.raises(ValueError, match="'glass' is unknown"):
+        wall_material("glass")
+    with pytest.raises(ValueError, match="needs a name"):
+        wall_material(young_modulus=1e9)
+    with pytest.raises(ValueError, match="support 'hung' is unknown"):
+        supported(body_mesh(SURFACES["flask"], 4e-4, COARSE, QUARTER), PET, "hung")
