@@ -116,5 +116,5 @@ def gram_certificate(Q: FloatArray, tensor: FloatArray, gap: float) -> GramCerti
     values = np.linalg.eigvalsh(Q)
     u = directions(d, 500)
     curvature = np.linalg.eigvalsh(np.einsum("ijkl,mk,ml->mij", tensor, u, u, optimize=True))
-    residual = float(np.abs(seen - tensor).max() / values[-1])
+    residual = float(np.abs(seen - tensor).max() / np.abs(values).max())
     return GramCertificate(Q, float(values[0]), float(values[-1]), residual, float(curvature.min()), gap)

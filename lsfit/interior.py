@@ -79,7 +79,7 @@ def least_quadratic(
         x, Z = x + length * dx, Z + length * dZ
         X = _matrix(A, x)
     raise FitError(
-        f"the interior-point method stopped after {step} steps with gap {gap:.1e} and dual residual {residual:.1e}; "
+        f"the search stopped after {step + 1} steps with gap {gap:.1e} and dual residual {residual:.1e}: "
         f"scale the data to about one, add a ridge, or allow a larger tolerance than {tolerance:.0e}"
     )
 

@@ -6,10 +6,12 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
 from lsfit.flag import FitError, FitFlag
 from lsfit.geometry import directions
 from lsfit.surface import Image, LimitSurface
+from lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 Scaling = Literal["maxima", "whitened", "none"]
@@ -97,10 +99,12 @@ def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float)
 def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
     """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
     d, r = samples.B.shape
-    if r < d:
-        return Image(surface, samples.B, surface.flag | FitFlag.RANK_DEFICIENT)
-    factors = np.diag(samples.B)
-    return surface.scaled(factors) if np.array_equal(samples.B, np.diag(factors)) else Image(surface, samples.B)
+    flag = surface.flag | (FitFlag.RANK_DEFICIENT if r < d else FitFlag.CLEAN)
+    if isinstance(surface, TiltedEllipsoid):
+        return TiltedEllipsoid.of_ball(samples.B @ surface.F, flag)
+    if r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
+        return surface.scaled(np.diag(samples.B))
+    return Image(surface, samples.B, flag)
 
 
 def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
@@ -114,7 +118,7 @@ def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
         )
     u = directions(Y.shape[1], 500)
     # Shifted power iteration goes down to the smallest value on the sphere if the shift outweighs all curvature.
-    shift = surface.degree * (surface.degree - 1) * float(np.abs(surface.value(u)).max())
+    shift = surface.degree**2 * float(np.abs(surface.value(u)).max())
     u = u[np.argsort(surface.value(u))[:5]]
     for _ in range(30):
         u = shift * u - surface.gradient(u)
@@ -127,3 +131,17 @@ def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
             f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u[low], 3).tolist()} (scaled "
             "coordinates), where no sample holds it: sample more motions, or spread them over all directions"
         )
+
+
+def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
+    """Unit motions spread evenly over the sphere, ``(count, dimension)``, the same in every run.
+
+    The additive recurrence by powers of the generalised golden ratio fills the unit cube evenly; the normal quantile
+    of each number makes it evenly spread over directions.
+    """
+    root = 2.0
+    for _ in range(60):
+        root = (1 + root) ** (1 / (dimension + 1))
+    u = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, dimension + 1))) % 1
+    x = ndtri(u)
+    return x / np.linalg.norm(x, axis=1, keepdims=True)

@@ -1,0 +1,318 @@
+"""Limit surfaces of all six components: spans, Gram matrices, the interior-point method and the fits."""
+
+import numpy as np
+import pytest
+
+from friction.motion import fibonacci_twists
+from friction.wrench import friction_support, friction_wrench
+from lsfit.ellipsoid import full_ellipsoid
+from lsfit.flag import FitError, FitFlag
+from lsfit.form import exponents, monomials
+from lsfit.gram import ball_gram, gram_certificate, gram_map, quadratic_map
+from lsfit.interior import least_quadratic
+from lsfit.quartic import convex_quartic
+from lsfit.quartic_surface import Quartic
+from lsfit.samples import normalised_samples, sample_rank
+from lsfit.six import convex_span_quartic, six_samples, span_ellipsoid, span_quartic
+from lsfit.span import CollapsedFitError, span_samples, sphere_motions
+from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
+
+RHO = 2.0
+SIX = np.array([1, 1, 1, RHO, RHO, RHO])
+
+
+def samples(patch, K, point=(0, 0, 0), unit=1.0):
+    """Samples of ``K`` motions; ``unit`` is the size of the caller's unit of length."""
+    motion = sphere_motions(K)
+    twist = motion / (SIX * [1, 1, 1, unit, unit, unit])
+    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO * unit, point)
+
+
+@pytest.fixture(scope="module")
+def cylinder():
+    return samples(cylinder_grid(1, np.pi / 3, 2, 24, 24), 512)
+
+
+@pytest.fixture(scope="module")
+def convex(cylinder):
+    return convex_span_quartic(*cylinder)
+
+
+# Gram matrices and the interior-point method ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("d", "unknowns"), [(2, 6), (3, 24), (6, 351)])
+def test_a_gram_matrix_gives_the_second_derivatives_whatever_its_free_numbers(d, unknowns):
+    rng, E = np.random.default_rng(d), exponents(d, 4)
+    A = gram_map(E)
+    assert A.shape == (d**4, unknowns)
+    x, w, z = rng.normal(size=unknowns), rng.normal(size=d), rng.normal(size=d)
+    Q = (A @ x).reshape(d * d, d * d)
+    curvature = z @ Quartic(x[: len(E)], E).hessian(w)[0] @ z
+    assert np.kron(z, w) @ Q @ np.kron(z, w) == pytest.approx(curvature, rel=1e-12)
+    np.testing.assert_array_equal(Q, Q.T)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_the_start_is_the_ball_with_a_definite_matrix(d):
+    E, w = exponents(d, 4), np.random.default_rng(0).normal(size=(5, d))
+    x = ball_gram(E)
+    np.testing.assert_allclose(monomials(w, E) @ x[: len(E)], (w**2).sum(axis=1) ** 2, rtol=1e-12)
+    assert np.linalg.eigvalsh((gram_map(E) @ x).reshape(d * d, d * d))[0] > 1.99
+
+
+def test_the_nearest_semidefinite_matrix_is_found():
+    """In the Frobenius norm it has the negative eigenvalues replaced by zero."""
+    S = np.random.default_rng(3).normal(size=(5, 5))
+    S = S + S.T
+    values, V = np.linalg.eigh(S)
+    assert values[0] < 0 < values[-1]
+    E = exponents(5, 2)
+    A = quadratic_map(E)
+    H = (A.T @ A).toarray()
+    best = least_quadratic(H, A.T @ S.ravel(), A, (E == 2).any(axis=1).astype(float), tolerance=1e-11)
+    np.testing.assert_allclose(best.X, (V * np.maximum(values, 0)) @ V.T, atol=1e-5)
+    assert best.objective == pytest.approx(-(np.maximum(values, 0) ** 2).sum() / 2, rel=1e-10)
+    assert np.linalg.eigvalsh(best.X)[0] > 0
+
+
+def test_the_interior_point_method_says_when_it_stops_short():
+    E = exponents(2, 2)
+    with pytest.raises(FitError, match="stopped after 2 steps with gap"):
+        least_quadratic(np.eye(3), np.array([1.0, 5.0, -1.0]), quadratic_map(E), np.array([1.0, 0, 1.0]), most=2)
+
+
+def plane_samples(c, K=60):
+    """Points and normals of ``x^4 + c x^2 y^2 + y^4 = 1``, which is convex for ``0 <= c <= 6``."""
+    surface = Quartic([1, 0, c, 0, 1], exponents(2, 4))
+    phi = np.pi * (np.arange(K) + 0.5) / K
+    u = np.column_stack([np.cos(phi), np.sin(phi)])
+    W = u * surface.radius(u)[:, None]
+    T = surface.gradient(W)
+    return W, T / np.linalg.norm(T, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("c", [0.5, 3.0, 5.5])
+def test_a_convex_quartic_is_found_again(c):
+    fit = convex_span_quartic(*plane_samples(c), gamma=1.0, scaling="none")
+    np.testing.assert_allclose(fit.surface.coefficients, [1, 0, c, 0, 1], atol=1e-4)
+    np.testing.assert_allclose(fit.errors, 0, atol=1e-3)
+    assert fit.certificate.proves_convexity
+
+
+def test_a_quartic_that_is_not_convex_becomes_one_that_hardly_is():
+    W, T = plane_samples(9.0)
+    free, fit = span_quartic(W, T, scaling="none"), convex_span_quartic(W, T, gamma=0.0, scaling="none")
+    assert free.errors.E1 < 1e-12
+    assert np.linalg.eigvalsh(free.surface.hessian(W)).min() < -1
+    assert np.linalg.eigvalsh(fit.surface.hessian(W)).min() > 0
+    assert fit.certificate.smallest_curvature == pytest.approx(0, abs=0.05)
+    assert fit.errors.E1 > 1e-2
+
+
+def test_the_certificate_sees_a_wrong_matrix():
+    E = exponents(3, 4)
+    x, tensor = ball_gram(E), Quartic(ball_gram(E)[:15], E).tensor
+    Q = (gram_map(E) @ x).reshape(9, 9)
+    assert gram_certificate(Q, tensor, 0.0).proves_convexity
+    assert gram_certificate(Q, tensor, 0.0).residual < 1e-15
+    assert not gram_certificate(Q + 0.3 * np.eye(9), tensor, 0.0).proves_convexity
+    assert not gram_certificate(-Q, -tensor, 0.0).proves_convexity
+
+
+def test_the_method_agrees_with_a_conic_solver_where_convexity_is_active():
+    """Few noisy samples in three dimensions, without motions."""
+    motion = fibonacci_twists(40, 1.0)
+    W, T = normalised_samples(friction_wrench(points_patch([[-1, 0], [1, 0]], [1, 1]), motion, 1.0), motion, 2.0, 1.0)
+    W = W * (1 + 0.3 * np.random.default_rng(1).uniform(-1, 1, (40, 1)))
+    ours, other = convex_span_quartic(W, T, gamma=0.0).surface, convex_quartic(W, T, gamma=0.0).surface
+    loss = [((surface.value(W) - 1) ** 2).sum() for surface in (ours, other)]
+    assert loss[0] == pytest.approx(loss[1], rel=1e-5)
+    assert loss[0] > 1.01 * ((span_quartic(W, T).surface.value(W) - 1) ** 2).sum()
+
+
+# Motions, samples and spans ------------------------------------------------------------------------------------------
+
+
+def test_motions_cover_the_sphere_evenly():
+    u = sphere_motions(4000)
+    np.testing.assert_allclose(np.linalg.norm(u, axis=1), 1, rtol=1e-14)
+    np.testing.assert_allclose(u.T @ u / len(u), np.eye(6) / 6, atol=5e-3)
+    np.testing.assert_allclose(u.mean(axis=0), 0, atol=5e-3)
+
+
+def test_the_reference_point_changes_neither_power_nor_the_ellipsoid():
+    """With ``w' = M w`` the ellipsoid ``A`` of least squares becomes ``M^-T A M^-1``."""
+    patch, p = lcg_patch(6, 60), np.array([0.3, -0.2, 0.5])
+    (W, T), (V, S) = samples(patch, 200), samples(patch, 200, p)
+    cross = np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]]) / RHO
+    M = np.eye(6)
+    M[3:, :3] = -cross
+    np.testing.assert_allclose(V, W @ M.T, atol=1e-14)
+    ratio = (W * T).sum(axis=1) / (V * S).sum(axis=1)  # motions have length one about either point
+    np.testing.assert_allclose(ratio, np.linalg.norm(T @ np.linalg.inv(M), axis=1), rtol=1e-12)
+    A, B = (span_ellipsoid(*s).surface.A for s in ((W, T), (V, S)))
+    np.testing.assert_allclose(np.linalg.inv(M).T @ A @ np.linalg.inv(M), B, rtol=1e-8, atol=1e-8 * np.abs(B).max())
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_samples_do_not_depend_on_the_unit_of_length(unit):
+    W, T = samples(cylinder_grid(1, 1.0, 2, 6, 6), 50)
+    V, S = samples(cylinder_grid(unit, 1.0, 2 * unit, 6, 6), 50, unit=unit)
+    np.testing.assert_allclose(V, W, atol=1e-13)
+    np.testing.assert_allclose(S, T, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("patch", "rank"),
+    [
+        (points_patch([[0, 0]], [1]), 2),
+        (rect_grid(2, 1, 6, 6), 3),
+        (points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1]), 3),
+        (cylinder_grid(1, 1.0, 2, 6, 6), 6),
+        (cap_polar(1, 1.0, 6, 12), 6),
+    ],
+)
+@pytest.mark.parametrize("scaling", ["maxima", "whitened", "none"])
+def test_rank_of_plane_and_curved_patches(patch, rank, scaling):
+    W, T = samples(patch, 200)
+    fit, inside = span_ellipsoid(W, T, scaling), span_samples(W, T, scaling)
+    assert fit.rank == inside.rank == fit.surface.rank == rank == sample_rank(W)
+    assert (FitFlag.RANK_DEFICIENT in fit.surface.flag) == (rank < 6)
+    np.testing.assert_allclose(inside.Y @ inside.B.T, W, atol=1e-13)
+    missing = np.linalg.svd(W)[2][rank:]
+    np.testing.assert_allclose(fit.surface.support(missing), 0, atol=1e-7)
+    assert np.isfinite(fit.surface.semi_axes).all()
+
+
+def test_a_plane_patch_has_the_ellipsoid_of_three_components():
+    patch = rect_grid(2, 1, 6, 6)
+    W, T = samples(patch, 300)
+    three = full_ellipsoid(W[:, [0, 1, 5]])
+    flat = span_ellipsoid(W, T).surface
+    np.testing.assert_allclose(flat.A[np.ix_([0, 1, 5], [0, 1, 5])], three.A, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(flat.semi_axes, [*three.semi_axes[:2], 0, 0, 0, three.semi_axes[2]], atol=1e-9)
+
+
+def test_quartics_of_plane_patches_are_flat():
+    patch = points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1])
+    W, T = samples(patch, 200)
+    fit = convex_span_quartic(W, T)
+    missing = np.linalg.svd(W)[2][3:]
+    assert (fit.rank, fit.surface.rank, fit.surface.dimension) == (3, 3, 6)
+    assert FitFlag.RANK_DEFICIENT in fit.surface.flag
+    assert fit.errors.Erad < 0.02
+    assert fit.certificate.proves_convexity
+    np.testing.assert_allclose(fit.surface.support(missing), 0, atol=1e-12)
+    np.testing.assert_array_equal(fit.surface.value(W[:3] + 1e-3 * missing[:1]), np.inf)
+    np.testing.assert_array_equal(fit.surface.radius(missing), 0)
+    assert fit.surface.holds(0.9 * W).all()
+
+
+def test_motions_without_friction_are_left_out():
+    W, T = samples(rect_grid(2, 1, 6, 6), 60)
+    V, S = np.vstack([W, 0 * W[:1]]), np.vstack([T, np.eye(6)[2]])
+    np.testing.assert_array_equal(span_samples(V, S).Y, span_samples(W, T).Y)
+
+
+# Fits ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("patch", "ellipsoid", "quartic"),
+    [
+        (cylinder_grid(1, np.pi / 3, 2, 24, 24), (0.0198, 0.0100), (0.0097, 0.0024)),
+        (cap_polar(1, np.pi / 3, 12, 24), (0.0191, 0.0097), (0.0048, 0.0012)),
+        (heightfield(1, 1, 0.8, -0.8, 20, 20), (0.0195, 0.0098), (0.0097, 0.0024)),
+    ],
+)
+def test_errors_of_fits_to_curved_patches(patch, ellipsoid, quartic):
+    """Figures of an independent implementation for other motions (and another saddle), hence the tolerance."""
+    W, T = samples(patch, 1024)
+    assert span_ellipsoid(W, T).errors[:2] == pytest.approx(ellipsoid, rel=0.12)
+    assert span_quartic(W, T).errors[:2] == pytest.approx(quartic, rel=0.15)
+
+
+def test_directions_are_judged_with_axes_of_like_length(cylinder):
+    """31.9 and 10.7 degrees, by an independent implementation and other motions."""
+    assert span_ellipsoid(*cylinder, scaling="none").errors.Edir == pytest.approx(31.9, rel=0.1)
+    assert span_ellipsoid(*cylinder).errors.Edir == pytest.approx(10.7, rel=0.1)
+
+
+def test_the_quartic_of_least_squares_is_not_convex_in_six_dimensions(cylinder):
+    free = span_quartic(*cylinder, scaling="none").surface
+    assert np.linalg.eigvalsh(free.hessian(cylinder[0])).min() < -1
+
+
+def test_the_convex_quartic_is_better_than_the_ellipsoid_and_proven(cylinder, convex):
+    W, T = cylinder
+    proof = convex.certificate
+    assert proof.Q.shape == (36, 36)
+    assert proof.proves_convexity
+    assert proof.residual < 1e-14
+    assert proof.gap < 1e-8
+    assert proof.smallest_curvature > 0
+    assert np.linalg.eigvalsh(convex.surface.hessian(W)).min() > 0
+    ellipsoid = span_ellipsoid(W, T).errors
+    assert convex.errors.Erad < 0.4 * ellipsoid.Erad
+    assert convex.errors.Edir < 0.6 * ellipsoid.Edir
+
+
+def test_the_convex_quartic_predicts_friction_for_other_motions(convex):
+    patch = cylinder_grid(1, np.pi / 3, 2, 24, 24)
+    motion = np.random.default_rng(1).normal(size=(200, 6))
+    H = friction_support(patch, motion / SIX, 0.5) / (0.5 * patch.load.sum())
+    np.testing.assert_allclose(convex.surface.support(motion), H, rtol=0.08)
+    assert np.abs(convex.surface.support(motion) / H - 1).mean() < 0.015
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("K", [256, 1000])
+def test_weights_of_motions_improve_directions(K):
+    """On other motions than those of the fit, 0.01 gives better directions than none at little cost in the radius."""
+    patch = cylinder_grid(1, np.pi / 3, 2, 24, 24)
+    (W, T), own = samples(patch, 3000), samples(patch, K)
+    B = span_samples(*own).B
+    T = T @ B / np.linalg.norm(T @ B, axis=1, keepdims=True)
+    angle = []
+    for gamma in (0.0, 0.01):
+        G = convex_span_quartic(*own, gamma=gamma).surface.gradient(W) @ B
+        angle.append(np.degrees(np.arccos((G * T).sum(axis=1) / np.linalg.norm(G, axis=1))).mean())
+    assert angle[1] < 0.9 * angle[0]
+
+
+def test_a_surface_that_nothing_holds_is_refused():
+    """All samples on two parallel lines: the best quartic is ``f_x^4``, endless along the lines."""
+    y = np.linspace(-1, 1, 20)
+    W, T = np.column_stack([np.ones(20), y]), np.column_stack([np.ones(20), 0 * y])
+    with pytest.raises(CollapsedFitError, match="where no sample holds it"):
+        convex_span_quartic(W, T)
+    bounded = span_ellipsoid(W, T).surface
+    assert FitFlag.BOUNDED in bounded.flag
+    assert bounded.semi_axes.max() < 15
+
+
+@pytest.mark.parametrize(
+    ("W", "T", "scaling", "message"),
+    [
+        (np.zeros((3, 2)), np.ones((3, 2)), "maxima", "all wrenches are zero"),
+        (np.ones((3, 2)), np.ones((2, 2)), "maxima", "one shape"),
+        (np.full((3, 2), np.nan), np.ones((3, 2)), "maxima", "must be finite"),
+        (np.ones((3, 2)), np.ones((3, 2)), "maximum", "choose one of maxima, whitened, none"),
+    ],
+)
+def test_bad_samples_are_named(W, T, scaling, message):
+    with pytest.raises(ValueError, match=message):
+        span_samples(W, T, scaling)
+
+
+def test_bad_scales_and_weights_are_named(cylinder):
+    one = np.eye(6)
+    with pytest.raises(ValueError, match="positive force and length"):
+        six_samples(one, one, 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"expected \(m, 6\) for both"):
+        six_samples(one[:, :3], one, 1.0, 1.0)
+    with pytest.raises(ValueError, match=r"twist\[2\] is zero"):
+        six_samples(one, one * (np.arange(6) != 2), 1.0, 1.0)
+    with pytest.raises(ValueError, match="weights must not be negative"):
+        convex_span_quartic(*cylinder, gamma=-1.0)

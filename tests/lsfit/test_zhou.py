@@ -1,0 +1,202 @@
+"""Fits by sums of lengths: optimality, invariance, spans, and refusals of surfaces that run away."""
+
+import numpy as np
+import pytest
+
+from friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
+from friction.wrench import friction_wrench
+from lsfit.flag import FitFlag
+from lsfit.misfit import misfit
+from lsfit.samples import normalised_samples
+from lsfit.six import six_samples
+from lsfit.span import CollapsedFitError, sphere_motions
+from lsfit.tilted import TiltedEllipsoid
+from lsfit.zhou import SIX_WEIGHTS, ZhouWeights, zhou_ellipsoid, zhou_quartic
+from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
+
+DISC = disc_polar(1, 40, 96)
+FITS = pytest.mark.parametrize("fit", [zhou_ellipsoid, zhou_quartic])
+
+
+def samples(patch, K, rho=2.0):
+    twist = fibonacci_twists(K, rho)
+    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), rho)
+
+
+def objective(surface, rates, W, T, weights):
+    """The objective as the publication writes it, for a surface in the coordinates of the wrenches."""
+    G = surface.gradient(W)
+    if isinstance(surface, TiltedEllipsoid):
+        size, G = np.linalg.norm(surface.A), G / 2
+    else:
+        size = np.linalg.norm(surface.coefficients)
+    off = np.abs(surface.value(W) - 1).sum()
+    return np.dot(weights, [size, off, np.linalg.norm(G - rates[:, None] * T, axis=1).sum()])
+
+
+@pytest.mark.parametrize(
+    ("fit", "value", "E1", "Edir"),
+    [
+        (zhou_quartic, 77.85994575252231, 0.014323128478641332, 0.5232225550749485),
+        (zhou_ellipsoid, 38.603816546861694, 0.01571060245314559, 5.092930192019943),
+    ],
+)
+def test_a_uniform_disc(fit, value, E1, Edir):
+    """Figures of an independent implementation with a modelling language."""
+    W, T = samples(DISC, 100)
+    found = fit(W, T, ZhouWeights(1.0, 10.0, 1.0), scaling="none")
+    errors = misfit(found.surface, W, T)
+    assert found.objective == pytest.approx(value, rel=1e-5)
+    assert (errors.E1, errors.Edir) == pytest.approx((E1, Edir), rel=1e-3)
+
+
+@FITS
+@pytest.mark.parametrize("weights", [SIX_WEIGHTS, ZhouWeights(0.1, 1.0, 3.0)])
+def test_the_objective_is_that_of_the_surface_and_neighbours_are_worse(fit, weights):
+    W, T = samples(lcg_patch(6, 40), 60)
+    best = fit(W, T, weights, scaling="none")
+    value = objective(best.surface, best.rates, W, T, weights)
+    assert value == pytest.approx(best.objective, rel=1e-6)
+    for factors in (np.full(3, 1.01), np.full(3, 0.99), *(1 + 0.01 * np.eye(3)), *(1 - 0.01 * np.eye(3))):
+        assert objective(best.surface.scaled(factors), best.rates, W, T, weights) > value * (1 - 1e-7)
+    for s in (best.rates * 1.01, best.rates * 0.99):
+        assert objective(best.surface, s, W, T, weights) > value * (1 - 1e-7)
+
+
+def test_an_ellipsoid_is_found_again():
+    A = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.5], [-0.2, 0.5, 9.0]])
+    true, u = TiltedEllipsoid(A), sphere_motions(80, 3)
+    W = u * true.radius(u)[:, None]
+    T = W @ A / np.linalg.norm(W @ A, axis=1, keepdims=True)
+    found = zhou_ellipsoid(W, T, scaling="none")
+    np.testing.assert_allclose(found.surface.A, A, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.rates, np.linalg.norm(W @ A, axis=1), rtol=1e-6)
+    assert found.objective == pytest.approx(np.linalg.norm(A), rel=1e-6)
+
+
+def test_one_wild_sample_hardly_moves_the_surface():
+    """Sums of lengths resist it; one wrench of twice its size moves the least squares."""
+    A = np.diag([1.0, 1.0, 9.0])
+    u = sphere_motions(80, 3)
+    W = u * TiltedEllipsoid(A).radius(u)[:, None]
+    T = W @ A / np.linalg.norm(W @ A, axis=1, keepdims=True)
+    W[7] *= 2
+    np.testing.assert_allclose(zhou_ellipsoid(W, T, scaling="none").surface.A, A, atol=1e-5)
+
+
+def test_the_quartic_is_convex_where_the_samples_are_not():
+    """Two points, noisy: the best quartic without the constraint has negative curvature."""
+    W, T = samples(points_patch([[-1, 0], [1, 0]], [1, 1]), 40)
+    W = W * (1 + 0.3 * np.random.default_rng(1).uniform(-1, 1, (40, 1)))
+    surface = zhou_quartic(W, T).surface
+    u = sphere_motions(2000, 3) * surface.semi_axes
+    assert np.linalg.eigvalsh(surface.hessian(u)).min() > -1e-6
+
+
+@FITS
+def test_component_scaling_makes_the_fit_free_of_units(fit):
+    """Scaled to one, samples in other units are the same samples, and motions change inversely."""
+    W, T = samples(lcg_patch(6, 40), 60)
+    factors = np.array([1.0, 1.0, 1e3])
+    S = T / factors
+    one, other = fit(W, T), fit(W * factors, S / np.linalg.norm(S, axis=1, keepdims=True))
+    assert other.objective == pytest.approx(one.objective, rel=1e-6)
+    np.testing.assert_allclose(other.surface.semi_axes, one.surface.semi_axes * factors, rtol=1e-5)
+
+
+def test_the_quartic_fits_better_than_the_ellipsoid():
+    W, T = samples(DISC, 121)
+    far, near = (misfit(fit(W, T, SIX_WEIGHTS).surface, W, T) for fit in (zhou_ellipsoid, zhou_quartic))
+    assert near.Erad < far.Erad / 4
+    assert near.Edir < far.Edir / 4
+
+
+def test_rates_keep_their_least_length():
+    W, T = samples(DISC, 30)
+    free, held = zhou_ellipsoid(W, T), zhou_ellipsoid(W, T, s_min=1.5)
+    assert free.rates.min() < 1.2
+    assert held.rates.min() == pytest.approx(1.5, abs=1e-6)
+    assert held.objective > free.objective
+
+
+# Spans ---------------------------------------------------------------------------------------------------------------
+
+
+@FITS
+def test_samples_in_a_plane_give_a_flat_surface(fit):
+    """Translations alone say nothing of torques: the semi-axis there is 0, not infinite."""
+    phi = np.pi * np.arange(12)[:, None] / 12
+    twist = np.cos(phi) * SLIDE_X + np.sin(phi) * SLIDE_Y
+    W, T = normalised_samples(friction_wrench(DISC, twist, 1.0), twist, DISC.load.sum(), 2.0)
+    found = fit(W, T, SIX_WEIGHTS)
+    assert (found.rank, found.surface.rank, found.surface.dimension) == (2, 2, 3)
+    assert FitFlag.RANK_DEFICIENT in found.surface.flag
+    np.testing.assert_allclose(found.surface.semi_axes, [1, 1, 0], atol=0.03)
+    assert found.surface.value([0.0, 0.0, 1e-3])[0] == np.inf
+
+
+@FITS
+def test_a_single_sample_gives_a_segment(fit):
+    found = fit([[3.0, 4.0, 0.0]], [[1.0, 0.0, 0.0]], ZhouWeights(0.01, 1.0, 1.0))
+    assert found.rank == 1
+    np.testing.assert_allclose(found.surface.support([[0.6, 0.8, 0.0], [0.8, -0.6, 0.0]]), [5, 0], atol=1e-5)
+
+
+@pytest.mark.parametrize(("patch", "rank"), [(rect_grid(2, 1, 6, 6), 3), (cylinder_grid(1, np.pi / 3, 2, 12, 12), 6)])
+def test_ellipsoids_of_six_components(patch, rank):
+    motion = sphere_motions(128)
+    twist = motion / [1, 1, 1, 2, 2, 2]
+    W, T = six_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), 2.0)
+    found = zhou_ellipsoid(W, T, SIX_WEIGHTS)
+    assert found.rank == found.surface.rank == rank
+    radius = found.surface.radius(W)
+    assert np.abs(radius - 1).mean() < 0.02
+
+
+@pytest.mark.long
+def test_quartics_of_six_components():
+    motion = sphere_motions(256)
+    patch = cylinder_grid(1, np.pi / 3, 2, 12, 12)
+    twist = motion / [1, 1, 1, 2, 2, 2]
+    W, T = six_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), 2.0)
+    surface = zhou_quartic(W, T, SIX_WEIGHTS).surface
+    assert np.abs(surface.radius(W) - 1).mean() < 0.01
+    assert np.linalg.eigvalsh(surface.hessian(W)).min() > 0
+
+
+# Refusals ------------------------------------------------------------------------------------------------------------
+
+
+@FITS
+def test_a_fit_that_collapses_is_refused(fit):
+    """A strong regulariser drives the coefficients to zero: P never comes near 1 on the samples."""
+    W, T = samples(DISC, 20)
+    with pytest.raises(CollapsedFitError, match=r"times as far out as half of the samples: .* lower lam"):
+        fit(W, T, ZhouWeights(lam=1e4), scaling="none")
+
+
+def test_published_weights_may_collapse_without_scaling():
+    """Where torques are small, gradients are large, and their errors outweigh those of the wrenches."""
+    W, T = samples(lcg_patch(6, 40), 60)
+    with pytest.raises(CollapsedFitError, match=r"the surface lies \d\d"):
+        zhou_quartic(W, T, scaling="none")
+    assert misfit(zhou_quartic(W, T).surface, W, T).Erad < 0.02
+
+
+@FITS
+def test_a_component_too_small_for_the_regulariser_is_refused_and_scaled_it_fits(fit):
+    """Without scaling, a small torque is cheaper to ignore: the surface is endless along it."""
+    W, T = samples(DISC, 60)
+    small = np.array([1.0, 1.0, 1e-3])
+    S = T / small
+    S /= np.linalg.norm(S, axis=1, keepdims=True)
+    with pytest.raises(CollapsedFitError, match=r"where no sample holds it|times as far out"):
+        fit(W * small, S, scaling="none")
+    assert fit(W * small, S).surface.semi_axes[2] == pytest.approx(1e-3 * fit(W, T).surface.semi_axes[2], rel=1e-4)
+
+
+@FITS
+@pytest.mark.parametrize("weights", [ZhouWeights(lam=-1), ZhouWeights(beta=np.nan)])
+def test_weights_are_not_negative(fit, weights):
+    with pytest.raises(ValueError, match="expected finite numbers, none negative"):
+        fit(*samples(DISC, 20), weights)
