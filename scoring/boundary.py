@@ -13,6 +13,7 @@ from scoring.contact import Body
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
+THIN = 1e-9  # of the longest extent; what is thinner counts as flat
 
 
 def ellipsoid_matrix(body: Body) -> FloatArray | None:
@@ -82,31 +83,27 @@ def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
 
 
 def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    centred = vertices - vertices.mean(axis=0)
-    scale = np.abs(centred).max(axis=0)
-    scale[scale == 0] = 1.0
-    extent = np.linalg.svd(centred / scale, compute_uv=False)
-    if len(extent) < 3 or extent[2] <= 1e-12 * extent[0]:
-        return _flat_mesh(vertices, centred / scale, scale)
-    try:
-        hull = ConvexHull(centred / scale)
-    except QhullError:
-        hull = ConvexHull(centred / scale, qhull_options="QJ")
-    triangles = hull.simplices.astype(np.intp)
-    a, b, c = (centred[triangles[:, i]] / scale for i in range(3))
-    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return vertices, triangles
-
-
-def _flat_mesh(vertices: FloatArray, centred: FloatArray, scale: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Both sides of a flat body; a segment or a point has no triangles."""
-    _, extent, axes = np.linalg.svd(centred)
-    if len(vertices) < 3 or extent[1] <= 1e-12 * max(extent[0], 1e-300):
+    """Faces of the hull; a flat one is given a thickness of 1e-9, so that its rim has normals."""
+    centre = vertices.mean(axis=0)
+    _, extent, axes = np.linalg.svd(vertices - centre)
+    extent = np.append(extent, np.zeros(3 - len(extent)))
+    if extent[0] == 0:
         return vertices, np.zeros((0, 3), dtype=np.intp)
-    rim = ConvexHull(centred @ axes[:2].T).vertices.astype(np.intp)
-    fan = np.column_stack([np.full(len(rim) - 2, rim[0]), rim[1:-1], rim[2:]])
-    return vertices, np.vstack([fan, fan[:, ::-1]])
+    flat = extent <= THIN * extent[0]
+    axes = axes * np.where(flat, THIN * extent[0], extent)[:, None]
+    points = np.vstack([vertices, centre + axes[flat], centre - axes[flat]])
+    # Hulls turn with linear maps: made as thick as wide, the points cost Qhull no digits.
+    round_points = np.linalg.solve(axes.T, (points - centre).T).T
+    try:
+        hull = ConvexHull(round_points)
+    except QhullError:
+        hull = ConvexHull(round_points, qhull_options="QJ")
+    triangles = hull.simplices.astype(np.intp)
+    a, b, c = (round_points[triangles[:, i]] for i in range(3))
+    outward = hull.equations[:, :3] * np.sign(np.linalg.det(axes))
+    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), outward) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return points, triangles
 
 
 @lru_cache(maxsize=8)

@@ -18,16 +18,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scoring.boundary import ellipsoid_matrix, surface_mesh
+from scoring.boundary import THIN, ellipsoid_matrix, surface_mesh
 from scoring.contact import Body
 from scoring.plane import fan_area, polygon_area
 
 FloatArray = NDArray[np.float64]
+TINY = 1e-200  # instead of a singular value 0
 SHADOW = 512  # directions in which a body without closed form is asked for its shadow
 
 
@@ -55,10 +57,14 @@ class Span:
         return self.U.T @ self.C
 
     @property
+    def det(self) -> float:
+        """Volume in the span per volume in ``(l, e)``."""
+        return abs(float(np.linalg.det(np.hstack([self.T, self.U]).T @ self.C)))
+
+    @property
     def facet_map(self) -> FloatArray:
         """Part in T of a facet's normal given in ``(l, e)``, ``(2, 4)``."""
-        G = np.hstack([self.T, self.U]).T @ self.C
-        return abs(np.linalg.det(G)) * np.linalg.inv(G)[:, :2].T
+        return self.det * np.linalg.inv(np.hstack([self.T, self.U]).T @ self.C)[:, :2].T
 
 
 class Fibre(Protocol):
@@ -91,17 +97,14 @@ class EllipsoidFibre:
     exact = False
 
     def __init__(self, A: FloatArray, span: Span) -> None:
-        F = span.facet_map
-        e = np.linalg.eigh(A)
-        cofactor = (e[1] * [e[0][1] * e[0][2], e[0][0] * e[0][2], e[0][0] * e[0][1]]) @ e[1].T
-        volume = float(np.prod(e[0]))
-        self.c = volume * F[:, 0]
-        W, s, self.sphere = np.linalg.svd(F[:, 1:] @ cofactor)
-        self.W = W * np.maximum(s, 1e-200)
-        self.v0 = (W.T @ self.c) / np.maximum(s, 1e-200)
+        axes, vectors = np.linalg.eigh(A)
+        self.W, self.c, self.v0, _ = _disc(axes, vectors, span.facet_map)
         self.rho = math.hypot(*self.v0)
+        # The rim of a flat body has normals only as the limit of thin ones.
+        thick = np.maximum(axes, THIN * axes[2])
+        self.rim = _disc(thick, vectors, span.facet_map)
         self.shadow_map, self.centre = span.M[:, 1:] @ A, span.M[:, 0]
-        self.volume = math.pi / 3 * volume * abs(np.linalg.det(np.hstack([span.T, span.U]).T @ span.C))
+        self.volume = math.pi / 3 * float(axes.prod()) * span.det
 
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone and area of the hull of an ellipse and 0."""
@@ -150,20 +153,32 @@ class EllipsoidFibre:
 
     def ridge(self, level: int, away: FloatArray) -> float:
         """Area swept by the circle of the sphere on which ``P v - c`` has the direction ``away``."""
-        w = np.linalg.solve(self.W, away)
+        W, _, v0, sphere = self.rim
+        w = np.linalg.solve(W, away)
         w = w / math.hypot(*w)
-        nearest = _cross(w, self.v0)
+        nearest = _cross(w, v0)
         if abs(nearest) >= 1:
             return 0.0
-        r, first = math.sqrt(1 - nearest**2), float(self.v0 @ w)
+        r, first = math.sqrt(1 - nearest**2), float(v0 @ w)
         if first >= r:
             return 0.0
         psi = math.pi if first <= -r else math.acos(first / r)
-        ends = np.array([w, [-w[1], w[0]]]) @ self.sphere[:2]
+        ends = np.array([w, [-w[1], w[0]]]) @ sphere[:2]
         centre = self.shadow_map @ (nearest * ends[1]) + self.centre
-        a, b = r * self.shadow_map @ ends[0], r * self.shadow_map @ self.sphere[2]
+        a, b = r * self.shadow_map @ ends[0], r * self.shadow_map @ sphere[2]
         # Twice the area, 0 to arc: (m + a cos + b sin) x d(a cos + b sin).
         return 0.5 * abs(2 * psi * _cross(a, b) + 2 * math.sin(psi) * _cross(centre, b))
+
+
+def _disc(
+    axes: FloatArray, vectors: FloatArray, F: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """``P`` as a map W of a plane of the ball, c, v0 in that plane, and the plane's axes with the one across it."""
+    cofactor = (vectors * [axes[1] * axes[2], axes[0] * axes[2], axes[0] * axes[1]]) @ vectors.T
+    W, s, sphere = np.linalg.svd(F[:, 1:] @ cofactor)
+    s = np.maximum(s, TINY)
+    c = float(axes.prod()) * F[:, 0]
+    return W * s, c, (W.T @ c) / s, sphere
 
 
 class MeshFibre:
@@ -172,12 +187,11 @@ class MeshFibre:
     def __init__(self, body: Body, span: Span) -> None:
         self.body, self.span = body, span
         self.exact = hasattr(body, "vertices")
-        self.det = abs(np.linalg.det(np.hstack([span.T, span.U]).T @ span.C))
         self.meshes: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
 
     def _mesh(self, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Points, corners of the triangles and the sides they make."""
-        level = 0 if self.exact else level + 2
+        level = 0 if self.exact else level + 1
         if level not in self.meshes:
             points, triangles = surface_mesh(self.body, level)
             a, b, c = (points[triangles[:, i]] for i in range(3))
@@ -189,13 +203,20 @@ class MeshFibre:
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone from the triangles, its shadow from the vertices or from the support function."""
         points, _, normals = self._mesh(level)
-        volume = -self.det * normals[:, 0].sum() / 4
+        volume = -self.span.det * normals[:, 0].sum() / 4
         M = self.span.M
         if self.exact:
             return volume, polygon_area(points @ M[:, 1:].T + M[:, 0])
-        phi = 2 * math.pi * np.arange(SHADOW) / SHADOW
-        u = np.column_stack([np.cos(phi), np.sin(phi)]) @ M
-        return volume, fan_area(u[:, 0] + self.body.support(u[:, 1:]))
+        return volume, self._shadow
+
+    @cached_property
+    def _shadow(self) -> float:
+        """Area of the hull of the body's shadow and 0, measured where the shadow is about as wide as long."""
+        M, phi = self.span.M, 2 * math.pi * np.arange(SHADOW) / SHADOW
+        W, s, _ = np.linalg.svd(M[:, 1:] * self.body.support(np.eye(3)))
+        s = np.maximum(s, [TINY, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], TINY)])
+        u = np.column_stack([np.cos(phi), np.sin(phi)]) @ (W / s).T @ M
+        return float(s.prod()) * fan_area(u[:, 0] + self.body.support(u[:, 1:]))
 
     def base(self, level: int) -> FloatArray:
         """The base has the volume of the body."""

@@ -92,15 +92,16 @@ def cone_volume(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body, relati
     coarse = _volumes(fibres, delta, 0)
     if all(fibre.exact for fibre in fibres):
         return PoseVolume(*(J * coarse).tolist(), 1e-9)
+    before = coarse
     for level in range(1, LEVELS + 1):
         fine = _volumes(fibres, delta, level)
         # Errors go with the square of the size of the pieces.
         better = fine + (fine - coarse) / 3
-        error = float(np.abs(better - fine).max() / max(np.abs(better).max(), 1e-300))
+        error = float((np.abs(better - before) / np.maximum(np.abs(better), 1e-300)).max())
         if error <= relative_error:
             break
-        coarse = fine
-    return PoseVolume(*(J * better).tolist(), error)
+        coarse, before = fine, better
+    return PoseVolume(*(J * np.maximum(better, 0)).tolist(), error)
 
 
 def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int) -> FloatArray:
@@ -114,12 +115,16 @@ def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int) -> Floa
 
 
 def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Span, Span] | None:
-    """The two spans, split along the plane in which they meet; None if they meet in more."""
-    scaled = []
+    """The two spans, split along the plane in which they meet; None if all wrenches lie in less than 6 dimensions."""
+    scaled, loads = [], []
     for C, body in ((C1, body1), (C2, body2)):
         reach = np.append(1.0, body.support(np.eye(3)))
         D = C * np.where(reach > 0, reach, 1.0)
         scaled.append(D / np.linalg.norm(D, axis=0))
+        loads.append(scaled[-1][:, reach > 0])
+    carried = np.linalg.svd(np.hstack(loads), compute_uv=False)
+    if len(carried) < 6 or carried[5] <= 1e-13 * carried[0]:
+        return None
     values, vectors = np.linalg.svd(np.hstack([scaled[0], -scaled[1]]))[1:]
     if values[5] <= 1e-13 * values[0]:
         return None
