@@ -13,6 +13,7 @@ from typing import IO, Any
 from study import commands
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, MEANING, USAGE, StudyError
+from study.patch.command import add_options as add_patch_options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -93,6 +94,8 @@ def _parser() -> argparse.ArgumentParser:
     form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
     form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
     report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+    add_patch_options(add("patch", commands.patch, "friction, limit surface and score of a pressure field from "
+                          "elsewhere", "softjaw patch jobs/cylinder-pressure.csv --distance 60"))  # fmt: skip
     add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
     add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
     return parser

@@ -124,6 +124,14 @@ def report(options: Namespace) -> int:
     return DONE
 
 
+def patch(options: Namespace) -> int:
+    """Judge a pressure field from elsewhere."""
+    from study.patch.command import answer_text
+
+    print(answer_text(options))
+    return DONE
+
+
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
     import json

@@ -1,0 +1,335 @@
+"""Pressure fields from elsewhere: closed forms, the same answer from every kind of file, units, scores."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friction.patch import ContactPatch
+from study.cli import main
+from study.commands import RANK
+from study.patch.evaluate import SURFACES
+from study.patch.faces import corner_geometry
+from tests.friction.closed_forms import cylinder_torque
+from tests.generators import cylinder_grid, points_patch
+from tests.study.launching import ROOT
+from tests.study.patch_files import centres, corners, cylinder_mesh, vtk
+
+MU = 0.5
+EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
+SAME = {"rel": 1e-9, "abs": 1e-12}
+
+
+@pytest.fixture(autouse=True)
+def _speak_on_every_rank(monkeypatch):
+    """Each rank that runs these tests looks at its own answers."""
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture
+def told(capsys):
+    """Call ``softjaw patch`` and give its JSON."""
+
+    def ask(*words):
+        code = main(["patch", *map(str, words), "--mu", str(MU), "--json"])
+        answer = capsys.readouterr()
+        assert code == 0, answer.err
+        return json.loads(answer.out)
+
+    return ask
+
+
+def faceted(triangles=False, **shape):
+    """Mesh of a cylinder under a pressure that differs from face to face, and its patch."""
+    points, cells = cylinder_mesh(triangles=triangles, **shape)
+    centroid, area, normal = corner_geometry(points[cells])
+    pressure = 2e4 * (1 - np.abs(centroid[:, 1]) / 0.03) * (1 + 5 * centroid[:, 0])
+    return points, cells, ContactPatch(centroid, area, normal, pressure, points[cells])
+
+
+def friction(answer):
+    """All that is told of a patch's friction as one list of numbers."""
+    patch = answer["patches"][0]
+    every = [value for model in patch["friction"].values() for value in model.values()]
+    return [patch["S"], patch["F_N"], *every]
+
+
+def test_a_uniform_cylinder_has_the_friction_of_its_closed_form(tmp_path, told):
+    """S = 2 R t L p, F_N = 2 R sin(t) L p, f_x = mu S, f_y = mu F_N; the torque is an elliptic integral."""
+    R, t, L, p = 0.03, math.pi / 3, 0.04, 2e4
+    patch = cylinder_grid(R, t, L, 65, 64)
+    file = centres(tmp_path / "cylinder.csv", replace(patch, pressure=p * patch.pressure), "mm", "kpa")
+    found = told(file, "--long-side", "1,0,0")["patches"][0]
+    S, F_N = 2 * R * t * L * p, 2 * R * math.sin(t) * L * p
+    curved, flat = found["friction"]["curved"], found["friction"]["flat"]
+    assert found["S"] == pytest.approx(S, rel=1e-12)
+    assert found["F_N"] == pytest.approx(F_N, rel=5e-5)
+    assert curved["f_x_max"] == pytest.approx(MU * S, rel=1e-12)
+    assert curved["f_y_max"] == pytest.approx(MU * found["F_N"], rel=1e-12)
+    torque = R**3 * p * cylinder_torque(1.0, 1.0, t, L / R)
+    assert curved["tau_z_max"] == pytest.approx(MU * torque, rel=1e-4)
+    assert curved["tau_pure"] == pytest.approx(curved["tau_z_max"], rel=1e-8)
+    assert curved["e_n"] == pytest.approx(torque / S, rel=1e-4)
+    assert curved["e_n_projected"] == pytest.approx(torque / F_N, rel=2e-4)
+    assert flat["f_y_max"] == pytest.approx(MU * S, rel=1e-12)
+    assert np.allclose(found["frame"]["axes"], np.eye(3), atol=1e-9)
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quadrilaterals", "triangles"])
+def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
+    points, cells, patch = faceted(triangles)
+    data = [("other", patch.pressure[::-1]), ("pressure", patch.pressure)]
+    units = "--unit", "m", "--pressure-unit", "pa"
+    by_corners = told(corners(tmp_path / "corners.csv", points, cells, patch.pressure))
+    for file, words in (
+        (centres(tmp_path / "centres.csv", patch), ()),
+        (vtk(tmp_path / "patch.vtu", points, cells, data), units),
+        (vtk(tmp_path / "patch.vtp", points, cells, data), units),
+        (vtk(tmp_path / "mm.vtp", 1e3 * points, cells, [("p_kpa", 1e-3 * patch.pressure)]),
+         ("--unit", "mm", "--pressure-name", "p")),
+    ):  # fmt: skip
+        answer = told(file, *words)
+        if file.name == "centres.csv":  # without corners the origin lies in the nearest face's centre
+            continue
+        assert friction(answer) == pytest.approx(friction(by_corners), **SAME)
+        assert np.allclose(answer["patches"][0]["frame"]["origin"], by_corners["patches"][0]["frame"]["origin"])
+
+
+def test_centres_and_corners_agree_where_the_pressure_is_symmetric(tmp_path, told):
+    points, cells, patch = faceted()
+    pressure = 2e4 * (1 - (patch.centroid[:, 1] / 0.03) ** 2)
+    one = told(corners(tmp_path / "corners.csv", points, cells, pressure))
+    two = told(centres(tmp_path / "centres.csv", replace(patch, pressure=pressure), "mm", "kpa"))
+    assert friction(two) == pytest.approx(friction(one), **SAME)
+    flags = [answer["patches"][0]["frame"]["flag"] for answer in (one, two)]
+    assert flags == [0, 4]
+    assert any("no corners" in text for text in two["remarks"])
+
+
+def test_pressure_at_points_is_averaged_over_each_face_and_said(tmp_path, told):
+    points, cells, patch = faceted(n=16)
+    at_points = 1e4 + 1e5 * np.abs(points[:, 1])
+    file = vtk(tmp_path / "p.vtu", points, cells, on_points=[("pressure", at_points)])
+    answer = told(file, "--unit", "m", "--pressure-unit", "pa")
+    assert answer["patches"][0]["S"] == pytest.approx(at_points[cells].mean(axis=1) @ patch.area, rel=1e-12)
+    assert any("mean of its corners" in text for text in answer["remarks"])
+
+
+def test_triangles_among_quadrilaterals_leave_their_last_corner_empty(tmp_path, told):
+    """Unit square of a quadrilateral of half its area and two triangles: S = p, f = mu p."""
+    rows = ["0,0,0,.5,0,0,.5,1,0,0,1,0,2", ".5,0,0,1,0,0,1,1,0,,,,2", ".5,0,0,1,1,0,.5,1,0,,,,2"]
+    names = [f"{c}{k}" for k in (1, 2, 3, 4) for c in "xyz"]
+    file = tmp_path / "mixed.csv"
+    file.write_text("\n".join([",".join([*names, "pressure"]), *rows]))
+    answer = told(file, "--unit", "m", "--pressure-unit", "pa")
+    points = [[0, 0, 0], [0.5, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 1, 0], [0, 1, 0]]
+    mixed = vtk(tmp_path / "mixed.vtu", points, [[0, 1, 4, 5], [1, 2, 3], [1, 3, 4]], [("pressure", [2, 2, 2])])
+    assert answer["patches"][0]["S"] == pytest.approx(2.0, rel=1e-14)
+    assert answer["patches"][0]["friction"]["curved"]["f_x_max"] == pytest.approx(MU * 2.0, rel=1e-14)
+    assert friction(told(mixed, "--unit", "m", "--pressure-unit", "pa")) == pytest.approx(friction(answer), **SAME)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "x_mm;y_mm;z_mm;area_mm2;nx;ny;nz;pressure_kpa",
+        "x [mm],Y [mm],z (mm),area [mm^2],n_x,n_y,n_z,Pressure [kPa]",
+        "normal_x\tnormal_y\tnormal_z\tx_mm\ty_mm\tz_mm\tarea_cm2\tpressure_mpa",
+    ],
+)
+def test_spellings_of_names_units_and_separators(tmp_path, told, head):
+    mark = next(m for m in ";\t," if m in head)
+    cells = {"x": "1", "y": "2", "z": "3", "area": "100", "nx": "0", "ny": "0", "nz": "2", "pressure": "5"}
+    if "cm2" in head:
+        cells = {"nx": "0", "ny": "0", "nz": "1", "x": "1", "y": "2", "z": "3", "area": "1", "pressure": ".005"}
+    file = tmp_path / "one.csv"
+    file.write_text("\ufeff# a comment\n" + head + "\n\n" + mark.join(cells.values()) + "\n", encoding="utf-8")
+    patch = told(file)["patches"][0]
+    assert patch["S"] == pytest.approx(0.5, rel=1e-14)
+    assert patch["frame"]["origin"] == pytest.approx([1e-3, 2e-3, 3e-3])
+
+
+def test_unused_columns_are_named_and_the_pressure_can_be_chosen(tmp_path, told):
+    file = tmp_path / "abaqus.csv"
+    file.write_text("node,x_m,y_m,z_m,area_m2,nx,ny,nz,CPRESS,pressure_pa\n7,0,0,0,1e-4,0,0,1,100,9\n")
+    chosen = told(file, "--pressure-name", "CPRESS", "--pressure-unit", "kpa")
+    assert chosen["patches"][0]["S"] == pytest.approx(10.0)
+    assert f"not used of {file}: node, pressure_pa" in chosen["remarks"]
+    assert f"not used of {file}: node, CPRESS" in told(file)["remarks"]
+
+
+def test_x_follows_the_long_direction_unless_it_is_given(tmp_path, told):
+    patch = replace(cylinder_grid(0.03, 0.3, 0.06, 9, 12), pressure=np.full(108, 1e4))
+    long = told(file := centres(tmp_path / "long.csv", patch))
+    given = told(file, "--long-side=0,1,0")
+    assert np.abs(long["patches"][0]["frame"]["axes"][0]) == pytest.approx([1, 0, 0], abs=1e-9)
+    assert any("no --long-side" in text for text in long["remarks"])
+    curved, turned = (a["patches"][0]["friction"]["curved"] for a in (long, given))
+    assert turned["f_y_max"] == pytest.approx(curved["f_x_max"], rel=1e-12)
+    assert not any("no --long-side" in text for text in given["remarks"])
+
+
+def test_turned_normals_change_no_friction(tmp_path, told):
+    _, _, patch = faceted()
+    file = centres(tmp_path / "patch.csv", patch)
+    one, two = told(file), told(file, "--flip-normals")
+    assert friction(two) == pytest.approx(friction(one), **SAME)
+    assert np.allclose(two["patches"][0]["frame"]["axes"][2], -np.array(one["patches"][0]["frame"]["axes"][2]))
+
+
+def test_surfaces_that_know_more_fit_better(told):
+    surfaces = told(EXAMPLE)["patches"][0]["limit_surface"]["curved"]
+    assert list(surfaces) == ["exact", *SURFACES]
+    three, full, quartic = (surfaces[name] for name in ("three_motions", "full", "quartic"))
+    assert full["E_rad"] < three["E_rad"]
+    assert full["E_dir"] < three["E_dir"]
+    assert quartic["E_rad"] < three["E_rad"]
+    assert quartic["E_dir"] < 0.25 * full["E_dir"]
+    ratio = {name: surfaces[name]["volume"] / surfaces["exact"]["volume"] for name in SURFACES}
+    assert 1.05 < ratio["three_motions"] < 1.2
+    assert ratio["quartic"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_grasp_of_equal_ellipsoids_has_its_closed_form(told):
+    """quality = 14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per unit force; d over the object's, tau over the contact's length."""
+    answer = told(EXAMPLE, "--distance", 60, "--object-length", 90, "--contact-length", 50,
+                  "--surface", "three_motions")  # fmt: skip
+    patch, grasp = answer["patches"][0], answer["grasp"]
+    for model, limits in patch["friction"].items():
+        f_x, f_y, tau = (limits[f"{name}_max"] / patch["S"] for name in ("f_x", "f_y", "tau_z"))
+        expected = 14 / 9 * math.pi**2 * (60 / 90) ** 2 * f_x**2 * f_y**2 * tau / 0.05
+        assert grasp["score"][model]["quality"] == pytest.approx(expected, rel=1e-9)
+        assert grasp["score"][model]["epsilon"] == pytest.approx(2 * (t := tau / 0.05) / math.hypot(1, t), rel=1e-6)
+    assert grasp["misalignment"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_default_lengths_are_the_distance_and_the_contact(told):
+    answer = told(EXAMPLE, "--distance", 60)
+    assert answer["grasp"]["object_length"] == pytest.approx(0.06)
+    assert answer["grasp"]["contact_length"] == answer["patches"][0]["rho"]
+    assert answer["grasp"]["surface"] == "quartic"
+
+
+def opposite(patch, distance):
+    """The same patch half a turn about x away, facing the first."""
+    turn = np.diag([1.0, -1.0, -1.0])
+    return replace(patch, centroid=patch.centroid @ turn + [0, 0, distance], normal=patch.normal @ turn)
+
+
+def test_two_files_score_as_one_whose_copy_faces_it(tmp_path, told):
+    _, _, patch = faceted(n=9, m=8)
+    patch = replace(patch, pressure=np.full(72, 1e4))
+    one = centres(tmp_path / "one.csv", patch)
+    height = float(patch.centroid[:, 2].max())
+    two = centres(tmp_path / "two.csv", opposite(patch, 2 * height + 0.06))
+    alone, both = told(one, "--distance", 60), told(one, "--other", two)
+    assert both["grasp"]["distance"] == pytest.approx(0.06)
+    for model, found in both["grasp"]["score"].items():
+        assert found["quality"] == pytest.approx(alone["grasp"]["score"][model]["quality"], rel=1e-6)
+    assert len(both["patches"]) == 2
+
+
+def test_a_grasp_that_slips_is_told(tmp_path, told):
+    _, _, patch = faceted(n=9, m=8)
+    one = centres(tmp_path / "one.csv", patch)
+    aside = opposite(patch, 0.12)
+    two = centres(tmp_path / "two.csv", replace(aside, centroid=np.add(aside.centroid, [0.05, 0, 0])))
+    answer = told(one, "--other", two)
+    assert answer["grasp"]["slips"]
+    assert any("slips" in text for text in answer["remarks"])
+    assert any("from antipodal" in text for text in answer["remarks"])
+
+
+def test_a_single_face_carries_no_torque_and_scores_nothing(tmp_path, told):
+    file = centres(tmp_path / "point.csv", points_patch([[0.0, 0.0]], [3.0]))
+    answer = told(file, "--distance", 50, "--contact-length", 20)
+    patch = answer["patches"][0]
+    assert patch["rank"] == 2
+    assert any("rank 2" in text for text in answer["remarks"])
+    for model in patch["friction"].values():
+        assert model["f_x_max"] == pytest.approx(MU * 3.0)
+        assert model["tau_z_max"] == model["tau_pure"] == model["e_n"] == 0.0
+    assert patch["limit_surface"]["curved"]["quartic"]["E_rad"] is None
+    assert {score["quality"] for score in answer["grasp"]["score"].values()} == {0.0}
+
+
+def test_overhanging_faces_are_counted(tmp_path, told):
+    """Half angle 100 deg: the outermost of 21 strips on each side hangs over."""
+    patch = cylinder_grid(0.03, np.radians(100), 0.02, 21, 4)
+    answer = told(centres(tmp_path / "round.csv", patch), "--long-side", "1,0,0")
+    beyond = int((patch.normal[:, 2] < 0).sum())
+    assert beyond > 0
+    assert answer["patches"][0]["frame"]["overhang_count"] == beyond
+    assert any(f"more than 90 deg from the contact normal: {beyond}" in text for text in answer["remarks"])
+
+
+def keys(record):
+    """Names of everything in a record; of a list, those of its first entry."""
+    if isinstance(record, dict):
+        return {name: keys(value) for name, value in record.items() if name not in ("units", "definitions")}
+    return [keys(record[0])] if isinstance(record, list) and record and isinstance(record[0], dict) else None
+
+
+def test_the_json_keeps_its_names(told):
+    limits = dict.fromkeys(["f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected"])
+    fit = dict.fromkeys(["volume", "semi_axes", "stands_in", "E_1", "E_rad", "E_dir"])
+    surfaces = {
+        "exact": dict.fromkeys(["volume", "semi_axes"]),
+        "three_motions": fit,
+        "axis_aligned": fit,
+        "full": fit,
+        "quartic": fit,
+    }
+    models = ("curved", "flat", "projected")
+    frame = ["origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share"]
+    patch = dict.fromkeys(["file", "faces", "loaded_faces", "area", "pressure", "S", "F_N", "rho"])
+    patch |= {"frame": dict.fromkeys(frame), "rank": None, "friction": dict.fromkeys(models, limits)}
+    patch |= {"limit_surface": dict.fromkeys(models, surfaces)}
+    grasp = dict.fromkeys(["surface", "distance", "object_length", "contact_length", "misalignment", "slips"])
+    grasp |= {"score": dict.fromkeys(models, dict.fromkeys(["quality", "epsilon"]))}
+    answer = told(EXAMPLE, "--distance", 60)
+    assert keys(answer) == {"mu": None, "patches": [patch], "grasp": grasp, "remarks": None}
+    numbers = {*limits, "S", "F_N", "rho", "distance", "object_length", "contact_length", "misalignment", "E_dir"}
+    assert numbers <= answer["units"].keys()
+
+
+def test_the_text_says_the_same_as_the_json(told, capsys):
+    patch = told(EXAMPLE)["patches"][0]
+    assert main(["patch", str(EXAMPLE), "--mu", str(MU), "--distance", "60"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+
+    def row(name):
+        return next(line.split() for line in lines if line.startswith(name))
+
+    assert lines[0] == f"{EXAMPLE}: 240 faces, 240 under pressure, mu = {MU:g}"
+    assert row("f_x_max [N]")[2:] == [f"{m['f_x_max']:.4g}" for m in patch["friction"].values()]
+    assert row("e_n [mm]")[2:] == [f"{1e3 * m['e_n']:.4g}" for m in patch["friction"].values()]
+    for word in ("quality", "epsilon", "convex quartic", "e_n: tau_z_max / (mu S)", "note: x follows"):
+        assert any(line.startswith(word) for line in lines), word
+    assert max(map(len, lines)) <= 120
+
+
+def test_the_example_shows_what_its_closed_form_says(told):
+    """Along a cylinder friction is mu S, across it mu F_N, whatever the pressure."""
+    patch = told(EXAMPLE)["patches"][0]
+    curved = patch["friction"]["curved"]
+    assert curved["f_x_max"] == pytest.approx(MU * patch["S"], rel=1e-9)
+    assert curved["f_y_max"] == pytest.approx(MU * patch["F_N"], rel=1e-6)
+
+
+@pytest.mark.launches
+def test_a_table_is_read_without_mpi_petsc_or_vtk(once):
+    words = [sys.executable, "-X", "importtime", "-m", "study", "patch", str(EXAMPLE), "--distance", "60"]
+    done = once(lambda: subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=False))
+    lines = [line.rpartition("|")[2].strip() for line in done.stderr.splitlines() if line.startswith("import time:")]
+    modules = {line.partition(".")[0] for line in lines}
+    assert done.returncode == 0
+    assert "numba" in modules
+    assert modules.isdisjoint({"mpi4py", "petsc4py", "h5py", "skfem", "pyvista", "vtkmodules", "matplotlib"})
