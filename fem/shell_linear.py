@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from fem.errors import ConvergenceError
 from fem.pattern import Pattern, add_up
 from fem.petsc import Factors
 from fem.shell_model import FloatArray, IntArray, Shell
 from fem.shell_solve import free_numbers
 
 AT_ONCE = 192  # right-hand sides; bounds the memory
+LOOSE = 1e15  # ratio of the largest to the smallest stiffness from which on a shell counts as loose
 
 
 class LinearShell:
@@ -28,6 +30,17 @@ class LinearShell:
         pattern = Pattern(len(self.free), rows, columns)
         add_up(pattern.slots(rows, columns), shell.tangent(np.zeros(shell.size)), pattern.values)
         self._factors = Factors(pattern)
+        self._refuse_loose(float(np.abs(pattern.values).max()))
+
+    def _refuse_loose(self, stiffest: float) -> None:
+        """Rounding keeps a loose body's pivots from being exactly zero; its displacements are beyond all bounds."""
+        load = np.zeros(self.shell.size)
+        load[self.free] = np.random.default_rng(0).normal(size=len(self.free))
+        ratio = stiffest * np.abs(self.solve(load)).max() / np.abs(load).max()
+        if not ratio < LOOSE:
+            raise ConvergenceError(
+                "the shell can move without force: fix more of it, or give it weak springs (see fem.shell_support)"
+            )
 
     def solve(self, load: FloatArray) -> FloatArray:
         """State ``q`` [m] under the load [N], both ``(6 k,)`` or several as the columns of ``(6 k, m)``."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fem.errors import ConvergenceError
 from fem.outer_surface import Section, of_revolution, of_sections
 from fem.revolution import Revolution
 from fem.shell_body import body_mesh
@@ -186,6 +187,13 @@ def test_weak_springs_do_not_matter_in_a_balanced_grasp():
     stiff = supported(soft.shell.mesh, PET, "free", 10.0)
     one, other = (LinearShell(body.shell, body.fixed).solve(load)[6 * node] for body in (soft, stiff))
     assert one == pytest.approx(other, rel=1e-4)
+
+
+def test_a_loose_shell_is_refused():
+    _, body, _, _ = pinched(QUARTER, "free")
+    body.shell.springs[:] = 0
+    with pytest.raises(ConvergenceError, match="can move without force"):
+        LinearShell(body.shell, body.fixed)
 
 
 def test_a_tube_under_pressure():
