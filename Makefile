@@ -10,6 +10,8 @@ PAGE    = $(RESULT:.hdf=.html)
 PICTURE = $(RESULT:.hdf=.png)
 BIN     = .venv/bin
 LIMIT   = timeout -k 30
+# Of the benchmark: any of kernels linearised element contact map; all if empty.
+PARTS   =
 # Exit code of a finished study with failed cases; the report lists them with their reasons.
 SOME_FAILED = 6
 
@@ -32,7 +34,7 @@ help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
 	@echo 'make test       the tests, first on one process and then on $(RANKS) ranks'
 	@echo 'make test-long  the checks that take minutes'
-	@echo 'make bench      what accuracy and speed cost'
+	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make lint       ruff'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
 	@echo 'make setup      only what each of the above does first: packages and .venv'
@@ -59,7 +61,7 @@ test-long: setup
 	$(BIN)/python -m pytest -q -m long --durations 10
 
 bench: setup
-	$(BIN)/python -m tests.benchmark.run
+	$(BIN)/python -m tests.benchmark.run $(PARTS)
 
 lint: setup
 	$(BIN)/ruff check .
