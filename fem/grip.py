@@ -27,7 +27,7 @@ from fem.stepping import Settings, Stepping, Work
 LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-ROUNDING = 3e-9  # norm of the residual [N]: a stiff wall's forces are differences of large numbers
+ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ class Grip:
         self.solver = NonlinearSolver(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
-            self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds), ROUNDING,
+            self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
+            ROUNDING * self.problem.model.shell.young_modulus,
         )  # fmt: skip
 
     def _guess(self, travel: float) -> FloatArray:

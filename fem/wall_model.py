@@ -21,6 +21,7 @@ IntArray = NDArray[np.int32]
 class WallModel(Protocol):
     """What a contact problem asks of a wall with ``n`` unknowns and ``k`` nodes."""
 
+    shell: Shell
     size: int
     first: IntArray
     second: IntArray
@@ -102,7 +103,7 @@ class LinearWall:
     both = False
 
     def __init__(self, linear: LinearShell, nodes: IntArray) -> None:
-        self.linear, self.nodes = linear, np.asarray(nodes)
+        self.linear, self.shell, self.nodes = linear, linear.shell, np.asarray(nodes)
         C, W = linear.compliance(self.nodes)
         self._free = np.flatnonzero(np.diag(C) > 0)  # the others lie in planes of symmetry or are held
         n, k = len(self._free), len(C)

@@ -1,0 +1,68 @@
+"""Thin-walled cylinders between two fingers, small enough for tests."""
+
+from functools import cache
+
+import numpy as np
+
+from fem.grip import Grip
+from fem.grip_problem import GripProblem
+from fem.materials import material
+from fem.outer_surface import of_revolution
+from fem.pad import Pad
+from fem.pad_shape import PadShape
+from fem.pose import Pose
+from fem.revolution import Revolution
+from fem.thin_walled import ThinWalled, WallMesh, grasp, linear_wall, nonlinear_wall
+from fem.wall_material import WallMaterial, wall_material
+
+SIZE = (0.03, 0.02, 0.02)
+COARSE = WallMesh(0.003, 0.005, 0.010)
+FOAM = 24e3  # shear modulus of the pads [Pa]
+
+
+@cache
+def can() -> Revolution:
+    """Straight can with a shoulder and a neck, 35 mm in radius."""
+    z = [0.0, 0.003, 0.05, 0.1, 0.150, 0.180, 0.190, 0.205]
+    return Revolution(np.column_stack([z, [0.033, 0.035, 0.035, 0.035, 0.035, 0.013, 0.013, 0.013]]))
+
+
+def thin(
+    thickness: float = 4e-4, law: WallMaterial | None = None, support: str = "standing", around: bool = True
+) -> ThinWalled:
+    """The can with a wall of PET."""
+    return ThinWalled(of_revolution(can()), around, thickness, law or wall_material("pet"), support)
+
+
+def pose(theta: float, z: float, radius: float = 0.035) -> Pose:
+    """Pad at first touch with the straight wall, its long side along the axis."""
+    c, s = np.cos(theta), np.sin(theta)
+    approach, long_side = np.array([-c, -s, 0.0]), np.array([0.0, 0.0, 1.0])
+    rotation = np.column_stack([long_side, np.cross(approach, long_side), approach])
+    return Pose(rotation, np.array([0.0, 0.0, z]) - radius * approach)
+
+
+def grip(
+    body: ThinWalled,
+    z: float = 0.075,
+    elements: tuple[int, int, int] = (6, 4, 3),
+    allowed: tuple[bool, bool] = (True, True),
+    level: str = "nonlinear",
+    mesh: WallMesh = COARSE,
+    theta: float = 0.0,
+) -> Grip:
+    """Both fingers on the can at this height."""
+    poses = pose(theta, z), pose(theta + np.pi, z)
+    held = grasp(body, poses, allowed)
+    model, walls = (nonlinear_wall if level == "nonlinear" else linear_wall)(body, held, SIZE, mesh)
+    pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)
+    problem = GripProblem(model, [(pad, p, wall) for p, wall in zip(held.poses, walls, strict=True)])
+    return Grip(problem, [_gap(p) for p in held.poses], held.mirrors)
+
+
+def _gap(at: Pose):
+    def gap(x):
+        g, normal, hessian = can().gap(at.to_object(x))
+        return g, normal @ at.rotation, at.rotation.T @ hessian @ at.rotation
+
+    return gap

@@ -1,0 +1,150 @@
+"""Two fingers on a thin wall: exact tangent, symmetry, balance, rigid and linear limits, and a prototype's figures."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fem.contact import Control
+from fem.extract import extract
+from fem.press import Press
+from fem.stepping import Work
+from fem.thin_walled import WallMesh
+from fem.wall_material import WallMaterial
+from friction.frame import contact_frame, in_frame
+from friction.wrench import friction_limits
+from tests.fem.grips import _gap, grip, pose, thin
+
+FORCES = (0.5, 2.0)
+FINE = WallMesh(0.00085, 0.0025, 0.005)
+
+
+@cache
+def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, support="standing", theta=0.0):
+    """Ladder over FORCES."""
+    body = thin(thickness, support=support)
+    return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).ladder(FORCES))
+
+
+def e_n(finger):
+    """Eccentricity parameter of one finger's patch, planar reading [m]."""
+    patch = extract(finger.pad, finger)
+    local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
+    return friction_limits(local, 1.0, "flat").e_n
+
+
+@pytest.mark.parametrize(
+    ("allowed", "level", "control"),
+    [
+        ((True, True), "nonlinear", Control(force=2.0)),
+        ((True, True), "linear", Control(force=2.0)),
+        ((False, False), "nonlinear", Control(force=2.0)),
+        ((False, False), "nonlinear", Control(travel=1e-3)),
+    ],
+)
+def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
+    problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem
+    rng = np.random.default_rng(1)
+    x = np.zeros(problem.size)
+    x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
+    for f in problem.fingers:
+        own, pad = x[f.own], f.pad
+        u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
+        own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
+        own[pad.travel_dof] = 1.5e-3
+        own[pad.travel_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
+    problem.control = control
+    problem.tangent(x)
+    pattern = problem.pattern
+    K = sp.csr_matrix((pattern.values.copy(), pattern.column, pattern.start), shape=(problem.size,) * 2)
+    parts = [slice(0, problem.model.size), *(f.own for f in problem.fingers)]
+    for moved in parts:
+        step = np.zeros(problem.size)
+        step[moved] = rng.normal(size=step[moved].size)
+        found = (problem.residual(x + 1e-9 * step) - problem.residual(x - 1e-9 * step)) / 2e-9
+        expected = K @ step
+        for rows in parts:
+            # differences of large forces: what rounding leaves, relative to the largest entry of the whole column
+            assert np.abs(found - expected)[rows].max() <= 1e-8 * np.abs(found).max() + 1e-3
+
+
+def test_quarter_half_and_full_give_the_same():
+    reference = states()
+    for allowed in ((True, False), (False, True), (False, False)):
+        for a, b in zip(reference, states(allowed), strict=True):
+            assert len(b.fingers) == (1 if allowed[0] else 2)
+            for finger in b.fingers:
+                assert finger.travel == pytest.approx(a.fingers[0].travel, rel=1e-7)
+                assert e_n(finger) == pytest.approx(e_n(a.fingers[0]), rel=1e-6)
+            np.testing.assert_allclose(b.wall.reaction, a.wall.reaction, atol=1e-7)
+
+
+def test_a_body_of_revolution_is_the_same_from_every_side():
+    for a, b in zip(states(), states(theta=0.7), strict=True):
+        assert b.fingers[0].travel == pytest.approx(a.fingers[0].travel, rel=1e-7)
+
+
+@pytest.mark.parametrize("support", ["standing", "free"])
+def test_fingers_object_and_support_are_in_balance(support):
+    # near the shoulder the wall leans, and the pads push the can down
+    for state in states((False, False), z=0.142, support=support):
+        one, two = (f.points.force for f in state.fingers)
+        assert one[2] == pytest.approx(state.force, rel=1e-8)
+        assert two[2] == pytest.approx(state.force, rel=1e-8)
+        along_axis = one[0] + two[0]  # the pads' long side points up
+        assert state.wall.reaction[2] == pytest.approx(-along_axis, rel=1e-9)
+        assert abs(state.wall.reaction[2]) > 1e-3 * state.force
+        np.testing.assert_allclose(state.wall.reaction[:2], 0.0, atol=1e-7)
+        np.testing.assert_allclose(state.wall.load.sum(axis=0), -state.wall.reaction, atol=1e-12)
+
+
+def test_a_very_stiff_wall_is_a_rigid_object():
+    stiff = thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")
+    soft = list(grip(stiff).ladder(FORCES))
+    pad = soft[0].fingers[0].pad
+    press = Press(pad, _gap(pose(0.0, 0.075)))
+    for a, b in zip(soft, press.ladder(FORCES), strict=True):
+        assert a.fingers[0].travel == pytest.approx(b.travel, rel=1e-4)
+        assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
+        np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
+    press.destroy()
+
+
+def test_linear_and_nonlinear_walls_agree_while_the_dent_is_small():
+    for a, b in zip(states(thickness=8e-4), states(thickness=8e-4, level="linear"), strict=True):
+        deepest = np.linalg.norm(a.wall.q.reshape(-1, 6)[:, :3], axis=1).max()
+        assert deepest < 0.3 * 8e-4
+        assert e_n(b.fingers[0]) == pytest.approx(e_n(a.fingers[0]), rel=0.01)
+        assert b.fingers[0].travel == pytest.approx(a.fingers[0].travel, rel=0.01)
+
+
+def test_a_thin_wall_gives_way_and_the_contact_spreads():
+    thick, thin_ = states(thickness=8e-4)[-1], states(thickness=3e-4)[-1]
+    assert thin_.fingers[0].travel > 1.2 * thick.fingers[0].travel
+    assert e_n(thin_.fingers[0]) > e_n(thick.fingers[0])
+
+
+# An independent prototype with another element library: force [N] and e_n [mm] by thickness and travel [mm].
+PROTOTYPE = {
+    0.3: {1: (0.860, 8.13), 2: (1.927, 8.88), 3: (2.632, 10.30), 4: (2.875, 11.45), 5: (3.263, 11.69)},
+    0.4: {1: (1.050, 8.07), 2: (2.537, 8.66), 3: (4.246, 9.23), 4: (5.730, 9.86), 5: (6.125, 10.84)},
+    0.5: {1: (1.153, 8.05), 2: (2.864, 8.61), 3: (4.986, 9.08), 4: (7.375, 9.46), 5: (9.788, 9.82)},
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("thickness", PROTOTYPE)
+def test_through_the_snap_in_as_an_independent_prototype(thickness):
+    held = grip(thin(thickness * 1e-3), elements=(15, 10, 10), mesh=FINE)
+    work, step = Work(), held._stepping
+    x, _ = step.first(5e-4, 0.5, work)
+    for travel in np.arange(1, 11) * 5e-4:
+        x = step.solve(x, Control(travel=travel), work)
+        expected = PROTOTYPE[thickness].get(round(travel * 1e3, 6))
+        if expected:
+            F = held.problem.sheet_force(x)
+            assert F == pytest.approx(expected[0], rel=0.035)
+            finger = held._gripped(x, F, False, work, held.solver.seconds).fingers[0]
+            assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)
+    assert work.cuts == 0
