@@ -194,7 +194,9 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
 
 def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[FloatArray, FitFlag]:
     """Solution of the normal equations ``N x = b`` that is nearest to ``start`` if there are many, and a flag."""
-    values, V = np.linalg.eigh(N)
+    size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
+    values, V = np.linalg.eigh(N * np.outer(size, size))
     held = values > 1e-12 * values[-1]
-    x = start + V[:, held] @ ((V[:, held].T @ (b - N @ start)) / values[held])
+    V = size[:, None] * V[:, held]
+    x = start + V @ ((V.T @ (b - N @ start)) / values[held])
     return x, FitFlag.CLEAN if held.all() else FitFlag.UNDERDETERMINED

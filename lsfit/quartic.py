@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsfit.certificate import Certificate, certify, smallest_eigenvalue
-from lsfit.ellipsoid import full_ellipsoid, nearest_solution
+from lsfit.ellipsoid import FAR, full_ellipsoid, nearest_solution
 from lsfit.flag import FitError, FitFlag
 from lsfit.form import derivative, exponents, monomials, substitute
+from lsfit.geometry import directions
 from lsfit.quartic_surface import Quartic
-from lsfit.samples import checked_motions
+from lsfit.samples import checked_motions, principal_frame
 from lsfit.sos import MARGIN, convex_least_squares
 from lsfit.surface import Image
 
@@ -71,15 +73,16 @@ def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
     """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
     W, T = checked_motions(W, T)
     ball = full_ellipsoid(W)
-    B = ball.F
+    B, inverse = ball.F, ball.inverse
     assert B is not None
-    inverse = np.linalg.pinv(B)
+    if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them
+        B = principal_frame(W)[0] * np.sqrt(ball.rank)
+        inverse = np.linalg.pinv(B)
     if T is not None and ball.rank < ball.dimension:
         T = T @ ball.span @ ball.span.T
         length = np.linalg.norm(T, axis=1, keepdims=True)
         T = np.where(length > 1e-9, T / np.maximum(length, 1e-9), 0.0)
-    # The ellipsoid's bound says nothing about the quartic's; its other flags do.
-    return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.BOUNDED & ~FitFlag.UNDERDETERMINED)
+    return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.UNDERDETERMINED)
 
 
 class Residuals(NamedTuple):
@@ -116,6 +119,7 @@ def residuals(samples: RoundSamples, beta: float, gamma: float) -> Residuals:
     return Residuals(np.vstack([M, G.reshape(m * d, k)]), np.concatenate([right, np.zeros(m * d)]), m)
 
 
+@lru_cache
 def ball_coefficients(dimension: int) -> FloatArray:
     """Coefficients of ``|y|^4``."""
     squares = exponents(dimension, 2)
@@ -170,7 +174,8 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
 
     The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
     the semidefinite programme is solved, which asks for eigenvalues of at least `lsfit.sos.MARGIN`, so that rounding
-    cannot undo the proof.
+    cannot undo the proof. A body that would reach more than `lsfit.ellipsoid.FAR` times as far as the ellipsoid of the
+    samples is bounded there by a larger margin, and flagged.
 
     Parameters
     ----------
@@ -190,21 +195,23 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     N, b = problem.normal()
     ball = ball_coefficients(r)
     v, flag = nearest_solution(N, b, ball)
-    least = problem.objective(v)
-    flag |= samples.flag
-    by = "least squares"
-    gram = certify(v, r)
+    least, loose = problem.objective(v), bool(flag)
+    by, gram = "least squares", certify(v, r)
     if gram is None:
         by = "semidefinite programme"
-        v, gram = convex_least_squares(N, b, ball, r, flag & FitFlag.UNDERDETERMINED != 0)
-    surface = placed(v, samples, flag)
-    values = np.linalg.eigvalsh(gram)
-    if values[0] < MARGIN / 4:
-        raise FitError(
-            f"the Gram matrix of the convex quartic has the eigenvalue {values[0]:.2e}: report these samples"
-        )
-    certificate = Certificate(_smallest(surface), float(values[0]), gram, samples.B, by)
-    return QuarticFit(surface, certificate, problem.objective(v), least, flag)
+        v, gram = convex_least_squares(N, b, ball, r, loose)
+    u = directions(r, 200)
+    if (monomials(u, exponents(r, 4)) @ v).min() < FAR**-4:
+        by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
+        v, gram = convex_least_squares(N, b, ball, r, loose, 12 * FAR**-4)
+    surface = placed(v, samples, samples.flag | flag)
+    low = float(np.linalg.eigvalsh(gram)[0])
+    if low < MARGIN / 4:
+        raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
+    # Curvature at unit wrenches is at least this. Rounding of very unequal coefficients can hide it from the search.
+    bound = low * np.linalg.norm(samples.B, 2) ** -4
+    certificate = Certificate(max(_smallest(surface), bound), low, gram, samples.B, by)
+    return QuarticFit(surface, certificate, problem.objective(v), least, surface.flag)
 
 
 def _smallest(surface: Quartic | Image) -> float:

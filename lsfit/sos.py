@@ -16,6 +16,7 @@ from scipy.sparse import csc_array, csr_array, hstack
 from lsfit.flag import FitError
 from lsfit.form import exponents
 from lsfit.gram import ball_gram, gram_map, quadratic_map, upper_triangle
+from lsfit.interior import least_quadratic
 
 FloatArray = NDArray[np.float64]
 
@@ -50,12 +51,12 @@ def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
 
 
 def convex_least_squares(
-    N: FloatArray, b: FloatArray, ball: FloatArray, dimension: int, loose: bool
+    N: FloatArray, b: FloatArray, ball: FloatArray, dimension: int, loose: bool, floor: float = MARGIN
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients ``v (k,)`` that minimise ``v' N v / 2 - b . v`` among sos-convex quartics, and their Gram matrix.
 
-    The solver's last digits may leave an eigenvalue just below `MARGIN`. Then the result moves towards ``ball`` by as
-    little as brings it back to half the margin: some ``1e-8`` of its length.
+    The solver's last digits may leave an eigenvalue just below ``floor``. Then the result moves towards ``ball`` by as
+    little as brings it back to half of it: some ``1e-8`` of its length.
 
     Parameters
     ----------
@@ -65,24 +66,31 @@ def convex_least_squares(
         Coefficients of ``|y|^4``.
     loose : bool
         Whether ``N`` leaves directions undetermined; of all solutions the one nearest to the ball is taken then.
+    floor : float
+        Smallest eigenvalue of the Gram matrix, below 4. The body reaches at most ``(12 / floor)^(1/4)`` far.
     """
     k = len(b)
-    triangle = _maps(dimension)[1]
+    size = np.trace(N) / k
+    N, b = N / size, b / size
     if loose:
-        pull = 1e-8 * np.trace(N) / k
-        N, b = N + pull * np.eye(k), b + pull * ball
-    M = np.zeros((triangle.shape[1],) * 2)
-    M[:k, :k] = N
-    x = least_in_cone(M, np.concatenate([b, np.zeros(len(M) - k)]), triangle, MARGIN)
-    v, free = x[:k], x[k:]
-    low = float(np.linalg.eigvalsh(gram_matrix(v, free, dimension))[0])
-    if low < MARGIN / 2:
-        whole = np.concatenate([ball, ball_freedom(dimension)])
-        most = float(np.linalg.eigvalsh(gram_matrix(ball, whole[k:], dimension))[0])
-        share = (MARGIN / 2 - low) / (most - low)
+        N, b = N + 1e-8 * np.eye(k), b + 1e-8 * ball
+    matrix, triangle, free = _maps(dimension)
+    whole = np.concatenate([ball, free])
+    H, g = np.zeros((len(whole),) * 2), np.zeros(len(whole))
+    H[:k, :k], g[:k] = N, b
+    try:
+        x = least_in_cone(H, g, triangle, floor)
+    except FitError:
+        # Few samples leave Clarabel short of its tolerance. The other method stays within the cone all the way; a ball
+        # of this size has no eigenvalue below the floor.
+        low = floor / 4 * whole
+        x = low + least_quadratic(H, g - H @ low, csr_array(matrix), whole).x
+    lack = floor / 2 - float(np.linalg.eigvalsh(gram_matrix(x[:k], x[k:], dimension))[0])
+    if lack > 0:
+        most = float(np.linalg.eigvalsh(gram_matrix(ball, free, dimension))[0])
+        share = lack / (most - floor / 2 + lack)
         x = (1 - share) * x + share * whole
-        v, free = x[:k], x[k:]
-    return v, gram_matrix(v, free, dimension)
+    return x[:k], gram_matrix(x[:k], x[k:], dimension)
 
 
 def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: float) -> FloatArray:

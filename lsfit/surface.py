@@ -20,7 +20,9 @@ ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface it
 class LimitSurface(Protocol):
     """Level set ``P(w) = 1`` of a positive homogeneous function, symmetric about the origin, in ``d`` dimensions."""
 
-    flag: FitFlag
+    @property
+    def flag(self) -> FitFlag:
+        """What the reader of a fit should know."""
 
     @property
     def degree(self) -> int:

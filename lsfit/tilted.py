@@ -36,7 +36,7 @@ class TiltedEllipsoid(LevelSet):
     A: FloatArray
     F: FloatArray | None = None
     flag: FitFlag = FitFlag.CLEAN
-    _inverse: FloatArray = field(init=False, repr=False)
+    inverse: FloatArray = field(init=False, repr=False)
     degree = 2
 
     def __post_init__(self) -> None:
@@ -48,7 +48,7 @@ class TiltedEllipsoid(LevelSet):
             raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
         F = _ball_map(A) if self.F is None else np.array(self.F, float)
         inverse = np.linalg.pinv(F)
-        for name, array in (("A", (A + A.T) / 2), ("F", F), ("_inverse", inverse)):
+        for name, array in (("A", (A + A.T) / 2), ("F", F), ("inverse", inverse)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
@@ -95,7 +95,7 @@ class TiltedEllipsoid(LevelSet):
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
         W = rows(w, self.dimension)
-        Y = W @ self._inverse.T
+        Y = W @ self.inverse.T
         P = (Y**2).sum(axis=1)
         if self.rank < self.dimension:
             away = np.linalg.norm(W - Y @ self._map.T, axis=1)
@@ -104,7 +104,7 @@ class TiltedEllipsoid(LevelSet):
 
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient ``2 A w``, the direction of motion, ``(m, d) -> (m, d)``."""
-        return 2 * rows(w, self.dimension) @ self._inverse.T @ self._inverse
+        return 2 * rows(w, self.dimension) @ self.inverse.T @ self.inverse
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
