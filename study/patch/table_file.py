@@ -143,7 +143,8 @@ def _numbers(table: Table, needed: list[Column], reading: Reading) -> dict[str, 
                 values[j, i] = np.nan
             elif not _is_number(cell):
                 found = shown(cell) if cell else "an empty cell"
-                remedy = "repair the cell or leave the face out"
+                comma = "," in cell and "." not in cell
+                remedy = "write a decimal point" if comma else "repair the cell or leave the face out"
                 problems.append(Problem(table.file, line, column.header, found, "a finite number", remedy))
             else:
                 values[j, i] = float(cell)

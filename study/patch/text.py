@@ -49,7 +49,8 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
         ("origin", f"{_vector(1e3 * frame['origin'])} mm"),
         *((f"axis {name}", _vector(axis)) for name, axis in zip("xyN", frame["axes"], strict=True)),
     ]  # fmt: skip
-    head = f"{patch['file']}: {patch['faces']} faces, {patch['loaded_faces']} under pressure, mu = {mu:g}"
+    faces = f"{patch['faces']} face{'s' * (patch['faces'] > 1)}"
+    head = f"{patch['file']}: {faces}, {patch['loaded_faces']} under pressure, mu = {mu:g}"
     return [head, *(f"  {name:<8} {text}" for name, text in rows), "", *_friction_table(patch), "",
             *_surface_table(patch["limit_surface"]["curved"])]  # fmt: skip
 

@@ -14,8 +14,10 @@ import pytest
 from friction.patch import ContactPatch
 from study.cli import main
 from study.commands import RANK
-from study.patch.evaluate import SURFACES
+from study.patch.evaluate import SURFACES, judge
 from study.patch.faces import corner_geometry
+from study.patch.picture import PLANES, section
+from study.patch.reading import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT
@@ -215,6 +217,18 @@ def test_the_default_lengths_are_the_distance_and_the_contact(told):
     assert answer["grasp"]["object_length"] == pytest.approx(0.06)
     assert answer["grasp"]["contact_length"] == answer["patches"][0]["rho"]
     assert answer["grasp"]["surface"] == "quartic"
+
+
+def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
+    picture = tmp_path / "sections.svg"
+    limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["curved"]
+    assert picture.read_text().count("<path") > 20
+    judged = judge(read_patch(str(EXAMPLE), Reading()), MU)
+    largest = [limits[f"{name}_max"] / judged.limits["curved"].S for name in ("f_x", "f_y", "tau_z")]
+    for name in ("exact", "three_motions"):
+        for plane in PLANES:
+            reach = section(judged, name, plane).max(axis=0)
+            assert reach == pytest.approx([largest[k] for k in plane], rel=2e-2 if name == "exact" else 1e-9)
 
 
 def opposite(patch, distance):

@@ -60,6 +60,7 @@ CORNER_HEAD = ",".join(f"{c}{k}_mm" for k in (1, 2, 3) for c in "xyz") + ",press
         (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1,nan", ":3", ["pressure_kpa", "nan", "a finite number"]),
         (f"{HEAD}\n{FACE}\n0,0,0,1,0,,1,5", ":3", ["ny", "an empty cell"]),
         (f"{HEAD}\n{FACE}\n0,zero,0,1,0,0,1,5", ":3", ["y_mm", "zero"]),
+        (f"{HEAD}\n{FACE}".replace(",", ";").replace("1;0;0", "1,5;0;0"), ":2", ['"1,5"', "decimal point"]),
         (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1", ":3", ["7 cells", "8 as in the line of names"]),
         (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,0,5", ", line 3", ["normal: found 0, 0, 0"]),
         (f"{HEAD}\n0,0,0,1,0,0,1,0", "", ["no load on any", "export a loaded state"]),
@@ -134,6 +135,20 @@ def test_the_pressure_of_a_vtk_file_has_to_be_found(tmp_path, refused):
     assert code == 2
     assert "pressure: found the arrays CPRESS" in said
     assert "--pressure-name CPRESS" in said
+
+
+def test_a_cell_needs_its_points(tmp_path, refused):
+    points, cells = cylinder_mesh()
+    file = vtk(tmp_path / "a.vtu", points, [*cells[:-1], cells[-1] + 9], [("pressure", np.ones(len(cells)))])
+    code, said = refused(file, "--unit", "m", "--pressure-unit", "pa")
+    assert (code, "a point that does not exist" in said) == (3, True)
+
+
+def test_pictures_have_an_ending_and_a_place(tmp_path, refused):
+    code, said = refused(EXAMPLE, "-o", tmp_path / "a.pdf")
+    assert (code, ".png or .svg" in said) == (2, True)
+    code, said = refused(EXAMPLE, "-o", tmp_path / "none" / "a.png")
+    assert (code, "cannot be written" in said) == (5, True)
 
 
 def test_only_faces_are_read(tmp_path, refused):
