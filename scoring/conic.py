@@ -1,7 +1,8 @@
 """Small programmes over products of Lorentz cones, many at once, by a primal-dual interior-point method.
 
 Nesterov and Todd's scaling with Mehrotra's corrector; L. Vandenberghe, "The CVXOPT linear and quadratic cone program
-solvers" (2010), gives the formulas used here. Every cone is ``y_0 >= |(y_1, y_2, y_3)|``; a half-line is one with zeros.
+solvers" (2010), gives the formulas used here. Every cone is ``y_0 >= |(y_1, y_2, y_3)|``; with ``y_0`` alone it is a
+half-line.
 """
 
 from __future__ import annotations

@@ -76,9 +76,8 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     B[:, :r, : r - 1] = _across(w) * np.linalg.norm(u0, axis=1)[:, None, None]
     B[:, r:, r - 1 :] = np.eye(k)
     cost = np.concatenate([np.zeros(r - 1), np.ones(k)])
-    x, z = cone_programme(
-        cost, -np.einsum("iad,mde->miae", L, B), np.einsum("iad,md->mia", L, v0), tolerance * size[:, 0]
-    )
+    G, inside = -np.einsum("iad,mde->miae", L, B), np.einsum("iad,md->mia", L, v0)
+    x, z = cone_programme(cost, G, inside, tolerance * size[:, 0])
     u = u0 + np.einsum("mde,me->md", B, x)[:, :r]
     u = u / (u * w).sum(axis=1, keepdims=True)
     upper = joint_support(c, D, u, kind)

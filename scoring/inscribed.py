@@ -16,9 +16,10 @@ _SPACING = 2.8 / np.sqrt(_DIRECTIONS)  # no direction is farther than this from 
 
 def is_ellipsoid(body: Body) -> bool:
     """Whether the squared support is a quadratic form, as of an ellipsoid about 0."""
+    axes, Q = _quadratic_form(body)
     t = fibonacci_vertices(np.ones(3), 60)
-    h = body.support(t)
-    return bool(np.abs(h - np.linalg.norm(t @ _root(body).T, axis=1)).max() <= 1e-9 * np.abs(h).max())
+    h2 = body.support(t / axes) ** 2
+    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= 1e-9 * h2.max())
 
 
 def ellipsoid_inside(body: Body) -> FloatArray:
@@ -28,7 +29,9 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     directions, less what a support function can fall between them, 2 to 4 % of its largest value.
     """
     if is_ellipsoid(body):
-        return _root(body)
+        axes, Q = _quadratic_form(body)
+        size, V = np.linalg.eigh(Q)
+        return np.sqrt(np.maximum(size, 0))[:, None] * V.T * axes
     ends = body.support(np.vstack([np.eye(3), -np.eye(3)]))
     axes = (ends[:3] + ends[3:]) / 2
     if (axes <= 0).any():
@@ -37,12 +40,15 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     return np.diag(axes * max(h.min() - _SPACING * h.max() / (1 - _SPACING), 0))
 
 
-def _root(body: Body) -> FloatArray:
-    e = np.eye(3)
-    mixed = [(0, 1), (0, 2), (1, 2)]
+def _quadratic_form(body: Body) -> tuple[FloatArray, FloatArray]:
+    """Lengths ``(3,)`` that scale the loads to one, and the form ``Q`` of the squared support of the scaled body."""
+    axes = body.support(np.eye(3))
+    axes = np.where(axes > 0, axes, 1.0)
+    e, mixed = np.diag(1 / axes), [(0, 1), (0, 2), (1, 2)]
     h = body.support(np.vstack([e, [e[i] + e[j] for i, j in mixed]])) ** 2
     Q = np.diag(h[:3])
     for (i, j), value in zip(mixed, h[3:], strict=True):
-        Q[i, j] = Q[j, i] = (value - h[i] - h[j]) / 2
-    size, V = np.linalg.eigh(Q)
-    return np.sqrt(np.maximum(size, 0))[:, None] * V.T
+        # what is left of a form with parallel axes is rounding
+        product = (value - h[i] - h[j]) / 2
+        Q[i, j] = Q[j, i] = product if abs(product) > 1e-14 else 0.0
+    return axes, Q

@@ -1,8 +1,8 @@
 """How far the wrenches of contacts with any limit surfaces reach along a wrench.
 
 Ellipsoids go to `scoring.gauge`. Other bodies are met by cutting planes: points of a body, found where its support is
-asked for, span a polytope inside it, and the reach of those polytopes is a linear programme. Its value is a lower bound,
-the bodies' own support for its direction an upper one, and that direction asks for the next points.
+asked for, span a polytope inside it, and the reach of those polytopes is a linear programme. Its value is a lower
+bound, the bodies' own support for its direction an upper one, and that direction asks for the next points.
 """
 
 from __future__ import annotations

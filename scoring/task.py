@@ -1,4 +1,4 @@
-"""Does a grasp hold this load: the weight of the object, or any other wrench, at given normal forces?
+"""Whether a grasp holds a load, the weight of the object or any other wrench, at given normal forces.
 
 The load ``w`` is held if the contacts can answer with ``-w``. How the normal forces behave is a choice:
 
@@ -8,8 +8,8 @@ The load ``w`` is held if the contacts can answer with ``-w``. How the normal fo
   line, and contacts whose normal forces do not balance may hold only a heavy enough load.
 
 Forces are in N and torques in N m about the origin of the contacts' frame. The safety factor, the largest multiple of
-the load that is held, is a ratio along one line of wrenches, so it depends neither on the point torques refer to nor on
-a length that would make them comparable with forces.
+the load that is held, is a ratio along one line of wrenches, so it depends neither on the point torques refer to nor
+on a length that would make them comparable with forces.
 """
 
 from __future__ import annotations

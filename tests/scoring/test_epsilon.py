@@ -1,0 +1,211 @@
+"""Bounds of epsilon in any pose: closed forms, random searches that must not undercut them, and degenerate grasps."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from scoring.epsilon import epsilon_l1, epsilon_linf
+from scoring.epsilon_search import epsilon, separating_wrench
+from scoring.gauge import gauge, joint_support
+from scoring.inscribed import ellipsoid_inside, is_ellipsoid
+from scoring.polytope import fibonacci_vertices
+from scoring.reach import reach
+
+A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
+
+
+def ring(n, rng, tilt, scale=(1, 1, 0.4)):
+    """Contacts around the origin, moved and turned at random; two of them face each other."""
+    contacts = []
+    for phi in 2 * np.pi * np.arange(n) / n:
+        out = np.array([np.cos(phi), np.sin(phi), 0])
+        position, N = out / 2 + tilt / 2 * rng.normal(size=3), tilt * rng.normal(size=3) - out
+        contacts.append(
+            SoftContact(position, contact_axes(N, [0, 0, 1]), EllipsoidBody(rng.uniform(0.2, 1, 3) * scale))
+        )
+    return contacts
+
+
+def facing(a, b, d=1.3, tilt=0.0):
+    c, s = math.cos(tilt), math.sin(tilt)
+    bodies = [body if hasattr(body, "support") else EllipsoidBody(body) for body in (a, b)]
+    return [
+        SoftContact([side * d / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
+        for side, body in zip((-1, 1), bodies, strict=True)
+    ]
+
+
+def maps(contacts, *arguments):
+    C = np.array([contact.wrench_map(*arguments) for contact in contacts])
+    D = [contact.body.semi_axes[:, None] * Ci[:, 1:].T for contact, Ci in zip(contacts, C, strict=True)]
+    return C[:, :, 0], np.array(D)
+
+
+def unit(u):
+    return u / np.linalg.norm(u, axis=1, keepdims=True)
+
+
+def least_found(c, D, kind, rng, enough=40):
+    """Random search that closes in on the weakest wrenches it found."""
+    u = unit(rng.normal(size=(20000, 6)))
+    for spread in 0.6 ** np.arange(30):
+        best = u[joint_support(c, D, u, kind).argsort()[:enough]]
+        u = unit(np.vstack([best, np.repeat(best, 40, axis=0) + spread * rng.normal(size=(40 * enough, 6))]))
+    return joint_support(c, D, u, kind).min()
+
+
+@pytest.mark.parametrize(("kind", "closed"), [("linf", epsilon_linf), ("l1", epsilon_l1)])
+@pytest.mark.parametrize("seed", range(8))
+def test_antipodal_contacts_have_the_closed_form(kind, closed, seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.05, 1.5, size=(2, 3)) * [1, 1, rng.choice([0.3, 2.0])]
+    x, d, L, rho = rng.uniform(-0.6, 0.6), rng.uniform(0.2, 2.0), 0.8, 0.5
+    bound = epsilon(facing(a, b, d), L, rho, (x, 0, 0), kind)
+    exact = closed(a / [1, 1, rho], b / [1, 1, rho], (-d / 2 - x) / L, (d / 2 - x) / L)
+    assert bound.lower <= exact * (1 + 1e-9)
+    assert bound.upper >= exact * (1 - 1e-9)
+    assert bound.upper <= bound.lower * (1 + 1e-4)
+
+
+def test_epsilon_of_a_known_grasp():
+    """Computed by an independent program: 0.53813823519705 and 0.2849881999516418."""
+    for kind, value in (("linf", 0.53813823519705), ("l1", 0.2849881999516418)):
+        assert epsilon(facing(A, B), 0.7, 0.7, kind=kind)[:2] == pytest.approx((value, value), rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["linf", "l1"])
+@pytest.mark.parametrize(("n", "seed"), [(2, 0), (2, 1), (2, 2), (3, 3), (4, 4)])
+def test_the_bounds_meet_and_no_wrench_is_weaker(kind, n, seed):
+    rng = np.random.default_rng(seed)
+    contacts = ring(n, rng, 0.12)
+    com = (0.1, -0.05, 0.02)
+    bound = epsilon(contacts, 0.9, 0.8, com, kind)
+    c, D = maps(contacts, 0.9, 0.8, com)
+    assert 0 < bound.lower <= bound.upper <= bound.lower * (1 + 1e-4)
+    assert np.linalg.norm(bound.wrench) == pytest.approx(1, rel=1e-12)
+    assert joint_support(c, D, bound.wrench[None], kind)[0] == pytest.approx(bound.upper, rel=1e-12)
+    assert least_found(c, D, kind, rng) >= bound.lower
+
+
+def test_a_gap_that_one_proof_leaves_is_closed_by_splitting_the_wrenches():
+    """The 42nd of these grasps; one programme proves 0.275475 and the weakest wrench found is at 0.275707."""
+    rng = np.random.default_rng(7)
+    contacts = [ring(2, rng, 0.12) for _ in range(42)][-1]
+    contacts = [SoftContact(k.position, k.axes, k.body) for k in contacts]
+    bound = epsilon(contacts, 1.0, 1.0)
+    assert bound.upper <= bound.lower * (1 + 1e-6) + 1e-9
+
+
+def test_contacts_that_press_the_object_out_have_exactly_nothing():
+    """Friction of 0.6 holds a wedge of half angle atan(0.6) = 31 degrees, where epsilon goes to 0, and none beyond."""
+    held = [epsilon(facing(A, A, 1.0, np.radians(t)), 1.0, 1.0).lower for t in (10, 20, 28, 30)]
+    assert held == sorted(held, reverse=True)
+    assert held[-1] > 0
+    for degrees in (31, 32, 60):
+        bound = epsilon(facing(A, A, 1.0, np.radians(degrees)), 1.0, 1.0)
+        assert bound[:2] == (0, 0)
+        c, D = maps(facing(A, A, 1.0, np.radians(degrees)), 1.0, 1.0)
+        assert joint_support(c, D, bound.wrench[None], "linf")[0] == 0
+
+
+def test_contacts_that_cannot_resist_some_wrench_have_exactly_nothing():
+    none = (0.8, 0.6, 0.0)
+    for contacts in (facing(none, none), facing(A, B)[:1], facing((0, 1, 1), (0, 1, 1)), facing((0, 0, 0), (0, 0, 0))):
+        for kind in ("linf", "l1"):
+            assert epsilon(contacts, 1.0, 1.0, kind=kind)[:2] == (0, 0)
+    assert epsilon(facing(none, A), 1.0, 1.0).lower > 0
+
+
+def test_a_wrench_is_named_that_separates():
+    c, D = maps(facing(A, A, 1.0, 0.7), 1.0, 1.0)
+    u = separating_wrench(c, D)
+    assert (u @ c.T + np.linalg.norm(D @ u, axis=1) < 0).all()
+    assert separating_wrench(*maps(facing(A, A), 1.0, 1.0)) is None
+
+
+def test_epsilon_depends_on_the_centre_of_mass_and_the_lengths_but_not_on_the_frame():
+    contacts = ring(2, np.random.default_rng(5), 0.1)
+    here = epsilon(contacts, 0.2, 2.0).upper
+    assert epsilon(contacts, 0.2, 2.0, (0, 0.3, 0.2)).upper < 0.99 * here
+    assert epsilon(contacts, 0.2, 1.0).upper > 1.01 * here
+    Q, shift = contact_axes([1, 2, 3], [1, 0, 0]).T, np.array([3.0, -2, 1])
+    moved = [SoftContact(Q @ k.position + shift, k.axes @ Q.T, k.body) for k in contacts]
+    assert epsilon(moved, 0.2, 2.0, shift).upper == pytest.approx(here, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["linf", "l1", "fixed"])
+def test_the_reach_has_two_sides_that_agree(kind):
+    c, D = maps(ring(3, np.random.default_rng(1), 0.1), 1.0, 1.0)
+    w = np.random.default_rng(2).normal(size=(30, 6))
+    found = gauge(c, D, w, kind)
+    assert (found.lower <= found.upper).all()
+    held = np.isfinite(found.lower)
+    assert held.sum() >= (10 if kind == "fixed" else 30)
+    np.testing.assert_allclose(found.lower[held], found.upper[held], rtol=1e-7)
+    np.testing.assert_allclose((found.u * w).sum(axis=1), 1, rtol=1e-9)
+
+
+def test_the_reach_of_polytopes_is_a_linear_programme():
+    contacts = facing(PolytopeBody(fibonacci_vertices(A, 9)), PolytopeBody(fibonacci_vertices(B, 12)), tilt=0.2)
+    C = np.array([k.wrench_map(1.0, 1.0) for k in contacts])
+    loads = [np.vstack([np.ones(len(k.body.vertices)), k.body.vertices.T]) for k in contacts]
+    w = np.array([0.1, 0.3, -0.2, 0.1, -0.05, 0.2])
+    columns = np.hstack([Ci @ load for Ci, load in zip(C, loads, strict=True)])
+    owner = np.repeat(np.eye(2), [9, 12], axis=0).T
+    exact = linprog(
+        [*np.zeros(21), -1],
+        A_eq=np.hstack([columns, -w[:, None]]),
+        b_eq=np.zeros(6),
+        A_ub=np.hstack([owner, np.zeros((2, 1))]),
+        b_ub=[1, 1],
+    )
+    found = reach(C, [k.body for k in contacts], w, "linf")
+    assert (found.lower, found.upper) == pytest.approx((-exact.fun, -exact.fun), rel=1e-7)
+
+
+class Superellipsoid:
+    """Support (sum |a t|^p)^(1/p): larger than the ellipsoid's for p < 2, smaller for p > 2."""
+
+    volume = shadow_area = float("nan")
+
+    def __init__(self, semi_axes, p):
+        self.semi_axes, self.p = np.array(semi_axes), p
+
+    def support(self, t):
+        return (np.abs(np.atleast_2d(t) * self.semi_axes) ** self.p).sum(axis=1) ** (1 / self.p)
+
+
+def test_any_body_is_bounded_by_an_ellipsoid_inside_it():
+    t = np.random.default_rng(0).normal(size=(5000, 3)) / A
+    for p in (1.7, 3.0):
+        body = Superellipsoid(A, p)
+        assert not is_ellipsoid(body)
+        inside = np.linalg.norm(t @ ellipsoid_inside(body).T, axis=1) / body.support(t)
+        assert 0.93 < inside.max() <= 1
+    tilted = ellipsoid_inside(EllipsoidBody(A)) @ contact_axes([1, 1, 1], [1, 0, 0])
+
+    class Tilted:
+        def support(self, t):
+            return np.linalg.norm(np.atleast_2d(t) @ tilted.T, axis=1)
+
+    assert is_ellipsoid(Tilted())
+    root = ellipsoid_inside(Tilted())
+    np.testing.assert_allclose(root.T @ root, tilted.T @ tilted, atol=1e-14)
+
+
+def test_epsilon_of_any_body():
+    """A body inside the ellipsoid is weaker; the gap is that of the ellipsoid that fits inside it."""
+    contacts = facing(Superellipsoid(A, 2.5), Superellipsoid(B, 2.5), tilt=0.1)
+    bound = epsilon(contacts, 0.7, 0.7)
+    assert 0.75 * bound.upper < bound.lower <= bound.upper
+    assert bound.upper < epsilon(facing(A, B, tilt=0.1), 0.7, 0.7).lower
+
+
+def test_bad_arguments_are_named():
+    with pytest.raises(ValueError, match="kind is 'l2'"):
+        epsilon(facing(A, B), 1.0, 1.0, kind="l2")
+    with pytest.raises(ValueError, match="contacts is empty"):
+        epsilon([], 1.0, 1.0)
