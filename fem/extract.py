@@ -41,6 +41,34 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     )
 
 
+def half_turned(patch: ContactPatch) -> ContactPatch:
+    """Patch of a pad that was solved turned by half a turn about its approach, in the pad's own frame."""
+    sign = np.array([-1.0, -1.0, 1.0])
+    return ContactPatch(
+        patch.centroid[::-1] * sign,
+        patch.area[::-1],
+        patch.normal[::-1] * sign,
+        patch.pressure[::-1],
+        patch.corners[::-1][:, [2, 3, 0, 1]] * sign,
+    )
+
+
+def mirrored(pad: Pad, patch: ContactPatch) -> ContactPatch:
+    """Patch of the other finger where a plane of symmetry lies between them: the image in the pad's plane y = 0."""
+    sign = np.array([1.0, -1.0, 1.0])
+
+    def flipped(values: FloatArray) -> FloatArray:
+        return np.flip(values.reshape(*pad.shape.patch_faces, *values.shape[1:]), 1).reshape(values.shape)
+
+    return ContactPatch(
+        flipped(patch.centroid) * sign,
+        flipped(patch.area),
+        flipped(patch.normal) * sign,
+        flipped(patch.pressure),
+        flipped(patch.corners)[:, [3, 2, 1, 0]] * sign,
+    )
+
+
 def _non_negative(load: FloatArray) -> FloatArray:
     """Loads ``(faces, points)`` without the negative parts of quadratic pressures; each hexahedron keeps its sum."""
     clipped = np.maximum(load, 0.0)

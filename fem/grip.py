@@ -8,7 +8,7 @@ that closes with a growing force meets first.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -74,6 +74,9 @@ class Grip:
         Whether ``x = 0`` and ``y = 0`` are planes of symmetry that the mesh of the wall ends at.
     options : dict
         PETSc options with the prefix ``contact_``.
+    fallback : callable, optional
+        Makes the same problem with nodal gaps, for forces at which this one has no solution; its unknowns must be
+        numbered alike.
     """
 
     problem: GripProblem
@@ -81,9 +84,13 @@ class Grip:
     mirrors: tuple[bool, bool] = (False, False)
     options: dict[str, Any] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
+    fallback: Callable[[], GripProblem] | None = None
 
     def __post_init__(self) -> None:
         """Set up the solver."""
+        self._set_up()
+
+    def _set_up(self) -> None:
         fingers = self.problem.fingers
         self._beds = [SpringBed(f.pad, gap) for f, gap in zip(fingers, self.gaps, strict=True)]
         self.solver = NonlinearSolver(self.problem, self.options)
@@ -111,16 +118,34 @@ class Grip:
         x, reached, compliance, snapped = None, 0.0, np.inf, False
         for force in forces:
             work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
-            if x is None:
-                travel = float(np.mean([bed.travel(force) for bed in self._beds]))
-                x, reached = self._stepping.first(travel, force, work)
-            last = self.problem.travel(x)
-            x, fell = self._climb(x, reached, force, compliance, work)
-            snapped |= fell
-            if force > reached:
-                compliance = (self.problem.travel(x) - last) / (force - reached)
-            reached = force
+            try:
+                x, slope, fell = self._level(x, reached, force, compliance, work)
+            except ConvergenceError:
+                if self.fallback is None:
+                    raise
+                self._fall_back()
+                x, slope, fell = self._level(x, reached, force, compliance, work)
+            reached, compliance, snapped = force, slope, snapped or fell
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
+
+    def _fall_back(self) -> None:
+        """Go on with nodal gaps."""
+        seconds = self.solver.seconds
+        self.solver.destroy()
+        self.problem, self.fallback = self.fallback(), None
+        self._set_up()
+        self.solver.seconds = seconds
+
+    def _level(
+        self, x: FloatArray | None, reached: float, force: float, compliance: float, work: Work
+    ) -> tuple[FloatArray, float, bool]:
+        """State at ``force``, the mean compliance [m/N] on the way, and whether a limit was passed."""
+        if x is None:
+            travel = float(np.mean([bed.travel(force) for bed in self._beds]))
+            x, reached = self._stepping.first(travel, force, work)
+        ahead, fell = self._climb(x, reached, force, compliance, work)
+        way = self.problem.travel(ahead) - self.problem.travel(x)
+        return ahead, way / (force - reached) if force > reached else np.inf, fell
 
     def _climb(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
