@@ -1,0 +1,105 @@
+"""Bodies of stacked sections as rigid objects: equal to bodies of revolution and elliptic cylinders where they are."""
+
+import numpy as np
+import pytest
+
+from fem.objects import EllipticCylinder, Revolution
+from fem.outer_surface import Section, of_sections
+from fem.pose import Pose
+from fem.spline_surface import spline_surface
+from fem.stacked import Stacked
+
+PROFILE = [
+    (0.0, 0.03),
+    (0.005, 0.033),
+    (0.03, 0.034),
+    (0.06, 0.034),
+    (0.09, 0.034),
+    (0.12, 0.03),
+    (0.15, 0.014),
+    (0.18, 0.013),
+]
+HERE = Pose(np.eye(3), np.zeros(3))
+
+
+def off_the_wall(body, n=400, far=0.003, heights=(0.012, 0.17)):
+    """Points up to ``far`` off a body's wall."""
+    rng = np.random.default_rng(2)
+    theta, z = rng.uniform(0, 2 * np.pi, n), rng.uniform(*heights, n)
+    x = np.column_stack([0.03 * np.cos(theta), 0.03 * np.sin(theta), z])
+    for _ in range(3):
+        g, normal, _ = body.gap(x)
+        x = x - g[:, None] * normal
+    return x + normal * rng.uniform(-far, far, n)[:, None]
+
+
+def test_circles_make_the_body_of_revolution():
+    rigid, stacked = Revolution(np.array(PROFILE)), Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
+    x = off_the_wall(rigid)
+    for body in (stacked, stacked.near(HERE, np.zeros(3), np.zeros(3))):
+        g, normal, hessian = body.gap(x)
+        expected = rigid.gap(x)
+        np.testing.assert_allclose(g, expected[0], atol=1e-9)
+        np.testing.assert_allclose(normal, expected[1], atol=5e-6)
+        np.testing.assert_allclose(hessian, expected[2], atol=0.05)
+    np.testing.assert_allclose(stacked.bounds, rigid.bounds, atol=1e-5)
+    assert stacked.axis_symmetry == 0
+
+
+def test_ellipses_of_one_size_make_the_elliptic_cylinder():
+    a, b = 0.03, 0.024
+    stacked = Stacked(of_sections([Section(z, a, b) for z in (0.0, 0.05, 0.1, 0.15)]))
+    rng = np.random.default_rng(4)
+    theta = rng.uniform(0, 2 * np.pi, 300)
+    x = np.column_stack([(a + 0.002) * np.cos(theta), (b + 0.002) * np.sin(theta), rng.uniform(0.02, 0.13, 300)])
+    g, normal, hessian = stacked.gap(x)
+    expected = EllipticCylinder(a, b, 1.0).gap(x)
+    np.testing.assert_allclose(g, expected[0], atol=1e-9)
+    np.testing.assert_allclose(normal, expected[1], atol=5e-6)
+    np.testing.assert_allclose(hessian, expected[2], atol=0.05)
+    assert stacked.axis_symmetry == 2
+
+
+def test_far_away_and_over_the_lids_the_distance_is_still_signed():
+    stacked = Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
+    low, high = stacked.bounds[:, 2]
+    points = np.array([[0.2, 0, 0.06], [0, 0, low - 0.01], [0, 0, high + 0.02], [0, 0, 0.06]])
+    g, normal, _ = stacked.gap(points)
+    np.testing.assert_allclose(g[:3], [0.2 - 0.034, 0.01, 0.02], atol=1e-4)
+    assert g[3] == pytest.approx(-0.034, abs=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
+
+
+def test_shifted_sections_have_no_symmetry():
+    body = Stacked(of_sections([Section(0.0, 0.03), Section(0.05, 0.03, shift=(0.002, 0.0)), Section(0.1, 0.03)]))
+    assert body.axis_symmetry == 1
+
+
+@pytest.mark.parametrize("m", [24, 48])
+def test_splines_converge_with_the_fourth_order(m):
+    def worst(m):
+        theta, s = np.linspace(0, 2 * np.pi, m + 1), np.linspace(0, 0.15, m + 1)
+
+        def point(t, z):
+            return np.stack(
+                [
+                    (0.035 + 0.002 * np.sin(60 * z)) * np.cos(t),
+                    0.03 * np.sin(t),
+                    z + 0 * t,
+                ],
+                axis=-1,
+            )
+
+        surface = spline_surface(theta, s, point(*np.meshgrid(theta, s, indexing="ij")), closed=True)
+        rng = np.random.default_rng(0)
+        t, z = rng.uniform(-7, 9, 200), rng.uniform(0.02, 0.13, 200)
+        return np.abs(surface.at(t, z)[0] - point(t, z)).max()
+
+    assert worst(m) / worst(2 * m) > 12
+
+
+def test_a_grid_that_does_not_close_is_refused():
+    with pytest.raises(ValueError, match="end where it began"):
+        spline_surface([0, 1, 2, 3], [0, 1, 2, 3], np.random.default_rng(0).normal(size=(4, 4, 3)), closed=True)
+    with pytest.raises(ValueError, match="expected"):
+        spline_surface([0, 1], [0, 1], np.zeros((3, 2, 3)), closed=False)
