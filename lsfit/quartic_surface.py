@@ -98,7 +98,7 @@ class Quartic(LevelSet):
 
     @cached_property
     def volume(self) -> float:
-        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-6 beyond."""
+        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-3 or better beyond."""
         V = ball_integral(self._round.value, self.dimension, 4)
         return abs(float(np.linalg.det(self.frame))) * V
 

@@ -1,0 +1,376 @@
+"""Fits of ellipsoids and quartics to friction of known patches, and to data that does not determine them."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from friction.motion import cor_grid, cor_twists, fibonacci_twists
+from friction.wrench import friction_limits, friction_wrench
+from lsfit.body import ExactSurface, body_volume
+from lsfit.certificate import lowest_eigenvalues, smallest_eigenvalue
+from lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
+from lsfit.flag import FitError, FitFlag
+from lsfit.geometry import directions
+from lsfit.misfit import misfit
+from lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
+from lsfit.samples import normalised_samples, sample_rank
+from lsfit.sos import least_in_cone, quadratic_parts
+from tests.generators import (
+    build,
+    cylinder_grid,
+    disc_polar,
+    heightfield,
+    lcg,
+    lcg_patch,
+    points_patch,
+    rect_grid,
+)
+
+HERTZ = {"gen": "disc_polar", "args": {"R": 1.0, "nr": 40, "nt": 96}, "pressure": {"kind": "hertz", "a": 1.0}}
+GAUSS = {
+    "gen": "rect_grid", "args": {"a": 2.0, "b": 1.0, "nx": 80, "ny": 40}, "shift_to_cop_xy": True,
+    "pressure": {"kind": "gauss", "x0": 0.5, "y0": 0.2, "sx": 0.4, "sy": 0.3},
+}  # fmt: skip
+TRIANGLE = [[1, 0], [-0.5, 3**0.5 / 2], [-0.5, -(3**0.5) / 2]]
+TWO_POINTS = points_patch([[-1, 0], [1, 0]], [1, 1])
+# Patch, rho, errors (E1, Erad, Edir) of the three-motion and full ellipsoid and the quartic, smallest eigenvalue, and
+# the three volumes over the exact one, as an independent implementation found them for 500 motions.
+PATCHES = {
+    "disc": (disc_polar(1, 40, 96), 2, ".0248/.0131/8.42 .0184/.0093/6.77 .0045/.0011/0.93", 4.0, "1.120/1.033/1.000"),
+    "Hertz": (build(HERTZ), 2, ".0208/.0110/8.27 .0156/.0078/6.54 .0045/.0011/1.09", 4.0, "1.110/1.027/1.000"),
+    "2:1": (rect_grid(2, 1, 80, 40), 2, ".0169/.0089/8.28 .0139/.0071/7.17 .0077/.0019/2.83", 4.0, "1.109/1.041/1.003"),
+    "6:1": (
+        rect_grid(6, 1, 120, 20), 6, ".0129/.0067/9.71 .0149/.0076/9.77 .0084/.0021/5.66", 3.9, "1.091/1.071/1.011",
+    ),
+    "triangle": (
+        points_patch(TRIANGLE, [1, 1, 1]), 2, ".0367/.0196/9.94 .0277/.0141/8.92 .0168/.0042/3.65", 4.0,
+        "1.227/1.131/1.064",
+    ),
+    "two points": (TWO_POINTS, 2, ".0179/.0095/11.1 .0196/.0101/11.0 .0125/.0031/6.34", -2.2, "1.333/1.289/1.120"),
+    "cylinder 60": (
+        cylinder_grid(1, np.pi / 3, 2, 48, 48), 2, ".0268/.0142/8.70 .0211/.0107/7.14 .0066/.0017/1.42", 5.6,
+        "1.123/1.040/1.001",
+    ),
+    "cylinder 85": (
+        cylinder_grid(1, np.radians(85), 2, 48, 48), 2, ".0342/.0178/11.2 .0287/.0148/10.4 .0163/.0041/3.66", 2.1,
+        "1.113/1.075/1.006",
+    ),
+    "saddle": (heightfield(1, 1, 1, -1, 48, 48), 2, ".0302/.0160/8.06 .0201/.0102/6.63 .0087/.0022/2.04", 5.9,
+               "1.124/1.034/1.003"),
+    "Gauss": (build(GAUSS), 2, ".0093/.0048/7.88 .0076/.0038/6.70 .0044/.0011/2.68", 4.0, "1.085/1.020/1.001"),
+}  # fmt: skip
+
+
+def samples(patch, K=500, rho=2.0, twist=None):
+    twist = fibonacci_twists(K, rho) if twist is None else twist
+    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
+
+
+def noisy(patch, K, amplitude, seed):
+    W, T = samples(patch, K)
+    draw = lcg(seed)
+    return W * (1 + amplitude * (2 * np.array([next(draw) for _ in W]) - 1))[:, None], T
+
+
+def numbers(text):
+    return np.array([[float(x) for x in group.split("/")] for group in text.split()])
+
+
+@pytest.mark.parametrize("name", PATCHES)
+def test_errors_and_volumes_of_known_patches(name):
+    patch, rho, errors, eigenvalue, ratios = PATCHES[name]
+    W, T = samples(patch, 500, rho)
+    limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, rho]
+    models = Ellipsoid(limits), full_ellipsoid(W), least_squares_quartic(W, T, gamma=0)
+    found = np.array([misfit(model, W, T) for model in models])
+    np.testing.assert_allclose(found - numbers(errors), 0, atol=0.06)
+    np.testing.assert_allclose((found - numbers(errors))[:, :2], 0, atol=6e-5)
+    assert smallest_eigenvalue(models[2].coefficients, 3) == pytest.approx(eigenvalue, abs=0.06)
+    V = body_volume(samples(patch, 1000, rho)[0], samples(patch, 4000, rho)[0])
+    np.testing.assert_allclose(np.array([m.volume for m in models]) / V, numbers(ratios)[0], atol=1.1e-3)
+
+
+@pytest.mark.parametrize("name", PATCHES)
+def test_only_two_points_need_the_programme(name):
+    patch, rho, *_ = PATCHES[name]
+    W, T = samples(patch, 500, rho)
+    fit = convex_quartic(W, T, gamma=0)
+    assert (fit.flag, fit.rank) == (FitFlag.CLEAN, 3)
+    if name == "two points":
+        assert fit.certificate.by == "semidefinite programme"
+        np.testing.assert_allclose(misfit(fit.surface, W, T), [0.0129, 0.0033, 6.62], atol=6e-3)
+        np.testing.assert_allclose(misfit(fit.surface, W, T)[:2], [0.0129, 0.0033], atol=6e-5)
+        assert fit.objective > fit.least_objective
+    else:
+        assert fit.certificate.by == "least squares"
+        assert fit.objective == fit.least_objective
+        np.testing.assert_array_equal(fit.surface.coefficients, least_squares_quartic(W, T, gamma=0).coefficients)
+
+
+def test_twenty_noisy_samples_need_the_programme():
+    """Objectives of an independent semidefinite solver."""
+    fit = convex_quartic(*noisy(disc_polar(1, 40, 96), 20, 0.3, 11), gamma=0)
+    assert fit.certificate.by == "semidefinite programme"
+    assert fit.least_objective == pytest.approx(0.021098939720272103, rel=1e-6)
+    assert fit.objective == pytest.approx(0.07303011056407738, rel=1e-5)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 10**6), faces=st.sampled_from([2, 3, 5, 30]), K=st.sampled_from([4, 8, 20, 60, 200]),
+    amplitude=st.sampled_from([0.0, 0.2, 0.6]), gamma=st.sampled_from([0.0, 0.01, 1.0]),
+)  # fmt: skip
+def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, amplitude, gamma):
+    W, T = noisy(lcg_patch(seed, faces), K, amplitude, seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = convex_quartic(W, T, gamma=gamma)
+        surfaces = fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)
+        sizes = [(*s.semi_axes, s.volume, s.shadow_area, *misfit(s, W, T)[1:]) for s in surfaces]
+    assert np.isfinite(sizes).all()
+    assert fit.certificate.gram_eigenvalue > 0
+    assert fit.certificate.smallest_eigenvalue > 0
+    a, b = (u * fit.surface.radius(u)[:, None] for u in np.random.default_rng(seed).normal(size=(2, 300, 3)))
+    assert fit.surface.holds((a + b) / 2).all()
+    assert fit.objective >= fit.least_objective * (1 - 1e-6) - 1e-12
+
+
+@pytest.mark.parametrize("gamma", [0.0, 1.0])
+def test_the_gram_matrix_is_that_of_the_second_derivative(gamma):
+    """``z' Hess p(y) z = (z x y)' Q (z x y)``: whoever holds the certificate can check it."""
+    fit = convex_quartic(*samples(TWO_POINTS), gamma=gamma)
+    c, surface = fit.certificate, fit.surface
+    z, y = np.random.default_rng(0).normal(size=(2, 20, 3))
+    H = c.frame.T @ surface.hessian(y @ c.frame.T) @ c.frame
+    product = (z[:, :, None] * y[:, None, :]).reshape(-1, 9)
+    curvature = np.einsum("mi,mij,mj->m", z, H, z)
+    np.testing.assert_allclose(np.einsum("mi,ij,mj->m", product, c.gram, product), curvature, rtol=1e-10)
+    assert np.linalg.eigvalsh(c.gram)[0] == pytest.approx(c.gram_eigenvalue, rel=1e-6)
+
+
+def test_no_convex_quartic_nearby_is_better():
+    """Steps from the optimum towards other convex quartics, which stay convex, all raise the objective."""
+    W, T = samples(TWO_POINTS)
+    best = convex_quartic(W, T, gamma=0)
+    others = [convex_quartic(*noisy(TWO_POINTS, 60, 0.2, s), gamma=0).surface for s in range(8)]
+    for other in others:
+        c = best.surface.coefficients + 1e-3 * (other.coefficients - best.surface.coefficients)
+        assert ((Quartic(c, best.surface.exponents).value(W) - 1) ** 2).mean() > best.objective
+
+
+@pytest.mark.parametrize("d", [2, 3, 4])
+def test_the_smallest_eigenvalue_is_the_smallest(d):
+    random = np.random.default_rng(d)
+    for _ in range(5):
+        fit = least_squares_quartic(random.normal(size=(300, d)), gamma=0)
+        u = random.normal(size=(20_000, d))
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        found = smallest_eigenvalue(fit.coefficients, d)
+        sampled = lowest_eigenvalues(fit.hessian(u)).min()
+        assert sampled - 0.1 * abs(sampled) - 0.1 < found <= sampled + 1e-12
+
+
+def test_ellipsoids_are_recovered_wherever_they_lie():
+    """Affine images of samples give the affine image of the fit, if wrenches alone count."""
+    random = np.random.default_rng(1)
+    for _ in range(10):
+        L = random.normal(size=(3, 3))
+        u = directions(3, 50)
+        inverse = np.linalg.inv(L)
+        np.testing.assert_allclose(full_ellipsoid(u @ L.T).A, inverse.T @ inverse, rtol=1e-9)
+        W = samples(lcg_patch(7, 30), 100)[0]
+        one, other = full_ellipsoid(W), full_ellipsoid(W @ L.T)
+        np.testing.assert_allclose(other.support(u), one.support(u @ L), rtol=1e-9)
+        one, other = convex_quartic(W, gamma=0).surface, convex_quartic(W @ L.T, gamma=0).surface
+        np.testing.assert_allclose(other.support(u), one.support(u @ L), rtol=1e-7)
+
+
+def test_a_convex_quartic_finds_itself():
+    surface = convex_quartic(*samples(lcg_patch(5, 40)), gamma=0).surface
+    W = surface.support_points(directions(3, 100))
+    T = surface.gradient(W)
+    fit = convex_quartic(W, T / np.linalg.norm(T, axis=1, keepdims=True))
+    np.testing.assert_allclose(fit.surface.coefficients, surface.coefficients, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(misfit(fit.surface, W, T / np.linalg.norm(T, axis=1, keepdims=True)), 0, atol=1e-8)
+
+
+def test_directions_of_motion_improve_directions():
+    W, T = samples(PATCHES["Gauss"][0], 60)
+    far, near = (convex_quartic(W, T, gamma=g).surface for g in (0.0, 1.0))
+    test = samples(PATCHES["Gauss"][0], 333)
+    assert misfit(near, *test).Edir < misfit(far, *test).Edir
+    assert misfit(near, *test).Erad > misfit(far, *test).Erad
+
+
+def test_the_grid_of_the_paper_flatters_its_own_fit():
+    """Errors on evenly spread motions are several times those on the grid, which hardly samples large torques."""
+    disc = disc_polar(1, 40, 96)
+    W, T = samples(disc, twist=cor_grid(21, 2.0))
+    own = [misfit(f, W, T).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
+    even = [misfit(f, *samples(disc)).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
+    np.testing.assert_allclose(own, [0.0040, 0.0003], atol=6e-5)
+    assert (np.array(even) > 3 * np.array(own)).all()
+
+
+def test_millimetres_or_metres_give_the_same_quartic():
+    a = convex_quartic(*samples(lcg_patch(3, 50), 100)).surface.coefficients
+    W, T = samples(lcg_patch(3, 50), 100)
+    wrench, twist = W * [1, 1, 2e3], T / [1, 1, 2e3]
+    b = convex_quartic(*normalised_samples(wrench, twist, 1.0, 2e3)).surface.coefficients
+    np.testing.assert_allclose(b, a, rtol=1e-10, atol=1e-11)
+
+
+def test_repeated_wrenches_change_nothing():
+    W, T = samples(lcg_patch(3, 50), 60)
+    once, twice = convex_quartic(W, T), convex_quartic(np.vstack([W, W]), np.vstack([T, T]))
+    np.testing.assert_allclose(twice.surface.coefficients, once.surface.coefficients, rtol=1e-9, atol=1e-10)
+
+
+def test_one_face_gives_a_flat_fit():
+    W, T = samples(points_patch([[0, 0]], [2.0]), 200)
+    for surface in (full_ellipsoid(W), axis_aligned_ellipsoid(W), convex_quartic(W, T).surface):
+        assert surface.flag == FitFlag.RANK_DEFICIENT
+        assert (surface.rank, surface.volume) == (2, 0)
+        np.testing.assert_allclose(surface.semi_axes, [1, 1, 0], atol=1e-12)
+        assert surface.shadow_area == pytest.approx(np.pi, rel=1e-12)
+        np.testing.assert_allclose(misfit(surface, W, T), 0, atol=1e-6)
+
+
+def test_colinear_centres_of_rotation_are_flagged():
+    """No sample excites the force along x: the fits lie in the plane of the others."""
+    patch = rect_grid(2, 1, 40, 20)
+    W, T = samples(patch, twist=cor_twists(np.column_stack([np.linspace(-10, 10, 41), np.zeros(41)])))
+    assert sample_rank(W) == 2
+    for surface in (full_ellipsoid(W), axis_aligned_ellipsoid(W), convex_quartic(W, T).surface):
+        assert surface.flag & FitFlag.RANK_DEFICIENT
+        assert (surface.rank, surface.volume, surface.semi_axes[0]) == (2, 0, pytest.approx(0, abs=1e-15))
+        assert surface.semi_axes[1] == pytest.approx(1, abs=0.05)
+        errors = misfit(surface, *samples(patch, 100))
+        assert not np.isnan(errors).any()
+        assert errors.Erad == pytest.approx(1)
+
+
+def test_wrenches_in_a_tilted_plane_are_found():
+    B = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0][:, :2]
+    W = directions(2, 40) * [1.0, 0.5] @ B.T
+    for surface in (full_ellipsoid(W), convex_quartic(W, gamma=0).surface):
+        assert surface.flag == FitFlag.RANK_DEFICIENT
+        np.testing.assert_allclose(surface.value(W), 1, rtol=1e-12)
+        assert surface.support(np.cross(*B.T))[0] == pytest.approx(0, abs=1e-15)
+        np.testing.assert_allclose(surface.support(B.T), [1.0, 0.5], rtol=1e-3)
+    aligned = axis_aligned_ellipsoid(W)
+    assert aligned.flag & FitFlag.RANK_DEFICIENT
+    assert (aligned.semi_axes < 5).all()
+
+
+def test_all_pressure_on_a_line_is_a_body():
+    patch = points_patch(np.column_stack([np.linspace(-1, 1, 41), np.zeros(41)]), np.ones(41))
+    fit = convex_quartic(*samples(patch, 300), gamma=0)
+    assert (fit.rank, fit.flag) == (3, FitFlag.CLEAN)
+    assert fit.surface.volume > 0.5
+
+
+@pytest.mark.parametrize(("R", "flag"), [(1e-6, FitFlag.RANK_DEFICIENT), (1e-3, FitFlag.THIN)])
+def test_a_rho_far_from_the_size_of_the_patch_is_flagged(R, flag):
+    W, T = samples(disc_polar(R, 20, 48), 300, rho=1.0)
+    for surface in (full_ellipsoid(W), axis_aligned_ellipsoid(W), convex_quartic(W, T).surface):
+        assert surface.flag & flag
+        assert 0 <= surface.semi_axes[2] <= R
+    W, T = samples(disc_polar(R, 20, 48), 300, rho=2 * R)
+    np.testing.assert_allclose(full_ellipsoid(W).A, full_ellipsoid(samples(disc_polar(1, 20, 48), 300)[0]).A, rtol=1e-9)
+
+
+@pytest.mark.parametrize("K", [1, 2, 3, 5, 10])
+def test_few_samples_are_flagged_and_stay_bounded(K):
+    W, T = (x[:: 300 // K][:K] for x in samples(lcg_patch(9, 30), 300))
+    fit = convex_quartic(W, gamma=0)
+    assert fit.flag & (FitFlag.UNDERDETERMINED | FitFlag.RANK_DEFICIENT)
+    for surface in (fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)):
+        assert (surface.semi_axes < 30 * np.abs(W).max()).all()
+        assert np.isfinite(misfit(surface, W, T)).all()
+
+
+def test_an_endless_ellipsoid_is_bounded():
+    """Points of a hyperboloid ``x^2 + y^2 - z^2 = 1``: the fit would be this, or a cylinder."""
+    phi, z = np.meshgrid(2 * np.pi * np.arange(12) / 12, np.linspace(-0.5, 0.5, 7))
+    r = np.sqrt(1 + z**2)
+    W = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1).reshape(-1, 3)
+    tilted, aligned = full_ellipsoid(W), axis_aligned_ellipsoid(W)
+    for surface in (tilted, aligned):
+        assert surface.flag == FitFlag.BOUNDED
+        assert FAR * 0.5 * 0.99 < surface.semi_axes[2] < FAR * 2
+    fit = convex_quartic(W, gamma=0)
+    assert fit.flag & FitFlag.BOUNDED
+    assert fit.surface.semi_axes[2] < 2 * FAR
+
+
+@pytest.mark.parametrize(
+    ("W", "T", "message"),
+    [
+        (np.zeros((5, 3)), None, "all wrenches are zero"),
+        ([[1.0, np.nan, 0.0]], None, r"W\[0\] is not finite"),
+        (np.empty((0, 3)), None, "W has shape"),
+        (np.eye(3), np.eye(3)[:2], "every wrench needs its motion"),
+        (np.eye(3), 2 * np.eye(3), r"T\[0\] has length 2"),
+        (np.eye(3), None, "weighs the directions"),
+    ],
+)
+def test_samples_that_cannot_be_fitted_are_refused(W, T, message):
+    with pytest.raises(ValueError, match=message):
+        convex_quartic(W, T, gamma=0.0 if T is None and "weighs" not in message else 1.0)
+
+
+def test_a_programme_that_is_not_solved_is_an_error():
+    """``x >= 1`` and the slope to minus infinity: there is no least value."""
+    _, triangle = quadratic_parts(2)
+    with pytest.raises(FitError, match="Clarabel stopped with"):
+        least_in_cone(np.zeros((3, 3)), np.ones(3), triangle, 1.0)
+
+
+@pytest.mark.parametrize("d", [1, 2, 4])
+def test_quartics_of_other_dimensions_are_certified(d):
+    W = directions(d, 60)
+    W = W * (1 + 0.3 * np.sin(5 * W).sum(axis=1, keepdims=True)) * np.arange(1, d + 1)
+    fit = convex_quartic(W, gamma=0)
+    assert fit.certificate.gram_eigenvalue > 0
+    a, b = (u * fit.surface.radius(u)[:, None] for u in np.random.default_rng(d).normal(size=(2, 300, d)))
+    assert fit.surface.holds((a + b) / 2).all()
+
+
+def exact(patch, rho=2.0, count=4000):
+    S = friction_limits(patch, 1.0).S
+
+    def wrench(t):
+        return normalised_samples(friction_wrench(patch, t / [1, 1, rho], 1.0), t / [1, 1, rho], S, rho)[0]
+
+    return ExactSurface(wrench, count=count)
+
+
+def test_the_exact_surface_has_the_measures_of_its_samples():
+    patch = disc_polar(1, 20, 48)
+    body = exact(patch)
+    limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
+    np.testing.assert_allclose(body.semi_axes, limits, rtol=1e-12)
+    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
+    finer = body_volume(samples(patch, 4000)[0], samples(patch, 16000)[0])
+    assert body.volume == pytest.approx(finer, abs=3 * body.volume_error)
+    assert body.volume_error < 1e-4 * body.volume
+    W, T = samples(patch, 150)
+    assert body.holds(0.998 * W).all()
+    assert not body.holds(1.0001 * W).any()
+    np.testing.assert_allclose(misfit(body, W, T), 0, atol=1.5)
+    assert misfit(body, W, T).Erad < 1e-3
+    other = body.scaled([3.0, 3.0, 0.5])
+    assert other.volume == pytest.approx(4.5 * body.volume, rel=1e-3)
+    np.testing.assert_allclose(other.semi_axes, body.semi_axes * [3, 3, 0.5], rtol=1e-12)
+    assert other.holds(0.998 * W * [3, 3, 0.5]).all()
+
+
+def test_the_exact_surface_of_one_face_is_flat():
+    body = exact(points_patch([[0, 0]], [2.0]), count=500)
+    assert (body.rank, body.volume, body.volume_error) == (2, 0, 0)
+    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
+    assert body.holds([[0.7, 0.7, 0.0], [0.7, 0.7, 0.01], [0.8, 0.7, 0.0]]).tolist() == [True, False, False]

@@ -1,0 +1,71 @@
+"""Homogeneous forms: monomials, derivatives, substitution."""
+
+import numpy as np
+import pytest
+
+from lsfit.form import (
+    derivative,
+    exponents,
+    hessian_tensor,
+    monomial_gradients,
+    monomial_hessians,
+    monomials,
+    substitute,
+)
+
+RANDOM = np.random.default_rng(3)
+
+
+@pytest.mark.parametrize(
+    ("d", "degree", "count"), [(1, 4, 1), (2, 4, 5), (3, 2, 6), (3, 4, 15), (6, 2, 21), (6, 4, 126)]
+)
+def test_there_are_as_many_monomials_as_ways_to_share_the_degree(d, degree, count):
+    E = exponents(d, degree)
+    assert E.shape == (count, d)
+    assert (E.sum(axis=1) == degree).all()
+    assert len(np.unique(E, axis=0)) == count
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_monomials_are_products_of_powers(d):
+    E, w = exponents(d, 4), RANDOM.normal(size=(7, d))
+    np.testing.assert_allclose(monomials(w, E), np.prod(w[:, None] ** E, axis=2), rtol=1e-13)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_derivatives_match_differences(d):
+    E, w, step = exponents(d, 4), RANDOM.normal(size=(4, d)), 1e-5
+    G, H = monomial_gradients(w, E), monomial_hessians(w, E)
+    for i, e in enumerate(step * np.eye(d)):
+        np.testing.assert_allclose(
+            G[:, :, i], (monomials(w + e, E) - monomials(w - e, E)) / (2 * step), rtol=1e-7, atol=1e-7
+        )
+        slope = (monomial_gradients(w + e, E) - monomial_gradients(w - e, E)) / (2 * step)
+        np.testing.assert_allclose(H[:, :, i], slope, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("d", [2, 3, 6])
+def test_derivative_matrices_and_the_tensor_say_the_same(d):
+    E, w = exponents(d, 4), RANDOM.normal(size=(5, d))
+    c = RANDOM.normal(size=len(E))
+    slope = np.stack([monomials(w, exponents(d, 3)) @ D @ c for D in derivative(d, 4)], axis=1)
+    np.testing.assert_allclose(slope, np.einsum("mki,k->mi", monomial_gradients(w, E), c), rtol=1e-11)
+    H = np.einsum("ijkl,mk,ml->mij", hessian_tensor(c, d), w, w)
+    np.testing.assert_allclose(H, np.einsum("mkij,k->mij", monomial_hessians(w, E), c), rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("d", [1, 3, 6])
+def test_euler(d):
+    """A form of degree 4: ``w . grad P = 4 P`` and ``w' H w = 12 P``."""
+    E, w = exponents(d, 4), RANDOM.normal(size=(5, d))
+    c = RANDOM.normal(size=len(E))
+    P = monomials(w, E) @ c
+    np.testing.assert_allclose(np.einsum("mki,mi,k->m", monomial_gradients(w, E), w, c), 4 * P, rtol=1e-10)
+    np.testing.assert_allclose(np.einsum("mkij,mi,mj,k->m", monomial_hessians(w, E), w, w, c), 12 * P, rtol=1e-10)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_substitution_is_composition(d):
+    E, w, L = exponents(d, 4), RANDOM.normal(size=(5, d)), RANDOM.normal(size=(d, d))
+    c = RANDOM.normal(size=len(E))
+    np.testing.assert_allclose(monomials(w, E) @ substitute(c, E, L), monomials(w @ L.T, E) @ c, rtol=1e-8, atol=1e-10)

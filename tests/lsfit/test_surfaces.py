@@ -1,0 +1,244 @@
+"""What all limit surfaces promise, checked on every kind: geometry against closed forms, and properties."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lsfit.ellipsoid import Ellipsoid
+from lsfit.flag import FitError, FitFlag
+from lsfit.form import exponents, monomials
+from lsfit.geometry import ball_integral, directions, shadow_area, sphere_rule, supported_shadow
+from lsfit.misfit import misfit
+from lsfit.quartic import Quartic
+from lsfit.surface import Image
+from lsfit.tilted import TiltedEllipsoid
+
+AXES = np.array([1.0, 0.7, 0.1])
+E = exponents(3, 4)
+
+
+def coefficients(P, d=3):
+    """Coefficients of a quartic given as a function."""
+    u = np.random.default_rng(0).normal(size=(8 * len(exponents(d, 4)), d))
+    return np.linalg.lstsq(monomials(u, exponents(d, 4)), P(u), rcond=None)[0]
+
+
+def tilted_matrix(seed=1):
+    F = np.random.default_rng(seed).normal(size=(3, 3))
+    return F @ F.T + 0.05 * np.eye(3)
+
+
+def squared(A):
+    """The ellipsoid as a quartic, ``(w' A w)^2``."""
+    return Quartic(coefficients(lambda w: np.einsum("mi,ij,mj->m", w, A, w) ** 2, len(A)), exponents(len(A), 4))
+
+
+def fourth_powers(axes=AXES):
+    """``sum (w_i / a_i)^4``: flat where it meets the axes, so that its second derivative is singular there."""
+    return Quartic(np.sum([(4 * np.eye(3)[i] == E).all(axis=1) / axes[i] ** 4 for i in range(3)], axis=0), E)
+
+
+def rounded_box():
+    return Quartic(fourth_powers().coefficients + squared(tilted_matrix()).coefficients, E)
+
+
+SURFACES = {
+    "ellipsoid": Ellipsoid(AXES),
+    "tilted": TiltedEllipsoid(tilted_matrix()),
+    "squared": squared(tilted_matrix()),
+    "fourth powers": fourth_powers(),
+    "rounded box": rounded_box(),
+    "image": Image(rounded_box(), np.random.default_rng(5).normal(size=(3, 3))),
+}
+FLAT = {
+    "ellipsoid": Ellipsoid([1.0, 0.0, 0.2]),
+    "tilted": TiltedEllipsoid.of_ball([[1.0, 0.0], [0.2, 0.0], [0.0, 0.3]]),
+    "image": Image(squared(np.diag([1.0, 2.0])), np.array([[1.0, 0.3], [0.5, 1.0], [0.1, 0.0]])),
+}
+every = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
+every_flat = pytest.mark.parametrize("surface", FLAT.values(), ids=FLAT)
+
+
+@every
+def test_points_on_the_surface_are_on_it(surface):
+    u = np.random.default_rng(0).normal(size=(40, 3))
+    w = u * surface.radius(u)[:, None]
+    np.testing.assert_allclose(surface.value(w), 1, rtol=1e-12)
+    assert surface.holds(w).all()
+    assert surface.holds((1 - 1e-9) * w).all()
+    assert not surface.holds((1 + 1e-9) * w).any()
+
+
+@every
+def test_the_gradient_is_the_derivative_of_the_value(surface):
+    u = np.random.default_rng(1).normal(size=(20, 3))
+    w, h = u * surface.radius(u)[:, None], 1e-6
+    slope = np.stack([(surface.value(w + e) - surface.value(w - e)) / (2 * h) for e in h * np.eye(3)], axis=1)
+    np.testing.assert_allclose(surface.gradient(w), slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+
+
+@every
+def test_the_support_is_what_the_point_with_that_normal_gives(surface):
+    u = np.random.default_rng(2).normal(size=(60, 3))
+    w = u * surface.radius(u)[:, None]
+    t = surface.gradient(w)
+    # Homogeneous: w . grad P = degree at the surface, where the gradient is the outward normal.
+    np.testing.assert_allclose(surface.support(t), surface.degree, rtol=1e-11)
+    t = np.random.default_rng(3).normal(size=(30, 3))
+    reached = (t @ w.T).max(axis=1)
+    assert (reached <= surface.support(t) * (1 + 1e-12)).all()
+    np.testing.assert_allclose(surface.support(-2 * t), 2 * surface.support(t), rtol=1e-12)
+    assert surface.support([[0.0, 0.0, 0.0]])[0] == 0
+
+
+@every
+def test_chords_stay_inside(surface):
+    u, v = np.random.default_rng(4).normal(size=(2, 200, 3))
+    a, b = u * surface.radius(u)[:, None], v * surface.radius(v)[:, None]
+    assert surface.holds(0.3 * a + 0.7 * b).all()
+
+
+@every
+def test_another_unit_changes_nothing_but_the_numbers(surface):
+    factors = np.array([3.0, 3.0, 0.02])
+    t = np.random.default_rng(6).normal(size=(10, 3))
+    other = surface.scaled(factors)
+    np.testing.assert_allclose(other.support(t), surface.support(t * factors), rtol=1e-11)
+    np.testing.assert_allclose(other.value(t * factors), surface.value(t), rtol=1e-11)
+    assert other.volume == pytest.approx(surface.volume * factors.prod(), rel=1e-10)
+    assert other.shadow_area == pytest.approx(surface.shadow_area * 9, rel=1e-10)
+    np.testing.assert_allclose(other.semi_axes, factors * surface.semi_axes, rtol=1e-11)
+    with pytest.raises(ValueError, match="factors is"):
+        surface.scaled([1.0, 0.0, 1.0])
+
+
+@every
+def test_the_shadow_from_supports_is_the_same(surface):
+    if surface is not SURFACES["fourth powers"]:  # its support has kinks in the curvature
+        assert supported_shadow(surface.support, 3) == pytest.approx(surface.shadow_area, rel=1e-8)
+
+
+@every
+def test_the_volume_from_random_points(surface):
+    """A box around the body holds a share of points in it; 3 standard deviations."""
+    box, n = surface.semi_axes, 40_000
+    w = np.random.default_rng(7).uniform(-1, 1, size=(n, 3)) * box
+    share = surface.holds(w).mean()
+    error = 3 * math.sqrt(share * (1 - share) / n)
+    assert surface.volume / (8 * box.prod()) == pytest.approx(share, abs=error)
+
+
+def test_an_ellipsoid_is_the_same_in_every_form():
+    A = tilted_matrix()
+    t, inverse = np.random.default_rng(8).normal(size=(100, 3)), np.linalg.inv(A)
+    for surface in (TiltedEllipsoid(A), squared(A)):
+        np.testing.assert_allclose(surface.support(t), np.sqrt(np.einsum("mi,ij,mj->m", t, inverse, t)), rtol=1e-11)
+        assert surface.volume == pytest.approx(4 / 3 * math.pi / math.sqrt(np.linalg.det(A)), rel=1e-12)
+        assert surface.shadow_area == pytest.approx(math.pi * math.sqrt(np.linalg.det(inverse[:2, :2])), rel=1e-12)
+        np.testing.assert_allclose(surface.semi_axes, np.sqrt(inverse.diagonal()), rtol=1e-11)
+    np.testing.assert_allclose(TiltedEllipsoid(np.diag(AXES**-2)).support(t), Ellipsoid(AXES).support(t), rtol=1e-13)
+
+
+def test_fourth_powers_have_a_closed_form():
+    """Support: the dual norm, of power 4/3; volume ``8 gamma(5/4)^3 / gamma(7/4)``, ``4 gamma(5/4)^2 / gamma(3/2)``."""
+    surface = fourth_powers()
+    t = np.vstack([np.random.default_rng(9).normal(size=(100, 3)), np.eye(3), [[1, 1, 0], [1, 0, 10], [1, 1e-8, 0]]])
+    np.testing.assert_allclose(surface.support(t), (np.abs(t * AXES) ** (4 / 3)).sum(axis=1) ** 0.75, rtol=1e-11)
+    volume = 8 * math.gamma(1.25) ** 3 / math.gamma(1.75) * AXES.prod()
+    assert surface.volume == pytest.approx(volume, rel=1e-12)
+    assert surface.shadow_area == pytest.approx(4 * math.gamma(1.25) ** 2 / math.gamma(1.5) * 0.7, rel=1e-12)
+
+
+@pytest.mark.parametrize("spread", [1e-2, 1e-4])
+def test_thin_bodies_keep_their_digits(spread):
+    axes = np.array([1.0, 1.0, spread])
+    surface = fourth_powers(axes)
+    assert surface.semi_axes == pytest.approx(axes, rel=1e-11)
+    assert surface.volume == pytest.approx(fourth_powers(np.ones(3)).volume * spread, rel=1e-11)
+
+
+@pytest.mark.parametrize(("d", "rel"), [(1, 1e-14), (2, 1e-12), (4, 1e-6), (5, 1e-4)])
+def test_volumes_in_other_dimensions(d, rel):
+    """``prod 2 gamma(5/4) / gamma(1 + d/4)`` for the sum of fourth powers."""
+    volume = ball_integral(lambda u: (u**4).sum(axis=1), d, 4)
+    assert volume == pytest.approx((2 * math.gamma(1.25)) ** d / math.gamma(1 + d / 4), rel=rel)
+
+
+def test_the_sphere_rule_integrates_squares():
+    u, weight = sphere_rule(3, 6)
+    np.testing.assert_allclose(u.T * weight @ u, 4 * math.pi / 3 * np.eye(3), atol=1e-13)
+
+
+@every_flat
+def test_flat_bodies_carry_nothing_across_and_are_nowhere_infinite(surface):
+    assert (surface.rank, surface.volume) == (2, 0)
+    across = np.linalg.svd(surface.span.T)[2][2]
+    assert surface.support(across)[0] == pytest.approx(0, abs=1e-15)
+    t = np.random.default_rng(10).normal(size=(30, 3))
+    assert np.isfinite(surface.support(t)).all()
+    assert np.isfinite(surface.gradient(t)).all()
+    inside = t @ surface.span @ surface.span.T
+    w = inside * surface.radius(inside)[:, None]
+    np.testing.assert_allclose(surface.value(w), 1, rtol=1e-10)
+    assert not surface.holds(0.1 * w + 1e-6 * across).any()
+    assert surface.holds(0.1 * w).all()
+    phi = 2 * np.pi * np.arange(4096) / 4096
+    h = surface.support(np.column_stack([np.cos(phi), np.sin(phi), 0 * phi]))
+    assert surface.shadow_area == pytest.approx(shadow_area(h), abs=2e-3)  # a segment has corners
+
+
+@every_flat
+def test_errors_of_flat_bodies_are_numbers(surface):
+    """Any motion across is normal to a flat body; the angle counts only the part within."""
+    u = np.random.default_rng(11).normal(size=(40, 3)) @ surface.span @ surface.span.T
+    w = u * surface.radius(u)[:, None]
+    t = surface.gradient(w)
+    t = t / np.linalg.norm(t, axis=1, keepdims=True) + np.linalg.svd(surface.span.T)[2][2]
+    errors = misfit(surface, w, t / np.linalg.norm(t, axis=1, keepdims=True))
+    np.testing.assert_allclose(errors, 0, atol=1e-8)
+    off = misfit(surface, w + np.array([0.1, 0.2, 0.3]), t / np.linalg.norm(t, axis=1, keepdims=True))
+    assert not np.isnan(off).any()
+    assert off.Erad == pytest.approx(1)
+
+
+def test_an_unbounded_quartic_is_refused():
+    flat = Quartic(coefficients(lambda w: (w[:, 0] ** 2 + w[:, 1] ** 2) ** 2), E)
+    for measure in ("volume", "semi_axes", "shadow_area"):
+        with pytest.raises(FitError, match=r"P is .* along"):
+            getattr(flat, measure)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Quartic(np.ones(14), E), "expected 15 finite numbers"),
+        (lambda: Quartic(np.ones(6), exponents(3, 2)), "sum 4"),
+        (lambda: Quartic(np.full(15, np.nan), E), "finite"),
+        (lambda: TiltedEllipsoid(np.diag([1.0, 1.0, -1.0])), "positive"),
+        (lambda: TiltedEllipsoid([[1.0, 2.0], [2.0, 1.0]]), "all positive"),
+        (lambda: TiltedEllipsoid([[1.0, 0.5], [0.0, 1.0]]), "not symmetric"),
+        (lambda: Image(fourth_powers(), np.ones((3, 3))), "depend on each other"),
+        (lambda: Image(fourth_powers(), np.ones((3, 2))), "expected finite numbers"),
+        (lambda: fourth_powers().value([1.0, 2.0]), "vectors of shape"),
+    ],
+)
+def test_what_is_no_surface_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_monomials_in_any_order_make_the_same_quartic():
+    shuffled, w = np.random.default_rng(12).permutation(15), directions(3, 10)
+    c = np.arange(15.0)
+    np.testing.assert_allclose(Quartic(c[shuffled], E[shuffled]).value(w), Quartic(c, E).value(w), rtol=1e-13)
+
+
+def test_flags_travel_with_the_surface():
+    for surface in (
+        Ellipsoid(AXES, FitFlag.BOUNDED),
+        TiltedEllipsoid(np.eye(3), flag=FitFlag.BOUNDED),
+        Quartic(fourth_powers().coefficients, E, FitFlag.BOUNDED),
+        Image(fourth_powers(), np.eye(3), FitFlag.BOUNDED),
+    ):
+        assert surface.scaled([1.0, 1.0, 2.0]).flag == FitFlag.BOUNDED
