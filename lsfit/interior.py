@@ -1,7 +1,8 @@
 """Interior-point method for a convex quadratic under one linear matrix inequality.
 
-A general conic solver treats the Gram matrix of a six-dimensional quartic as 666 rows of a sparse system. Here the
-matrix is written by its unknowns, so each step factorises one dense system of their number (351): some 15 times faster.
+The matrix is written by its unknowns, so each step factorises one dense system of their number (351 for the Gram matrix
+of a quartic in six dimensions). That takes about two thirds of Clarabel's time for the same programme; and every
+iterate lies strictly inside the cone, so the Gram matrix that comes out is positive definite as it is.
 """
 
 from __future__ import annotations
@@ -34,7 +35,13 @@ class Optimum(NamedTuple):
 
 
 def least_quadratic(
-    H: FloatArray, g: FloatArray, A: csr_array, x: FloatArray, tolerance: float = 1e-9, most: int = 60
+    H: FloatArray,
+    g: FloatArray,
+    A: csr_array,
+    x: FloatArray,
+    tolerance: float = 1e-9,
+    enough: float = 1e-5,
+    most: int = 60,
 ) -> Optimum:
     """Minimiser of ``x' H x / 2 - g' x`` among the ``x`` whose matrix ``X = mat(A x)`` is positive semidefinite.
 
@@ -52,14 +59,16 @@ def least_quadratic(
     x : (n,) array
         Start with a positive definite matrix.
     tolerance : float
-        Gap and dual residual at the end, as shares of ``1 + |objective|`` and ``1 + max |g|``.
+        Gap and dual residual to reach, as shares of ``1 + |objective|`` and ``1 + max |g|``.
+    enough : float
+        The same, accepted where rounding ends the steps before that; the optimum states what was reached.
     most : int
         Largest number of steps.
 
     Raises
     ------
     FitError
-        If the steps do not converge.
+        If the steps end before that.
     """
     X = _matrix(A, x)
     Z = np.eye(len(X)) * max(1.0, float(np.abs(g).max())) / len(X)
@@ -68,19 +77,23 @@ def least_quadratic(
         slope = H @ x - g - AT @ Z.ravel()
         objective, gap = float(x @ (H @ x) / 2 - g @ x), float((X * Z).sum())
         residual = float(np.abs(slope).max() / (1 + np.abs(g).max()))
-        if gap <= tolerance * (1 + abs(objective)) and residual <= tolerance:
-            return Optimum(x, X, objective, gap, residual, step)
+        worst = max(gap / (1 + abs(objective)), residual)
+        best = Optimum(x, X, objective, gap, residual, step)
+        if worst <= tolerance:
+            return best
         try:
             dx, dX, dZ = _direction(H, A, AT, X, Z, slope)
+            # One length for both: the quadratic couples the residual of the dual equation to the step of x.
+            length = min(1.0, 0.95 * min(_reach(X, dX), _reach(Z, dZ)))
         except np.linalg.LinAlgError:
             break
-        # One length for both: the quadratic couples the residual of the dual equation to the step of x.
-        length = min(1.0, 0.95 * min(_reach(X, dX), _reach(Z, dZ)))
         x, Z = x + length * dx, Z + length * dZ
         X = _matrix(A, x)
+    if worst <= enough:
+        return best
     raise FitError(
-        f"the search stopped after {step + 1} steps with gap {gap:.1e} and dual residual {residual:.1e}: "
-        f"scale the data to about one, add a ridge, or allow a larger tolerance than {tolerance:.0e}"
+        f"the search ended after {step + 1} steps with gap {gap:.1e} and dual residual {residual:.1e}: scale the data "
+        f"to about one, whiten them, or add a ridge"
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsfit.ellipsoid import full_ellipsoid
+from lsfit.flag import FitError, FitFlag
 from lsfit.form import exponents, monomial_gradients, monomials
 from lsfit.gram import GramCertificate, ball_gram, gram_certificate, gram_map
 from lsfit.interior import least_quadratic
@@ -97,7 +98,9 @@ def span_quartic(
     """
     samples = span_samples(W, T, scaling)
     H, g = _normal_equations(samples, gamma, ridge)
-    return _fit(Quartic(np.linalg.lstsq(H, g, rcond=None)[0], exponents(samples.rank, 4)), samples, check=False)
+    size = np.sqrt(H.diagonal())  # monomials of one size keep the digits of small components
+    v = np.linalg.lstsq(H / np.outer(size, size), g / size, rcond=1e-15)[0] / size
+    return _fit(Quartic(v, exponents(samples.rank, 4), _held(H)), samples, check=False)
 
 
 def convex_span_quartic(
@@ -123,7 +126,7 @@ def convex_span_quartic(
     CollapsedFitError
         If the surface runs away from the samples.
     FitError
-        If the solver does not converge.
+        If the solver does not converge, or the Gram matrix proves nothing.
     """
     samples = span_samples(W, T, scaling)
     E = exponents(samples.rank, 4)
@@ -132,9 +135,14 @@ def convex_span_quartic(
     n = A.shape[1]
     start *= (g @ start[:k]) / (start[:k] @ H @ start[:k])
     best = least_quadratic(np.pad(H, (0, n - k)), np.pad(g, (0, n - k)), A, start)
-    surface = Quartic(best.x[:k], E)
-    fit = _fit(surface, samples)
-    return fit._replace(certificate=gram_certificate(best.X, surface.tensor, best.gap / (1 + abs(best.objective))))
+    surface = Quartic(best.x[:k], E, _held(H))
+    certificate = gram_certificate(best.X, surface.tensor, best.gap / (1 + abs(best.objective)))
+    if not certificate.proves_convexity:
+        raise FitError(
+            f"the Gram matrix has the eigenvalues {certificate.smallest:.1e} to {certificate.largest:.1e}, which "
+            'proves nothing: choose the scaling "whitened", or add a ridge'
+        )
+    return _fit(surface, samples)._replace(certificate=certificate)
 
 
 def _normal_equations(samples: SpanSamples, gamma: float, ridge: float) -> tuple[FloatArray, FloatArray]:
@@ -150,6 +158,13 @@ def _normal_equations(samples: SpanSamples, gamma: float, ridge: float) -> tuple
         across = (G - along[:, :, None] * T[:, None, :]).transpose(0, 2, 1).reshape(-1, len(E))
         H += gamma * across.T @ across
     return H, M.sum(axis=0)
+
+
+def _held(H: FloatArray) -> FitFlag:
+    """Whether the normal equations determine every coefficient, all monomials made one size."""
+    size = np.sqrt(H.diagonal())
+    values = np.linalg.eigvalsh(H / np.outer(size, size))
+    return FitFlag.CLEAN if values[0] > 1e-14 * values[-1] else FitFlag.UNDERDETERMINED
 
 
 def _fit(surface: LimitSurface, samples: SpanSamples, check: bool = True) -> SpanFit:
