@@ -56,7 +56,9 @@ def cone_programme(
     return x, z
 
 
-def _step(cost, G, missing, y, z):
+def _step(
+    cost: FloatArray, G: FloatArray, missing: FloatArray, y: FloatArray, z: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Steps of x, y and z, and which programmes they are good for."""
     with np.errstate(all="ignore"):
         v, beta = _scaling(y, z)
@@ -74,7 +76,7 @@ def _step(cost, G, missing, y, z):
 
         first = np.linalg.solve(R.swapaxes(1, 2), off[..., None])[..., 0]
 
-        def solve(q):
+        def solve(q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
             right = first - np.einsum("miad,mia->md", Q, q - missing)
             dz = np.einsum("miad,md->mia", Q, right) + q - missing
             return np.linalg.solve(R, right[..., None])[..., 0], q - dz, dz

@@ -28,6 +28,7 @@ from scoring.reach import reach
 FloatArray = NDArray[np.float64]
 
 _SMALLEST = 1e-9  # relative to the largest wrench of a contact: what counts as no wrench
+_ABSOLUTE = 1e-6
 _ROUNDS, _STARTS, _SPLITS = 12, 40, 16
 
 
@@ -60,7 +61,7 @@ def epsilon(
     kind : str
         "linf": every normal force is at most one; "l1": their sum is.
     tolerance : float
-        Relative gap of the bounds to work for.
+        Relative gap of the bounds to work for; an absolute one of 1e-6 is enough too.
 
     Notes
     -----
@@ -115,7 +116,7 @@ def _between(c: FloatArray, D: FloatArray, kind: str, tolerance: float) -> tuple
     upper, u = _weakest(c, D, proofs[0].directions, kind, proofs[0].radius * (1 + tolerance / 10))
     for _ in range(_SPLITS):
         first = min(proofs, key=lambda proof: proof.radius)
-        if upper <= first.radius * (1 + tolerance):
+        if upper <= first.radius * (1 + tolerance) + _ABSOLUTE:
             break
         if len(proofs) == 1:
             many = np.random.default_rng(0).normal(size=(_STARTS, 6))

@@ -152,7 +152,7 @@ class _Programme:
         g[self.matrices] -= np.einsum("pkii->pk", P).real
         flat = P.reshape(-1, 16, 16), P.swapaxes(2, 3).reshape(-1, 16, 16)
         _add(H, self.matrices, (flat[0] @ flat[1].swapaxes(1, 2)).real)
-        size = 1 / np.sqrt(np.diag(H))
+        size = 1 / np.sqrt(np.abs(np.diag(H)))
         step = -size * np.linalg.solve(H * size[:, None] * size + 1e-14 * np.eye(m), size * g)
         return step, float(-g @ step)
 

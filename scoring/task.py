@@ -180,7 +180,8 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     if small_w and np.linalg.norm(off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum():
         C, w = U.T @ C, U.T @ w
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
-        return max(-back.lower, 0.0), forth._replace(u=U @ forth.u)
+        lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
+        return lowest, forth._replace(u=U @ forth.u)
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
     s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
     rest = s * w - b
