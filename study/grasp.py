@@ -1,42 +1,108 @@
-"""Score of the grasp by both contacts: in closed form where they face each other, by integration elsewhere."""
+"""Score of the grasp by both contacts: in closed form where they face each other, exactly in any pose elsewhere."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from lsfit.quartic import Quartic
+from lsfit.surface import LimitSurface
+from scoring.contact import SoftContact
+from scoring.epsilon_search import epsilon
+from scoring.pose import pose_volume
 from scoring.score import score
 from scoring.volume import volume_linf
-from study.contact import Contact
+from study.contact import Contact, angles
 from study.limit_surface import Bound
 from study.quantity import MODELS
 from study.scene import Scene
+
+FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
+ROUGH = 0.05  # difference of divisions at which a quartic's volume ends; extrapolated it is good to some 1e-3
+NEAR = 1e-2  # relative gap between the bounds of epsilon
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Distance of the contacts, and the lengths by which arms and torques about the normals are divided [m]."""
+
+    distance: float
+    arms: float
+    torques: float
+
+
+def lengths(scene: Scene, obj: Any, contacts: Sequence[Contact]) -> Lengths:
+    """The lengths of a grasp, as the scene's ``[score]`` and the object give them."""
+    arms = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
+    torques = scene.score.contact_length or scene.gripper.pad_length
+    if scene.score.torque_scale == "object":
+        torques = arms
+    return Lengths(float(np.linalg.norm(contacts[1].origin - contacts[0].origin)), arms, torques)
 
 
 def grasp_values(
     scene: Scene, obj: Any, contacts: Sequence[Contact], bounds: Sequence[Mapping[str, Bound]]
 ) -> tuple[dict[str, Any], int]:
     """Maps of the grasp's quality, one value for each friction model, and the flag of the score."""
-    object_length = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
-    contact_length = scene.score.contact_length or scene.gripper.pad_length
-    if scene.score.torque_scale == "object":
-        contact_length = object_length
-    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
+    size = lengths(scene, obj, contacts)
+    facing = max(angles(*contacts)) <= FACING
     found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
-    flag = 0
+    tilt = math.nan  # what the pose makes of the closed form, for quartics
     for m in MODELS:
-        one, two = (c.ellipsoids[m].semi_axes for c in contacts)
-        exact = score(one, two, distance, object_length, contact_length)
-        sizes = [size for own in bounds for size in _volume_and_shadow(own[m], scene.friction.mu, contact_length)]
-        found["quality"].append(exact.quality)
-        found["quality_fitted"].append(volume_linf(*sizes, distance / object_length))
-        found["epsilon"].append(exact.epsilon)
-        flag |= int(exact.flag) * (m == MODELS[0])
-    return {f"maps/{name}": values for name, values in found.items()}, flag
+        ellipsoids = [c.ellipsoids[m] for c in contacts]
+        closed = score(*(e.semi_axes for e in ellipsoids), size.distance, size.arms, size.torques)
+        own = [finger[m] for finger in bounds]
+        both = _closed_form(own, scene.friction.mu, size)
+        if facing or closed.quality == 0:
+            found["quality"].append(closed.quality)
+            found["quality_fitted"].append(both)
+            found["epsilon"].append(closed.epsilon)
+            continue
+        found["quality"].append(_volume(contacts, ellipsoids, size))
+        fitted = _bodies(own, scene.friction.mu)
+        if not all(isinstance(body, Quartic) for body in fitted):
+            both = _volume(contacts, fitted, size)
+        elif math.isnan(tilt):  # the curved model comes first; the planar ones are of nearly the same shape
+            both, flat = _volume(contacts, fitted, size), both
+            tilt = both / flat
+        else:
+            both *= tilt
+        found["quality_fitted"].append(both)
+        search = scene.score.epsilon == "everywhere"
+        found["epsilon"].append(_epsilon(contacts, ellipsoids, size) if search else math.nan)
+    flag = score(*(c.ellipsoids[MODELS[0]].semi_axes for c in contacts), size.distance, size.arms, size.torques).flag
+    return {f"maps/{name}": values for name, values in found.items()}, int(flag)
 
 
-def _volume_and_shadow(bound: Bound, mu: float, contact_length: float) -> tuple[float, float]:
-    """Volume and shadow of a fitted surface in ``(f_x, f_y, tau_z / contact_length)`` per unit force."""
-    return mu**3 * bound.rho / contact_length * bound.surface.volume, mu**2 * bound.surface.shadow_area
+def _bodies(bounds: Sequence[Bound], mu: float) -> list[LimitSurface]:
+    """Fitted surfaces in ``(f_x, f_y, tau_z)`` per unit normal force."""
+    return [b.surface.scaled(mu * np.array([1.0, 1.0, b.rho])) for b in bounds]
+
+
+def _closed_form(bounds: Sequence[Bound], mu: float, size: Lengths) -> float:
+    """Volume of the grasp wrench space of two contacts that face each other, with the fitted surfaces."""
+    V = [mu**3 * b.rho / size.torques * b.surface.volume for b in bounds]
+    A = [mu**2 * b.surface.shadow_area for b in bounds]
+    return volume_linf(V[0], A[0], V[1], A[1], size.distance / size.arms)
+
+
+def _soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact]:
+    return [SoftContact(c.origin, c.axes, body) for c, body in zip(contacts, bodies, strict=True)]
+
+
+def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], size: Lengths) -> float:
+    """Volume of the grasp wrench space in any pose; 0 for a contact that carries no load in some direction."""
+    if any(body.rank < 3 for body in bodies):
+        return 0.0
+    error = ROUGH if any(body.degree == 4 for body in bodies) else 1e-5
+    return pose_volume(*_soft(contacts, bodies), size.arms, size.torques, relative_error=error).linf
+
+
+def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], size: Lengths) -> float:
+    """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
+    middle = 0.5 * (contacts[0].origin + contacts[1].origin)
+    return epsilon(_soft(contacts, bodies), size.arms, size.torques, middle, tolerance=NEAR).upper

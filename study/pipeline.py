@@ -27,6 +27,7 @@ from study.limit_surface import Bound, bound, surface_values
 from study.quantity import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
+from study.weight import safety_factors
 
 FloatArray = NDArray[np.float64]
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
@@ -141,6 +142,8 @@ def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, B
         values[f"maps/{key}"] = limits[key].min(axis=0)
     if scene.friction.cor_grid:
         values["fingers/cor_wrench"] = [_cor_wrenches(scene, c) for c in contacts]
+    if scene.object.mass is not None:
+        values["maps/safety_factor"] = safety_factors(scene, obj, contacts, bounds)
     values |= scores | surface_values(scene, contacts, bounds)
     return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
 

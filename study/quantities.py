@@ -28,7 +28,8 @@ MAPS = (
              " sum of pressure times area times the cosine between face normal and contact normal; of the weaker"
              " finger.", by_model=True),
     Quantity("epsilon", "", "largest-minimum resisted wrench", "Radius of the largest ball around the origin inside the"
-             " grasp wrench space.", by_model=True),
+             " grasp wrench space of quality, with torques about the midpoint of the contacts. NaN where the contacts"
+             " are more than 0.5 degrees from antipodal, unless score.epsilon is 'everywhere'.", by_model=True),
     Quantity("f_x_max", "N", "largest friction along x", "Total friction force along the contact frame's x axis when"
              " the pad slides along x, Eqs. (6)-(8); of the weaker finger.", by_model=True),
     Quantity("f_y_max", "N", "largest friction along y", "Total friction force along the contact frame's y axis when"
@@ -71,8 +72,9 @@ MAPS = (
                needs="two meshes")
       for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_projected")),
     Quantity("safety_factor", "", "weight held over weight", "How many times its own weight the object could have"
-             " before the grasp, with the normal force of this case on both fingers, lost it; limit surfaces as for"
-             " quality_fitted. Below 1 it cannot hold the object.", by_model=True, needs="mass"),
+             " before the grasp, with the normal force of this case on both fingers, lost it, with the hull of the"
+             " sampled wrenches as limit surface (on the safe side). Below 1 it cannot hold the object. The centre of"
+             " mass is that of [task], or the middle of the box round the object.", by_model=True, needs="mass"),
 )
 
 # Levels of each effect, cheapest first; effects/<name>_level holds the position in this list.

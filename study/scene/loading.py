@@ -119,7 +119,7 @@ def _override(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(f"{key} = {value}")
     except ValueError:
-        if re.fullmatch(r"[A-Za-z_./][\w./ -]*", value):  # shells take the quotes away
+        if re.fullmatch(r"[A-Za-z_./][\w./ -]*|[36]-D", value):  # shells take the quotes away
             return tomllib.loads(f'{key} = "{value}"')
     raise OverrideError(
         f"the value {shown(value)}", "a value as in TOML", "write 0.8, [1, 2], true or '\"text\"'"

@@ -26,6 +26,10 @@ class Score(Section):
     contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
         "auto", description="length that scales soft torques; auto is the pad's length"
     )
+    epsilon: Literal["facing", "everywhere"] = Field(
+        "facing",
+        description="where epsilon is computed: for contacts that face each other, or in any pose (some 0.1 s each)",
+    )
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 

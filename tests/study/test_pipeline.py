@@ -193,7 +193,7 @@ def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
 ])  # fmt: skip
 def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, length):
     """7/12 d^2 (V1 A2 + A1 V2): contacts with semi-axes f_x, f_y, tau_z / rho per unit force, arms over a length."""
-    for values in cases(OVAL, *overrides, angles="[30]"):
+    for values in cases(OVAL, *overrides, angles="[0]"):
         S = values["fingers/S"][:, None]
         f_x, f_y, tau = (values[f"fingers/{name}_max"] / S for name in ("f_x", "f_y", "tau_z"))
         V, A = 4 / 3 * np.pi * f_x * f_y * tau / rho, np.pi * f_x * f_y

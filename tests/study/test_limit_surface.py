@@ -1,0 +1,147 @@
+"""Limit surfaces, general poses and the task in the pipeline, on coarse meshes; judged by what each case stores."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from friction.motion import fibonacci_twists
+from friction.patch import ContactPatch
+from friction.wrench import friction_wrench
+from lsfit.form import exponents, monomials
+from scoring.contact import EllipsoidBody, SoftContact
+from scoring.pose import pose_volume
+from study.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME
+from study.quantity import MODELS
+from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
+
+WEIGHT = 9.80665
+
+
+def exact(result, f, model, count):
+    """Wrenches ``(f_x, f_y, tau_z / rho) / S`` of a finger for ``count`` motions, from the case's patch."""
+    values, patch = result.values, result.patch
+    R, origin = values["fingers/frame_axes"][f], values["fingers/frame_origin"][f]
+    local = ContactPatch(
+        (patch["centroid"][f] - origin) @ R.T, patch["area"][f], patch["normal"][f] @ R.T, patch["pressure"][f]
+    )
+    rho = values["limit_surface/rho"][f]
+    w = friction_wrench(local, fibonacci_twists(count, rho), 1.0, model)[:, [0, 1, 5]]
+    return w / values["fingers/S"][f] / [1, 1, rho]
+
+
+@pytest.mark.parametrize("angle", [0, 30])
+def test_stored_quartics_pass_the_wrenches_of_the_stored_patch_as_closely_as_their_misfit_says(angle):
+    [(_, ladder)] = solved(OVAL, angles=f"[{angle}]")
+    for result in ladder:
+        values = result.values
+        for f in range(2):
+            for m, model in enumerate(MODELS):
+                W = exact(result, f, model, INDEPENDENT)
+                P = monomials(W, exponents(3, 4)) @ values["limit_surface/coefficients"][f][m]
+                E1, radial, angle_error = values["limit_surface/misfit"][f][m]
+                assert np.abs(P - 1).mean() == pytest.approx(E1, rel=1e-6)
+                assert np.abs(P**-0.25 - 1).mean() == pytest.approx(radial, rel=1e-6)
+                assert 0 < angle_error < np.radians(10)
+                assert values["limit_surface/certificate"][f][m] in (AS_FITTED, PROGRAMME)
+                assert np.isnan(values["limit_surface/matrix"][f][m]).all()
+        curved = [values["limit_surface/misfit"][f][CURVED].Erad for f in range(2)]
+        assert values["maps/misfit"] == max(curved)
+        assert values["maps/misfit"] < 0.7 * values["maps/misfit_ellipsoid"]
+        # the ellipsoid from three motions lies outside of most of the true surface
+        assert (np.array(values["maps/quality_fitted"]) < np.array(values["maps/quality"])).all()
+        assert result.effects["limit_surface"][:2] == ("convex quartic", values["maps/misfit"])
+
+
+@pytest.mark.parametrize(("model", "objective"), [
+    ("three_motions", "least_squares"), ("axis_aligned", "least_squares"), ("full", "least_squares"), ("full", "zhou"),
+    ("quartic", "zhou"),
+])  # fmt: skip
+def test_every_model_and_objective_gives_a_surface_near_the_wrenches(model, objective):
+    choice = (f"limit_surface.model={model}", f"limit_surface.objective={objective}", "limit_surface.samples=100")
+    [(_, [result])] = solved(OVAL, *choice, forces="[5]")
+    values = result.values
+    assert 0 < values["maps/misfit"] < 0.03
+    if model == "quartic":
+        assert np.isfinite(values["limit_surface/coefficients"]).all()
+        assert (np.array(values["limit_surface/certificate"]) == PROGRAMME).all()
+        return
+    assert (np.array(values["limit_surface/certificate"]) == ELLIPSOID).all()
+    matrix = np.array(values["limit_surface/matrix"])
+    W = exact(result, 0, "curved", INDEPENDENT)
+    P = np.einsum("mi,ij,mj->m", W, matrix[0, CURVED], W)
+    assert np.abs(P**-0.5 - 1).mean() == pytest.approx(values["maps/misfit"], rel=1e-6)
+    if model == "three_motions":
+        assert values["maps/misfit"] == values["maps/misfit_ellipsoid"]
+        assert values["maps/quality_fitted"] == pytest.approx(values["maps/quality"], rel=1e-9)
+
+
+def test_sampled_wrenches_are_those_of_the_patch_times_mu():
+    [(_, [result])] = solved(OVAL, "limit_surface.wrench_samples=all", "limit_surface.samples=60", forces="[5]")
+    values = result.values
+    found = np.array(values["wrenches/wrench"])
+    assert found.shape == (2, 3, 60, 3)
+    for m, model in enumerate(MODELS):
+        unit = MU * values["fingers/S"][0] * np.array([1, 1, values["limit_surface/rho"][0]])
+        assert found[0, m] == pytest.approx(exact(result, 0, model, 60) * unit, rel=1e-9, abs=1e-12)
+    assert "wrenches/wrench" not in cases(OVAL)[0]
+
+
+def soft_contacts(values, m):
+    """Contacts with the ellipsoids from three motions, from what a case stores."""
+    for f in range(2):
+        R = values["fingers/pose_rotation"][f]
+        position = R @ values["fingers/frame_origin"][f] + values["fingers/pose_origin"][f]
+        body = EllipsoidBody(values["limit_surface/semi_axes"][f][m])
+        yield SoftContact(position, values["fingers/frame_axes"][f] @ R.T, body)
+
+
+def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand():
+    """The object's length is 120 mm, the pad's 50 mm; the closed form would be off by some percent."""
+    for values in cases(OVAL, angles="[30]"):
+        assert values["maps/misalignment"] > np.radians(5)
+        for m in range(len(MODELS)):
+            expected = pose_volume(*soft_contacts(values, m), 0.12, 0.05, relative_error=1e-6).linf
+            assert values["maps/quality"][m] == pytest.approx(expected, rel=1e-4)
+        assert np.isnan(values["maps/epsilon"]).all()
+    [near, far] = (cases(OVAL, angles=f"[{a}]")[1] for a in (0, 30))
+    gain = (
+        np.array(far["maps/quality_fitted"])
+        / far["maps/quality"]
+        / (np.array(near["maps/quality_fitted"]) / near["maps/quality"])
+    )
+    assert gain == pytest.approx(1.0, abs=0.05)
+
+
+def test_epsilon_in_any_pose_is_computed_on_demand():
+    [facing] = cases(OVAL, forces="[5]")
+    [askew] = cases(OVAL, "score.epsilon=everywhere", angles="[30]", forces="[5]")
+    assert (np.array(facing["maps/epsilon"]) > 0).all()
+    assert (np.array(askew["maps/epsilon"]) > 0).all()
+    assert (np.array(askew["maps/epsilon"]) < facing["maps/epsilon"]).all()
+
+
+@pytest.mark.parametrize(("shape", "rank"), [(PLATE, 3), (OVAL, 6)])
+def test_a_plane_contact_resists_three_directions_and_a_curved_one_six(shape, rank):
+    [(_, [result])] = solved(shape, "effects.wrench=6-D", "limit_surface.samples=60", forces="[5]")
+    values = result.values
+    assert values["limit_surface/rank_6d"] == [rank, rank]
+    A = values["limit_surface/matrix_6d"][0]
+    assert (np.linalg.eigvalsh(A) > 1e-9 * np.abs(A).max()).sum() == rank
+    assert values["limit_surface/misfit_6d"][0][1] < 0.05
+    level, dropped, _ = result.effects["wrench"]
+    assert level == "6-D"
+    assert (dropped > 1e-3) == (rank == 6)
+
+
+def test_the_safety_factor_is_friction_over_weight_where_the_weight_hangs_between_the_pads():
+    """Two pads hold mu F each along the plate; beside the centre of mass the weight turns the plate as well."""
+    mass = ("object.mass_g=500", "limit_surface.samples=100")
+    [above] = cases(PLATE, *mass, forces="[5]")
+    expected = 2 * MU * 5 / (0.5 * WEIGHT)
+    assert above["maps/safety_factor"] == pytest.approx([expected] * 3, rel=1e-3)
+    [beside] = cases(PLATE, *mass, "task.centre_of_mass_mm=[0, 30, 0]", forces="[5]")
+    assert 0 < beside["maps/safety_factor"][FLAT] < 0.9 * expected
+    [pulled] = cases(PLATE, *mass, "task.weight_direction=[1, 0, 0]", forces="[5]")  # onto one finger
+    assert pulled["maps/safety_factor"][CURVED] == pytest.approx(5 / (0.5 * WEIGHT), rel=1e-3)
+    assert "maps/safety_factor" not in cases(PLATE)[0]
