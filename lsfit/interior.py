@@ -1,7 +1,7 @@
 """Interior-point method for a convex quadratic under one linear matrix inequality.
 
 The matrix is written by its unknowns, so each step factorises one dense system of their number (351 for the Gram matrix
-of a quartic in six dimensions). That takes about two thirds of Clarabel's time for the same programme; and every
+of a quartic in six dimensions). That takes half to two thirds of Clarabel's time for the same programme; and every
 iterate lies strictly inside the cone, so the Gram matrix that comes out is positive definite as it is.
 """
 

@@ -25,7 +25,7 @@ from lsfit.flag import FitError
 from lsfit.form import exponents, monomial_gradients, monomials
 from lsfit.gram import gram_map, quadratic_map, upper_triangle
 from lsfit.quartic_surface import Quartic
-from lsfit.span import Scaling, SpanSamples, placed, refuse_runaway, span_samples
+from lsfit.span import FAR, CollapsedFitError, Scaling, SpanSamples, placed, refuse_runaway, span_samples
 from lsfit.surface import LimitSurface
 from lsfit.tilted import TiltedEllipsoid
 
@@ -42,6 +42,10 @@ class ZhouWeights(NamedTuple):
 
 SIX_WEIGHTS = ZhouWeights(1.0, 10.0, 1.0)
 """The weights that the paper's authors use for wrenches of six components."""
+
+
+ENOUGH = 1e-6
+"""Relative gap and residuals of the programme from which its solution is taken."""
 
 
 class ZhouFit(NamedTuple):
@@ -72,7 +76,9 @@ def zhou_quartic(
     W, T : (m, d) array
         Normalised wrenches and unit motions [-].
     weights : ZhouWeights
-        ``lam``, ``beta`` and ``gamma``, all 1 as published or `SIX_WEIGHTS`.
+        ``lam``, ``beta`` and ``gamma``, all 1 as published or `SIX_WEIGHTS`. With all 1 the errors of the gradients,
+        longer than those of ``P``, may be worth more than all of ``P - 1``: then no surface at all is best, which is
+        refused. A larger ``beta``, as in `SIX_WEIGHTS`, prevents it.
     s_min : float
         Least length of the gradients along the motions.
     scaling : str
@@ -106,7 +112,14 @@ def zhou_ellipsoid(
     A = quadratic_map(E)
     # The length of v is to be the Frobenius norm of A, which holds every mixed coefficient twice, halved.
     v, rates, objective = _solve(samples, M, G, A, np.sqrt((A.toarray() ** 2).sum(axis=0)), weights, s_min)
-    return _fit(TiltedEllipsoid((A @ v).reshape(samples.rank, samples.rank)), objective, rates, samples)
+    matrix = (A @ v).reshape(samples.rank, samples.rank)
+    smallest = float(np.linalg.eigvalsh(matrix)[0])
+    if smallest * (FAR * np.linalg.norm(samples.Y, axis=1).max()) ** 2 < 1:
+        raise CollapsedFitError(
+            f"the smallest eigenvalue of A is {smallest:.1e} (scaled coordinates): the ellipsoid reaches more than "
+            f"{FAR:.0f} times as far as the samples; sample more motions, lower lam, or raise beta"
+        )
+    return _fit(TiltedEllipsoid(matrix), objective, rates, samples)
 
 
 def _fit(surface: LimitSurface, objective: float, rates: FloatArray, samples: SpanSamples) -> ZhouFit:
@@ -171,9 +184,11 @@ def _clarabel(q: FloatArray, A: csc_array, b: FloatArray, cones: list) -> tuple[
     settings.verbose = False
     settings.max_threads = 1
     answer = clarabel.DefaultSolver(csc_array((len(q), len(q))), q, A, b, cones, settings).solve()
-    if answer.status != clarabel.SolverStatus.Solved:
+    # Nearly collapsed fits stop a few times short of Clarabel's own tolerance, 1e-8; what they reached decides.
+    short = max(answer.r_prim, answer.r_dual, abs(answer.obj_val - answer.obj_val_dual) / (1 + abs(answer.obj_val)))
+    if answer.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved) or not short < ENOUGH:
         raise FitError(
-            f"Clarabel ended with {answer.status} after {answer.iterations} iterations: scale the samples to about "
-            "one, or use a fit of least squares"
+            f"Clarabel ended with {answer.status} and errors of {short:.1e} after {answer.iterations} iterations: "
+            "scale the samples to about one, or use a fit of least squares"
         )
     return np.array(answer.x), float(answer.obj_val)
