@@ -70,8 +70,8 @@ def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
     Q = hessian_tensor(v, d).reshape(d * d, d * d)
     u = directions(d, 200 if d <= 3 else 1000)
     H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
-    u = u[np.argsort(lowest_eigenvalues(H))[:6]]
-    for _ in range(8):
+    u = u[np.argsort(lowest_eigenvalues(H))[:4]]
+    for _ in range(5):
         H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
         values, vectors = np.linalg.eigh(H)
         u, z = vectors[:, :, 0], u

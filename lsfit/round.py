@@ -16,7 +16,7 @@ from lsfit.samples import checked_motions, principal_frame
 from lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
-TILT = 1e3  # spread of a frame's directions from which coefficients in the wrench's own components lose digits
+TILT = 50.0  # spread of a frame's directions from which coefficients lose digits: its fourth power times rounding
 
 
 class RoundSamples(NamedTuple):
@@ -75,12 +75,14 @@ def residuals(samples: RoundSamples, beta: float, gamma: float) -> Residuals:
     T = samples.T
     if T is None:
         raise ValueError(f"gamma is {gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
-    d, k = samples.inverse.shape[1], M.shape[1]
-    D = np.einsum("ri,rck->cik", samples.inverse, derivative(r, 4)).reshape(-1, d * k)
-    G = (monomials(samples.Y, exponents(r, 3)) @ D).reshape(m, d, k)
-    G -= T[:, :, None] * (T[:, None, :] @ G)
-    G *= np.sqrt(gamma) * T.any(axis=1)[:, None, None]
-    return Residuals(np.vstack([M, G.reshape(m * d, k)]), np.concatenate([right, np.zeros(m * d)]), m)
+    d, k = T.shape[1], M.shape[1]
+    D = np.sqrt(gamma) * np.tensordot(samples.inverse, derivative(r, 4), axes=(0, 0))
+    G = monomials(samples.Y, exponents(r, 3)) @ D  # (d, m, k): one block for each component
+    across = T.T[:, :, None]
+    G -= across * (across * G).sum(axis=0)
+    if not (moving := T.any(axis=1)).all():
+        G[:, ~moving] = 0.0
+    return Residuals(np.vstack([M, G.reshape(d * m, k)]), np.concatenate([right, np.zeros(d * m)]), m)
 
 
 @lru_cache

@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from friction.motion import cor_grid, cor_twists, fibonacci_twists
 from friction.wrench import friction_limits, friction_wrench
 from lsfit.body import ExactSurface, body_volume
-from lsfit.certificate import lowest_eigenvalues, smallest_eigenvalue
+from lsfit.certificate import certify, lowest_eigenvalues, smallest_eigenvalue
 from lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
 from lsfit.flag import FitError, FitFlag
 from lsfit.geometry import directions
 from lsfit.misfit import misfit
 from lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
+from lsfit.round import ball_coefficients
 from lsfit.samples import normalised_samples, sample_rank
-from lsfit.sos import least_in_cone, quadratic_parts
+from lsfit.sos import MARGIN, ball_freedom, gram_matrix, least_in_cone, quadratic_parts
 from tests.generators import (
     build,
     cylinder_grid,
@@ -171,6 +173,23 @@ def test_the_smallest_eigenvalue_is_the_smallest(d):
         found = smallest_eigenvalue(fit.coefficients, d)
         sampled = lowest_eigenvalues(fit.hessian(u)).min()
         assert sampled - 0.1 * abs(sampled) - 0.1 < found <= sampled + 1e-12
+
+
+def test_every_convex_quartic_in_three_variables_has_a_gram_matrix():
+    """Convex is sos-convex there: a curvature of 0.02 at least is enough for a proof, one of -0.02 forbids it."""
+    random, ball = np.random.default_rng(4), ball_coefficients(3)
+    assert smallest_eigenvalue(ball, 3) == pytest.approx(4, rel=1e-12)
+    searched = 0
+    for _ in range(30):
+        v = random.normal(size=15)
+        # The smallest curvature is concave in the share of the ball: 4 at 1, below zero at 0.
+        for curvature in (0.02, -0.02):
+            share = brentq(lambda x, v=v, c=curvature: smallest_eigenvalue(x * ball + (1 - x) * v, 3) - c, 0, 1)
+            mixed = share * ball + (1 - share) * v
+            assert (certify(mixed, 3) is not None) == (curvature > 0)
+            first = np.linalg.eigvalsh(gram_matrix(mixed, ball_freedom(3), 3))[0]
+            searched += curvature > 0 and first < MARGIN
+    assert searched > 0  # the programme for the Gram matrix alone was needed
 
 
 def test_ellipsoids_are_recovered_wherever_they_lie():
@@ -340,7 +359,7 @@ def test_quartics_of_other_dimensions_are_certified(d):
     assert fit.surface.holds((a + b) / 2).all()
 
 
-def exact(patch, rho=2.0, count=4000):
+def exact(patch, rho=2.0, count=2000):
     S = friction_limits(patch, 1.0).S
 
     def wrench(t):
@@ -355,18 +374,18 @@ def test_the_exact_surface_has_the_measures_of_its_samples():
     limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
     np.testing.assert_allclose(body.semi_axes, limits, rtol=1e-12)
     assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
-    finer = body_volume(samples(patch, 4000)[0], samples(patch, 16000)[0])
+    finer = body_volume(samples(patch, 2000)[0], samples(patch, 8000)[0])
     assert body.volume == pytest.approx(finer, abs=3 * body.volume_error)
-    assert body.volume_error < 1e-4 * body.volume
+    assert body.volume_error < 2e-4 * body.volume
     W, T = samples(patch, 150)
-    assert body.holds(0.998 * W).all()
+    assert body.holds(0.994 * W).all()
     assert not body.holds(1.0001 * W).any()
     np.testing.assert_allclose(misfit(body, W, T), 0, atol=1.5)
     assert misfit(body, W, T).Erad < 1e-3
     other = body.scaled([3.0, 3.0, 0.5])
     assert other.volume == pytest.approx(4.5 * body.volume, rel=1e-3)
     np.testing.assert_allclose(other.semi_axes, body.semi_axes * [3, 3, 0.5], rtol=1e-12)
-    assert other.holds(0.998 * W * [3, 3, 0.5]).all()
+    assert other.holds(0.994 * W * [3, 3, 0.5]).all()
 
 
 def test_the_exact_surface_of_one_face_is_flat():
