@@ -33,7 +33,8 @@ DEFINITIONS = {
     "limit surface": "all loads (f_x, f_y, tau_z) that friction can carry, here per newton of S",
     "E_rad, E_dir": "mean error of a fitted surface's radius, and mean angle between its normal and the sliding motion",
     "quality": "volume of the grasp wrench space of both contacts (L-infinity, S = 1 each)",
-    "epsilon": "radius of the largest ball round 0 in it",
+    "epsilon": "radius of the largest ball round 0 in it, for a centre of mass halfway between the contacts; lower and"
+    " upper bound, which a quartic leaves apart",
 }
 FRAME = {
     FrameFlag.CYCLE: "the contact normal is a mean, because its search went in a circle between faces",
@@ -173,7 +174,14 @@ def _grasp_record(grasp: Grasp) -> dict[str, Any]:
         "contact_length": grasp.contact_length,
         "misalignment": grasp.misalignment,
         "slips": grasp.slips,
-        "score": {model: {"quality": s.quality, "epsilon": s.epsilon} for model, s in grasp.scores.items()},
+        "score": {
+            model: {
+                "quality": scored.quality,
+                "quality_l1": scored.quality_l1,
+                "epsilon": [scored.epsilon.lower, scored.epsilon.upper],
+            }
+            for model, scored in grasp.scores.items()
+        },
     }
 
 

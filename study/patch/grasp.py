@@ -4,17 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from friction.patch import FloatArray
+from scoring.contact import SoftContact
+from scoring.epsilon_search import EpsilonBound, epsilon
+from scoring.grasp import grasp_score
 from study.exits import USAGE, StudyError
 from study.patch.evaluate import Judged
 from study.quantity import MODELS
 
 ANTIPODAL = np.radians(5.0)  # beyond this the study flags a grasp
 FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands
+
+
+class Scored(NamedTuple):
+    """Volumes of the L-infinity and L1 grasp wrench spaces, and bounds of epsilon in the first.
+
+    The bounds meet for ellipsoids; for a quartic they leave a gap as large as its distance to an ellipsoid inside it.
+    """
+
+    quality: float
+    quality_l1: float
+    epsilon: EpsilonBound
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +48,7 @@ class Grasp:
     surface : str
         Kind of limit surface that was scored.
     scores : mapping
-        ``scoring.score.Score`` for each friction model.
+        `Scored` for each friction model.
     """
 
     distance: float
@@ -43,7 +57,7 @@ class Grasp:
     misalignment: float
     slips: bool
     surface: str
-    scores: Mapping[str, Any]
+    scores: Mapping[str, Scored]
 
 
 def grasp_of(
@@ -71,9 +85,6 @@ def grasp_of(
     object_length, contact_length : float, optional
         By default the distance, and the longer side of the larger contact [m].
     """
-    from scoring.contact import SoftContact
-    from scoring.grasp import grasp_score
-
     (O1, R1), (O2, R2) = _places(one, two, distance)
     line = O2 - O1
     d = float(np.linalg.norm(line))
@@ -87,7 +98,9 @@ def grasp_of(
     for model in MODELS:
         bodies = [judged.surfaces[model][surface].surface for judged in both]
         contacts = SoftContact(O1, R1, bodies[0]), SoftContact(O2, R2, bodies[1])
-        scores[model] = grasp_score(contacts, L, a)
+        lengths = L, a, (O1 + O2) / 2
+        volume = grasp_score(contacts, *lengths, with_epsilon=False)
+        scores[model] = Scored(volume.quality, volume.quality_l1, epsilon(contacts, *lengths))
     slips = bool(np.tan(min(lean, 1.57)) > mu + 1e-9)
     return Grasp(d, L, a, max(_angle(N1, -N2), lean), slips, surface, scores)
 

@@ -77,7 +77,9 @@ def _surface_table(surfaces: dict[str, Any]) -> list[str]:
 def _grasp_block(grasp: dict[str, Any]) -> list[str]:
     apart, whole, own = (f"{1e3 * grasp[key]:.4g} mm" for key in ("distance", "object_length", "contact_length"))
     rows = [[f"grasp ({NAMES[grasp['surface']]})", *MODELS]]
-    rows += [[name, *(_number(grasp["score"][model][name]) for model in MODELS)] for name in SCORES]
+    found = [grasp["score"][model] for model in MODELS]
+    rows += [["quality", *(_number(scored["quality"]) for scored in found)]]
+    rows += [["epsilon", *(_between(*scored["epsilon"]) for scored in found)]]
     return [*_aligned(rows), f"  contacts {apart} apart, torques over object length {whole} and contact length {own}"]
 
 
@@ -93,6 +95,10 @@ def _wrapped(text: str) -> list[str]:
 
 def _vector(v: np.ndarray) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in np.where(np.abs(v) < 1e-9, 0.0, v)) + ")"
+
+
+def _between(lower: float, upper: float) -> str:
+    return _number(lower) if upper <= 1.001 * lower + 1e-9 else f"{lower:.3g} to {upper:.3g}"
 
 
 def _number(value: float) -> str:
