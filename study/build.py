@@ -12,11 +12,12 @@ from study.scene.grasp_warnings import station_warnings
 
 if TYPE_CHECKING:
     from fem.materials import Material
+    from fem.outer_surface import OuterSurface
     from fem.pad_shape import PadShape
     from fem.shape import GapObject
     from study.scene import Scene
     from study.scene.sections import Gripper
-    from study.scene.shapes import Shape
+    from study.scene.shapes import Shape, Walled
 
 
 @lru_cache(maxsize=8)
@@ -39,6 +40,10 @@ def build_object(shape: Shape) -> GapObject:
     match shape.shape:
         case "revolution":
             return objects.Revolution(np.array(shape.profile))
+        case "sections":
+            from fem.stacked import Stacked
+
+            return Stacked(outer_surface(shape)[0])
         case "elliptic_cylinder":
             return objects.EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
         case "sphere":
@@ -47,6 +52,23 @@ def build_object(shape: Shape) -> GapObject:
             return objects.Box(np.array(shape.size), shape.edge_radius)
         case _:
             return objects.Plane(shape.thickness)
+
+
+@lru_cache(maxsize=8)
+def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
+    """Outer surface of an object that can have a wall, and whether it is a body of revolution.
+
+    Raises
+    ------
+    ValueError
+        For geometry that cannot be.
+    """
+    from fem.outer_surface import Section, of_revolution, of_sections
+
+    if shape.shape == "revolution":
+        return of_revolution(build_object(shape)), True
+    sections = [Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections]
+    return of_sections(sections), shape.axis_symmetry == 0
 
 
 def shapes_of(scene: Scene) -> list[Shape]:
@@ -70,7 +92,8 @@ def check_object(scene: Scene) -> None:
         With the key and what is wrong with it.
     """
     for shape in shapes_of(scene):
-        key = {"revolution": "object.profile_mm", "mesh": "object.mesh"}.get(shape.shape)
+        keys = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}
+        key = keys.get(shape.shape)
         if key is None:
             return
         try:

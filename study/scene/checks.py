@@ -12,6 +12,7 @@ from study.scene.gripper_checks import pad_material, pad_mesh
 from study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
 from study.scene.sections import Candidates, GraspPose, Gripper, Load
 from study.scene.shapes import Box, Plate, Revolution, Shape
+from study.scene.wall_checks import sections, wall
 
 SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
 
@@ -32,6 +33,7 @@ def object_size(shape: Shape) -> Iterator[Finding]:
 
 def _size_key(shape: Shape, axis: str) -> str:
     keys = {"sphere": "radius_mm", "box": "size_mm", "plane": "thickness_mm", "revolution": "profile_mm"}
+    keys["sections"] = "sections"
     cylinder = {"x": "semi_axis_a_mm", "y": "semi_axis_b_mm", "z": "length_mm"}
     return keys.get(shape.shape, cylinder[axis])  # type: ignore[attr-defined]
 
@@ -166,11 +168,12 @@ CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
     (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
     (("output",), output_file), (("petsc",), petsc_options), (("limit_surface", "effects"), surface_choice),
-    (("limit_surface", "candidates"), sampled_candidates), (("task",), weight),
+    (("limit_surface", "candidates"), sampled_candidates), (("task",), weight), (("object", "effects"), wall),
+    (("object",), sections),
 )  # fmt: skip
 
 
-def findings(sections: Mapping[str, Any]) -> list[Finding]:
+def findings(given: Mapping[str, Any]) -> list[Finding]:
     """Everything wrong with the sections that are there; a check whose sections are not all there is left out."""
-    ready = [(names, check) for names, check in CHECKS if all(name in sections for name in names)]
-    return [finding for names, check in ready for finding in check(*(sections[name] for name in names))]
+    ready = [(names, check) for names, check in CHECKS if all(name in given for name in names)]
+    return [finding for names, check in ready for finding in check(*(given[name] for name in names))]

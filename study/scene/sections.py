@@ -14,6 +14,7 @@ Count = Annotated[int, Field(ge=2, le=400)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
+WallSize = Annotated[float, Field(ge=0.2, le=50)]
 
 
 class Gripper(Section):
@@ -151,7 +152,9 @@ class Load(Section):
 class Effects(Section):
     """What is simulated; ``auto`` takes the cheapest level that the scene allows."""
 
-    object: Literal["auto", "rigid"] = Field("auto", description="the object's compliance")
+    object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
+        "auto", description="the object's compliance; the shells need object.wall_mm"
+    )
     pad: Literal["auto", "hyperelastic"] = Field("auto", description="the pad's deformation")
     sheet: Literal["auto", "rigid"] = Field("auto", description="compliance of the sheet behind the pad")
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
@@ -174,6 +177,10 @@ class Accuracy(Section):
     min_step_fraction: float = Field(
         1 / 8, gt=0, le=1, description="shortest part of a step between two forces that is tried before another way"
     )
+    wall_around_mm: WallSize = Field(1.5, description="size of a thin wall's elements round the object, under the pads")
+    wall_along_mm: WallSize = Field(2.5, description="size of a thin wall's elements along the axis, under the pads")
+    wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
+    wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
 
 class Output(Section):

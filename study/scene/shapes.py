@@ -4,43 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from study.scene.shape import Length, Point, Section, Shape, Span, Walled
 from study.scene.units import UNITS, si
 
-Span = tuple[float, float]
-Length = Annotated[float, Field(gt=0)]
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
-Point = Annotated[tuple[float, float], Field(strict=False)]
-
-
-class Section(BaseModel):
-    """What all sections share: nothing unknown, nothing converted from text, nothing changed later."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, protected_namespaces=())
-
-
-class Shape(Section):
-    """What all shapes share. The object's axis is z."""
-
-    name: str = Field("", max_length=100, description="name for titles and tables")
-    mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
-    mass = si("mass_g")
-
-    @property
-    def axis_symmetry(self) -> int:
-        """Order of the rotational symmetry about z: 0 is every angle, 1 none."""
-        return 1
-
-    @property
-    def spans_mm(self) -> dict[str, Span]:
-        """Extent along each axis where the scene alone tells it [mm]."""
-        return {}
-
-    @property
-    def extent(self) -> float | None:
-        """Largest extent [m]; None where the scene alone does not tell it."""
-        return max(high - low for low, high in self.spans_mm.values()) / 1000 if len(self.spans_mm) == 3 else None
 
 
 class Sphere(Shape):
@@ -119,7 +88,7 @@ class Plate(Shape):
         return {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
 
 
-class Revolution(Shape):
+class Revolution(Walled):
     """A body of revolution about z: a bottle, a cup."""
 
     shape: Literal["revolution"]
@@ -141,7 +110,43 @@ class Revolution(Shape):
         return {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
 
 
-class Mesh(Shape):
+class SectionTable(Section):
+    """One cross-section of a body of stacked sections."""
+
+    z_mm: float = Field(description="height")
+    a_mm: float = Field(ge=0, description="semi-axis along x; 0 is allowed for the first and the last section")
+    b_mm: Length | None = Field(None, description="semi-axis along y; that along x if left out")
+    exponent: float = Field(2.0, ge=2, le=20, description="2 for an ellipse, more for a rounded rectangle")
+    shift_mm: Point = Field((0.0, 0.0), strict=False, description="place of the section's middle, [x, y]")
+    z, a, b, shift = si("z_mm"), si("a_mm"), si("b_mm"), si("shift_mm")
+
+
+class Sections(Walled):
+    """A body of sections stacked along z, each an ellipse or a rounded rectangle: a bottle that is not round."""
+
+    shape: Literal["sections"]
+    sections: tuple[SectionTable, ...] = Field(
+        strict=False, min_length=4, max_length=500, description="cross-sections from bottom to top"
+    )
+
+    @property
+    def axis_symmetry(self) -> int:
+        """Order of the rotational symmetry about z."""
+        if any(any(s.shift_mm) for s in self.sections):
+            return 1
+        alike = all((s.b_mm or s.a_mm) == s.a_mm and s.exponent == 2.0 for s in self.sections)
+        return 0 if alike else 2
+
+    @property
+    def spans_mm(self) -> dict[str, Span]:
+        """Extent along each axis [mm]."""
+        x = [s.shift_mm[0] + side * s.a_mm for s in self.sections for side in (-1, 1)]
+        y = [s.shift_mm[1] + side * (s.b_mm or s.a_mm) for s in self.sections for side in (-1, 1)]
+        z = [s.z_mm for s in self.sections]
+        return {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
+
+
+class Mesh(Walled):
     """A closed triangle mesh from a file."""
 
     shape: Literal["mesh"]
@@ -162,11 +167,12 @@ class Mesh(Shape):
 
 
 Object = Annotated[
-    Revolution | EllipticCylinder | Sphere | Box | Plate | Mesh,
+    Revolution | Sections | EllipticCylinder | Sphere | Box | Plate | Mesh,
     Field(discriminator="shape", description="what is grasped"),
 ]
 SHAPES: dict[str, type[Shape]] = {
     "revolution": Revolution,
+    "sections": Sections,
     "elliptic_cylinder": EllipticCylinder,
     "sphere": Sphere,
     "box": Box,

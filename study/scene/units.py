@@ -33,6 +33,7 @@ UNITS = {
     "pa": Unit("pressure", 1, 1, "Pa", "Pa"),
     "kpa": Unit("pressure", 1000, 1, "Pa", "kPa"),
     "mpa": Unit("pressure", 1e6, 1, "Pa", "MPa"),
+    "gpa": Unit("pressure", 1e9, 1, "Pa", "GPa"),
     "deg": Unit("angle", math.pi, 180, "rad", "degrees"),
     "rad": Unit("angle", 1, 1, "rad", "rad"),
 }
