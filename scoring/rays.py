@@ -142,7 +142,9 @@ def _extreme(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) ->
         [Ci[:, 0] + touching_points(body, u @ Ci[:, 1:]) @ Ci[:, 1:].T for Ci, body in zip(C, bodies, strict=True)]
     )
     h = np.einsum("nmi,mi->nm", w, u)
-    chosen = (h == h.max(axis=0)) & (h > 0) if kind == "l1" else h > 0
+    chosen = h > 0
+    if kind == "l1":
+        chosen &= np.arange(len(C))[:, None] == h.argmax(axis=0)
     return np.where(chosen[:, :, None], w, 0.0).sum(axis=0)
 
 

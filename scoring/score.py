@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 
+import numpy as np
+
+from scoring.contact import Body, EllipsoidBody
 from scoring.epsilon import epsilon_l1, epsilon_linf
 from scoring.volume import volume_l1, volume_linf
 
@@ -35,6 +38,11 @@ class Score:
         0 if nothing is unusual.
     epsilon_l1 : float
         The same radius in the L1 grasp wrench space [-].
+    method : str
+        How the volumes were found: "antipodal" in closed form, "pose" by division of two contacts in any pose, "rays"
+        by an estimate for three or more.
+    error : float
+        Relative error of the volumes left by that method [-].
     """
 
     quality: float
@@ -42,23 +50,27 @@ class Score:
     epsilon: float
     flag: ScoreFlag
     epsilon_l1: float
+    method: str = "antipodal"
+    error: float = 0.0
 
 
 def score(
-    contact1: Sequence[float],
-    contact2: Sequence[float],
+    contact1: Sequence[float] | Body,
+    contact2: Sequence[float] | Body,
     distance: float,
     object_length: float,
     contact_length: float,
     centre_of_mass: float = 0.0,
 ) -> Score:
-    """Score of two ellipsoidal soft contacts that face each other.
+    """Score of two soft contacts that face each other.
 
     Parameters
     ----------
-    contact1, contact2 : (3,) sequence
-        Semi-axes ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the simplified surface
-        of Eq. (12), see `simplified_contact`.
+    contact1, contact2 : (3,) sequence or Body
+        Semi-axes ``(f_x, f_y, tau_z)`` of an ellipsoid, per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the
+        simplified surface of Eq. (12), see `simplified_contact`. Or any limit surface in these coordinates, of which
+        only the volume and the shadow's area count; epsilon has no closed form then and is nan, see
+        `scoring.grasp.grasp_score`.
     distance : float
         Distance of the contacts [m].
     object_length : float
@@ -73,21 +85,33 @@ def score(
     >>> score((1, 1, 0.01), (1, 1, 0.01), distance=0.06, object_length=0.06, contact_length=0.05).flag
     <ScoreFlag.CLEAN: 0>
     """
-    a = _scaled("contact1", contact1, _positive("contact_length", contact_length))
-    b = _scaled("contact2", contact2, contact_length)
+    rho = _positive("contact_length", contact_length)
     L = _positive("object_length", object_length)
     d = _positive("distance", distance) / L
+    if hasattr(contact1, "volume") or hasattr(contact2, "volume"):
+        bodies = (_as_body("contact1", contact1), _as_body("contact2", contact2))
+        sizes = [size for body in bodies for size in (body.volume / rho, body.shadow_area)]
+        return Score(volume_linf(*sizes, d), volume_l1(*sizes, d), math.nan, contact_flag(bodies), math.nan)
+    a, b = _scaled("contact1", contact1, rho), _scaled("contact2", contact2, rho)
     x = centre_of_mass / L
-    bodies = (*_volume_and_shadow(a), *_volume_and_shadow(b))
+    sizes = [*_volume_and_shadow(a), *_volume_and_shadow(b)]
     arms = -d / 2 - x, d / 2 - x
     flag = ScoreFlag.CLEAN
     if a[2] == 0 or b[2] == 0:
         flag |= ScoreFlag.NO_TORQUE
     if 0 in (*a[:2], *b[:2]):
         flag |= ScoreFlag.NO_FORCE
-    return Score(
-        volume_linf(*bodies, d), volume_l1(*bodies, d), epsilon_linf(a, b, *arms), flag, epsilon_l1(a, b, *arms)
-    )
+    return Score(volume_linf(*sizes, d), volume_l1(*sizes, d), epsilon_linf(a, b, *arms), flag, epsilon_l1(a, b, *arms))
+
+
+def contact_flag(bodies: Sequence[Body]) -> ScoreFlag:
+    """What some contact does not carry at all."""
+    flag = ScoreFlag.CLEAN
+    for body in bodies:
+        f_x, f_y, tau_z = body.support(np.eye(3))
+        flag |= ScoreFlag.NO_TORQUE if tau_z == 0 else ScoreFlag.CLEAN
+        flag |= ScoreFlag.NO_FORCE if f_x == 0 or f_y == 0 else ScoreFlag.CLEAN
+    return flag
 
 
 def simplified_contact(mu: float, e_n: float) -> tuple[float, float, float]:
@@ -101,6 +125,10 @@ def _scaled(name: str, contact: Sequence[float], length: float) -> tuple[float, 
         if not 0 <= value < math.inf:
             raise ValueError(f"{name}: {label} is {value}; semi-axes must be finite and not negative")
     return f_x, f_y, tau_z / length
+
+
+def _as_body(name: str, contact: Sequence[float] | Body) -> Body:
+    return contact if hasattr(contact, "volume") else EllipsoidBody(np.array(_scaled(name, contact, 1.0)))
 
 
 def _positive(name: str, value: float) -> float:

@@ -1,0 +1,114 @@
+"""Scores of contacts anywhere: the right method for each grasp, and one answer from all of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from scoring.grasp import grasp_score
+from scoring.polytope import fibonacci_vertices
+from scoring.pose import pose_volume
+from scoring.score import ScoreFlag, score
+
+A, B = (0.8, 0.6, 0.015), (0.5, 0.9, 0.025)
+LENGTHS = 0.2, 0.05
+
+
+def facing(angle=0.0, bodies=(A, B), d=0.06):
+    c, s = math.cos(angle), math.sin(angle)
+    bodies = [EllipsoidBody(b) if isinstance(b, tuple) else b for b in bodies]
+    one = SoftContact([-d / 2, 0, 0], contact_axes([c, s, 0], [0, 0, 1]), bodies[0])
+    return one, SoftContact([d / 2, 0, 0], contact_axes([-c, s, 0], [0, 0, 1]), bodies[1])
+
+
+def test_facing_contacts_score_as_in_closed_form():
+    exact = score(A, B, 0.06, *LENGTHS, centre_of_mass=0.01)
+    found = grasp_score(facing(), *LENGTHS, centre_of_mass=(0.01, 0, 0))
+    assert found.method == "antipodal"
+    names = ("quality", "quality_l1", "epsilon", "epsilon_l1")
+    np.testing.assert_allclose([getattr(found, n) for n in names], [getattr(exact, n) for n in names], rtol=1e-12)
+
+
+def test_epsilon_off_the_line_and_of_turned_contacts_is_searched():
+    one, two = facing()
+    x, y, N = two.axes
+    turned = SoftContact(two.position, [(x + y) / 2**0.5, (y - x) / 2**0.5, N], two.body)
+    exact = grasp_score([one, two], *LENGTHS)
+    for contacts, com in (((one, turned), (0, 0, 0)), ((one, two), (0, 0.02, 0.01))):
+        found = grasp_score(contacts, *LENGTHS, centre_of_mass=com)
+        assert (found.quality, found.method) == (pytest.approx(exact.quality, rel=1e-12), "antipodal")
+        assert 0 < found.epsilon < 1
+    equal = [facing(bodies=(A, b)) for b in (A, EllipsoidBody(A))]
+    assert grasp_score(equal[0], *LENGTHS) == grasp_score(equal[1], *LENGTHS)
+
+
+def test_tilted_contacts_go_on_from_facing_ones():
+    exact = grasp_score(facing(), *LENGTHS)
+    inside, outside = (grasp_score(facing(angle), *LENGTHS, with_epsilon=False) for angle in (0.9e-4, 1.1e-4))
+    assert (inside.method, outside.method) == ("antipodal", "pose")
+    for found in (inside, outside):
+        assert found.quality == pytest.approx(exact.quality, rel=2e-7)
+        assert found.quality_l1 == pytest.approx(exact.quality_l1, rel=2e-7)
+        assert math.isnan(found.epsilon)
+    far = grasp_score(facing(0.3), *LENGTHS, with_epsilon=False)
+    volume = pose_volume(*facing(0.3), *LENGTHS)
+    assert (far.quality, far.quality_l1, far.error) == volume
+
+
+def test_any_limit_surface_has_a_score():
+    polytope = PolytopeBody(fibonacci_vertices(A, 4000))
+    exact = score(A, B, 0.06, *LENGTHS)
+    for found in (
+        score(polytope, B, 0.06, *LENGTHS),
+        grasp_score(facing(bodies=(polytope, B)), *LENGTHS, with_epsilon=False),
+    ):
+        assert found.quality == pytest.approx(exact.quality, rel=3e-3)
+        assert found.quality < exact.quality
+        assert math.isnan(found.epsilon)
+
+
+@pytest.mark.long
+def test_three_contacts():
+    third = SoftContact([0, -0.03, 0], contact_axes([0, 1, 0], [0, 0, 1]), EllipsoidBody(A))
+    found = grasp_score([*facing(), third], *LENGTHS, with_epsilon=False)
+    two = grasp_score(facing(), *LENGTHS, with_epsilon=False)
+    assert found.method == "rays"
+    assert 0 < found.error < 0.02
+    assert found.quality > two.quality
+    assert found.quality_l1 > two.quality_l1
+
+
+def test_contacts_that_carry_nothing_score_nothing_and_say_so():
+    points = [(1.0, 1.0, 0.0)] * 2
+    for angle in (0.0, 0.2):
+        found = grasp_score(facing(angle, points), *LENGTHS)
+        assert (found.quality, found.quality_l1, found.epsilon, found.epsilon_l1) == (0, 0, 0, 0)
+        assert found.flag == ScoreFlag.NO_TORQUE
+    slippery = grasp_score(facing(0.2, [(0.0, 0.0, 0.0)] * 2), *LENGTHS)
+    assert (slippery.quality, slippery.epsilon) == (0, 0)
+    assert slippery.flag == ScoreFlag.NO_TORQUE | ScoreFlag.NO_FORCE
+
+
+def test_bad_arguments_are_named():
+    one, two = facing()
+    with pytest.raises(ValueError, match="at least two"):
+        grasp_score([one], *LENGTHS)
+    with pytest.raises(ValueError, match="object_length is 0"):
+        grasp_score([one, two], 0.0, 0.05)
+    with pytest.raises(ValueError, match="perpendicular unit vectors"):
+        SoftContact([0, 0, 0], 2 * np.eye(3), one.body)
+    with pytest.raises(ValueError, match="no semi-axis can be negative"):
+        EllipsoidBody([1, -1, 1])
+    with pytest.raises(ValueError, match="position is"):
+        SoftContact([0, 0, math.nan], np.eye(3), one.body)
+    with pytest.raises(ValueError, match="is parallel to N"):
+        contact_axes([0, 0, 1], [0, 0, 2])
+
+
+def test_a_cone_reaches_as_far_as_its_wrenches():
+    one, _ = facing(0.2, bodies=(PolytopeBody(fibonacci_vertices(A, 50)), B))
+    C = one.wrench_map(*LENGTHS, centre_of_mass=(0.1, 0.2, 0.3))
+    wrenches = np.vstack([np.zeros(6), np.column_stack([np.ones(50), one.body.vertices]) @ C.T])
+    u = np.random.default_rng(0).normal(size=(30, 6))
+    np.testing.assert_allclose(one.cone_support(C, u), (u @ wrenches.T).max(axis=1), rtol=1e-12)

@@ -1,0 +1,292 @@
+"""Volume of two contacts in any pose: against hulls in 6 dimensions, closed forms and laws of scale."""
+
+import json
+import math
+import timeit
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from scoring.boundary import ellipsoid_matrix, sphere_mesh, surface_mesh, touching_points
+from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from scoring.plane import fan_area, joint_pairs, mixed_area, polygon_area
+from scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
+from scoring.pose import pose_volume
+from scoring.volume import volume_l1, volume_linf
+
+A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
+PADS = EllipsoidBody(A), EllipsoidBody(B)
+TABLE = json.loads((Path(__file__).parents[1] / "data" / "friction_table.json").read_text())["cases"]
+G08 = next(case for case in TABLE if case["id"] == "g08")
+POSES = [(0, 0, (0, 0, 0)), (10, 10, (0, 0, 0)), (30, -20, (0.1, 0.3, 0.2)), (60, 5, (0, 0.2, 0.4)),
+         (80, 85, (0, 0.2, 0.1)), (20, 160, (0, 0.2, 0.1)), (90, 0, (0, 0, 0.3)), (0, 180, (0, 0.1, 0))]  # fmt: skip
+
+
+def rotation(rng):
+    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return Q * np.linalg.det(Q)
+
+
+def tilted(angle1, angle2, offset=(0, 0, 0), bodies=PADS, d=1.3):
+    """Contacts at -d/2 and d/2 + offset on the x axis, their normals turned about z away from facing, in degrees."""
+    a, b = np.radians([angle1, angle2])
+    N1, N2 = (math.cos(a), math.sin(a), 0), (-math.cos(b), math.sin(b), 0)
+    one = SoftContact([-d / 2, 0, 0], contact_axes(N1, [0, 0, 1]), bodies[0])
+    return one, SoftContact(np.array([d / 2, 0, 0]) + offset, contact_axes(N2, [0, 0, 1]), bodies[1])
+
+
+def anywhere(rng, body1, body2):
+    return [SoftContact(rng.normal(size=3), rotation(rng), body) for body in (body1, body2)]
+
+
+def hull_volumes(contacts, object_length, contact_length):
+    """Volumes of the hulls of all sums of two wrenches, and of the wrenches with 0."""
+    wrenches = []
+    for contact in contacts:
+        V = contact.body.vertices
+        loads = np.column_stack([np.ones(len(V)), V])
+        wrenches.append(np.vstack([np.zeros(6), loads @ contact.wrench_map(object_length, contact_length).T]))
+    sums = (wrenches[0][:, None] + wrenches[1]).reshape(-1, 6)
+    return ConvexHull(sums, qhull_options="Qt").volume, ConvexHull(np.vstack(wrenches), qhull_options="QJ").volume
+
+
+class Smooth:
+    """An ellipsoid that does not tell that it is one, or with a radius at least where it ends."""
+
+    def __init__(self, body):
+        self.inside, self.volume, self.shadow_area = body, body.volume, body.shadow_area
+
+    def support(self, t):
+        return self.inside.support(t)
+
+
+class Radial(Smooth):
+    def radius(self, u):
+        return 1 / np.linalg.norm(np.asarray(u) / self.inside.semi_axes, axis=1)
+
+
+class Tilted:
+    """Image of the unit ball under any map."""
+
+    degree = 2
+
+    def __init__(self, matrix):
+        self.matrix = matrix
+        self.volume = 4 / 3 * math.pi * abs(np.linalg.det(matrix))
+        self.shadow_area = math.pi * math.sqrt(np.linalg.det(matrix[:2] @ matrix[:2].T))
+
+    def support(self, t):
+        return np.linalg.norm(np.atleast_2d(t) @ self.matrix, axis=1)
+
+
+def test_the_worked_case_of_contacts_tilted_by_ten_degrees():
+    inputs, expected = G08["inputs"], G08["expected"]
+    axes = inputs["semi_axes1"], inputs["semi_axes2"]
+    for name, bodies in (
+        ("volume_Linf", [EllipsoidBody(a) for a in axes]),
+        ("volume_Linf_fib12_polytope", [PolytopeBody(fibonacci_vertices(a, 12)) for a in axes]),
+    ):
+        contacts = [
+            SoftContact(inputs[f"O{i}"], contact_axes(inputs[f"N{i}"], [0, 0, 1]), body)
+            for i, body in ((1, bodies[0]), (2, bodies[1]))
+        ]
+        found = pose_volume(*contacts, inputs["rho"], inputs["rho"], inputs["com"])
+        assert found.linf == pytest.approx(expected[name]["value"], rel=expected[name]["rtol"])
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_polytopes_have_the_volume_of_their_hull_in_six_dimensions(pose):
+    vertices = [PolytopeBody(fibonacci_vertices(axes, m)) for axes, m in ((A, 9), (B, 7))]
+    contacts = tilted(*pose, bodies=vertices)
+    found, hulls = pose_volume(*contacts, 1.0, 0.7), hull_volumes(contacts, 1.0, 0.7)
+    assert found.linf == pytest.approx(hulls[0], rel=1e-9)
+    assert found.l1 == pytest.approx(hulls[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_polytopes_anywhere(seed):
+    rng = np.random.default_rng(seed)
+    contacts = anywhere(rng, *(PolytopeBody(fibonacci_vertices(rng.uniform(0.1, 1, 3), 8)) for _ in "12"))
+    found, hulls = pose_volume(*contacts, 0.8, 0.3), hull_volumes(contacts, 0.8, 0.3)
+    assert found.linf == pytest.approx(hulls[0], rel=1e-9)
+    assert found.l1 == pytest.approx(hulls[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["ellipsoid", "graspit"])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_facing_contacts_have_the_closed_form_however_they_are_turned_about_their_line(kind, turn):
+    bodies = [EllipsoidBody(a) if kind == "ellipsoid" else PolytopeBody(graspit_vertices(a)) for a in (A, B)]
+    one, two = tilted(0, 0, bodies=bodies)
+    x, y, N = two.axes
+    c, s = math.cos(turn), math.sin(turn)
+    two = SoftContact(two.position, [c * x + s * y, c * y - s * x, N], two.body)
+    sizes = [size for body in bodies for size in (body.volume, body.shadow_area)]
+    found = pose_volume(one, two, 0.7, 0.7)
+    assert found.linf == pytest.approx(volume_linf(*sizes, 1.3, 0.7), rel=1e-9)
+    assert found.l1 == pytest.approx(volume_l1(*sizes, 1.3, 0.7), rel=1e-8)
+
+
+@pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-6, 1e-4])
+def test_nearly_facing_contacts_are_nearly_as_good(angle):
+    exact, found = (pose_volume(*tilted(math.degrees(a), 2 * math.degrees(a)), 1.0, 0.7) for a in (0.0, angle))
+    assert found.linf == pytest.approx(exact.linf, rel=10 * angle**2 + 1e-12)
+    assert found.l1 == pytest.approx(exact.l1, rel=10 * angle**2 + 1e-9)
+
+
+@pytest.mark.parametrize(("angle", "low", "high"), [(2, 0.001, 0.003), (5, 0.006, 0.011), (10, 0.025, 0.037)])
+def test_what_the_closed_form_errs_for_tilted_contacts(angle, low, high):
+    """Independent figures: 0.1-0.3 % at 2 degrees, 0.6-1.1 % at 5, 2.6-3.7 % at 10."""
+    for pose in ((angle, angle), (angle, -angle), (angle, 0)):
+        if pose[1] != 0:
+            error = pose_volume(*tilted(0, 0), 1, 1).linf / pose_volume(*tilted(*pose), 1, 1).linf - 1
+            assert low / 1.5 <= abs(error) <= high * 1.5, pose
+
+
+@pytest.mark.parametrize("pose", POSES[1::2])
+def test_ellipsoids_are_the_limit_of_polytopes_within_them(pose):
+    """Both deficits go with 1 / m, so two polytopes extrapolate to the ellipsoid."""
+    smooth, volumes = pose_volume(*tilted(*pose), 1.0, 0.7), []
+    for m in (1000, 4000):
+        bodies = [PolytopeBody(fibonacci_vertices(axes, m)) for axes in (A, B)]
+        volumes.append(np.array(pose_volume(*tilted(*pose, bodies=bodies), 1.0, 0.7)[:2]))
+    limit = volumes[1] + (volumes[1] - volumes[0]) / 3
+    np.testing.assert_allclose(smooth[:2], limit, rtol=2e-4)
+    assert (volumes[1] < smooth[:2]).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_error_is_stated_and_kept(seed):
+    rng = np.random.default_rng(seed)
+    contacts = anywhere(rng, *(EllipsoidBody(rng.uniform(0.05, 1, 3)) for _ in "12"))
+    fine = pose_volume(*contacts, 1.0, 1.0, relative_error=1e-9)
+    usual = pose_volume(*contacts, 1.0, 1.0)
+    assert usual.relative_error <= 1e-5
+    np.testing.assert_allclose(usual[:2], fine[:2], rtol=1e-5)
+
+
+def test_laws_of_scale_and_motion():
+    rng = np.random.default_rng(7)
+    axes = rng.uniform(0.1, 1, (2, 3))
+    one, two = anywhere(rng, *map(EllipsoidBody, axes))
+    exact = pose_volume(one, two, 1.0, 1.0, relative_error=1e-8)
+    Q, shift = rotation(rng), rng.normal(size=3)
+    moved = [SoftContact(Q @ c.position + shift, c.axes @ Q.T, c.body) for c in (one, two)]
+    same = pose_volume(*moved, 1.0, 1.0, relative_error=1e-8), pose_volume(two, one, 1, 1, shift, relative_error=1e-8)
+    longer = [SoftContact(1e3 * c.position, c.axes, EllipsoidBody(c.body.semi_axes * [1, 1, 1e3])) for c in moved]
+    same += (pose_volume(*longer, 1e3, 1e3, relative_error=1e-8),)
+    for found in same:
+        np.testing.assert_allclose(found[:2], exact[:2], rtol=1e-7)
+    np.testing.assert_allclose(pose_volume(one, two, 2.0, 2.0)[:2], np.array(exact[:2]) / 8, rtol=1e-5)
+
+
+@pytest.mark.parametrize("hidden", [Smooth, Radial])
+def test_bodies_known_by_support_or_radius(hidden):
+    for pose in POSES[1:4]:
+        exact = pose_volume(*tilted(*pose), 1.0, 0.7)
+        found = pose_volume(
+            *tilted(*pose, bodies=[hidden(EllipsoidBody(a)) for a in (A, B)]), 1.0, 0.7, (0, 0, 0), 1e-4
+        )
+        np.testing.assert_allclose(found[:2], exact[:2], rtol=2e-4)
+        mixed = pose_volume(
+            *tilted(*pose, bodies=[EllipsoidBody(A), hidden(EllipsoidBody(B))]), 1, 0.7, (0, 0, 0), 1e-4
+        )
+        np.testing.assert_allclose(mixed[:2], exact[:2], rtol=2e-4)
+
+
+def test_tilted_ellipsoids():
+    rng = np.random.default_rng(5)
+    bodies = [Tilted(rng.normal(size=(3, 3)) * [[1], [1], [0.2]]) for _ in "12"]
+    found = pose_volume(*tilted(20, -30, (0, 0.2, 0.1), bodies=bodies), 1.0, 1.0)
+    volumes = []
+    for m in (1000, 4000):
+        inside = [PolytopeBody(fibonacci_vertices(np.ones(3), m) @ b.matrix.T) for b in bodies]
+        volumes.append(np.array(pose_volume(*tilted(20, -30, (0, 0.2, 0.1), bodies=inside), 1.0, 1.0)[:2]))
+    np.testing.assert_allclose(found[:2], volumes[1] + (volumes[1] - volumes[0]) / 3, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("axes1", "flat"),
+    [((0.8, 0.6, 0), False), ((0, 0.6, 0.1), False), ((0, 0, 0.1), False), ((0.5, 0, 0), False), ((0, 0, 0), True)],
+)
+def test_contacts_that_do_not_carry_every_load(axes1, flat):
+    """The limit of thin bodies; a point without friction leaves fewer than 6 dimensions."""
+    pose = (30, -20, (0.1, 0.3, 0.2))
+    found = pose_volume(*tilted(*pose, bodies=[EllipsoidBody(axes1), EllipsoidBody(B)]), 1.0, 1.0)
+    thin = EllipsoidBody(np.maximum(axes1, 1e-7))
+    limit = pose_volume(*tilted(*pose, bodies=[thin, EllipsoidBody(B)]), 1.0, 1.0)
+    np.testing.assert_allclose(found[:2], limit[:2], rtol=1e-4, atol=1e-8)
+    assert (found.linf == 0) == flat
+    polytope = PolytopeBody(fibonacci_vertices(axes1, 1500))
+    inside = pose_volume(*tilted(*pose, bodies=[polytope, EllipsoidBody(B)]), 1.0, 1.0)
+    np.testing.assert_allclose(inside[:2], found[:2], rtol=5e-3)
+
+
+def test_no_volume_in_fewer_than_six_dimensions():
+    points = [EllipsoidBody([1, 1, 0])] * 2
+    cases = [
+        tilted(0, 0, bodies=points), tilted(20, -30, (0, 0.1, 0.2), bodies=points),  # no torque about their line
+        tilted(0, 0, d=0.0), tilted(90, 90), tilted(90, -90),  # one place; normals across the line
+        tilted(10, 10, bodies=[EllipsoidBody([0, 0, 0])] * 2),
+        tilted(10, 10, bodies=[PolytopeBody(np.zeros((1, 3)))] * 2),
+    ]  # fmt: skip
+    for contacts in cases:
+        assert pose_volume(*contacts, 1.0, 1.0) == (0, 0, 0)
+
+
+def test_mixed_areas_of_polygons():
+    """V(P, P) is the area, and |P + Q| = |P| + 2 V + |Q|."""
+    rng = np.random.default_rng(2)
+    P, Q = rng.normal(size=(2, 9, 2))
+    sums = (P[:, None] + Q).reshape(-1, 2)
+
+    def sides(points):
+        ring = points[ConvexHull(points).vertices]
+        step = np.roll(ring, -1, axis=0) - ring
+        return np.column_stack([step[:, 1], -step[:, 0]])
+
+    p, q, both = (ConvexHull(points).volume for points in (P, Q, sums))
+    assert mixed_area(sides(P), sides(P)) == pytest.approx(p, rel=1e-13)
+    assert mixed_area(sides(P), sides(Q)) == pytest.approx((both - p - q) / 2, rel=1e-12)
+    n1, n2, direction = sides(P), sides(Q), np.array([0.3, -0.7])
+    share = np.array([[np.linalg.solve(np.column_stack([-a, b]), direction) for b in n2] for a in n1])
+    cross = np.abs(n1[:, None, 0] * n2[:, 1] - n1[:, None, 1] * n2[:, 0])
+    assert joint_pairs(n1, n2, direction) == pytest.approx(cross[(share > 0).all(axis=2)].sum(), rel=1e-12)
+
+
+def test_areas_of_hulls_with_the_origin():
+    """A unit disc at the distance rho: two tangents, and the part of the disc behind them."""
+    phi = 2 * np.pi * np.arange(512) / 512
+    for rho in (0.0, 0.9, 1.5, 20.0):
+        outside = rho > 1
+        area = math.sqrt(rho**2 - 1) + math.pi - math.acos(1 / rho) if outside else math.pi
+        assert fan_area(1 + rho * np.cos(phi)) == pytest.approx(area, rel=1e-5)
+        rim = np.column_stack([np.cos(phi) + rho, np.sin(phi)])
+        assert polygon_area(rim) == pytest.approx(area, rel=1e-4)
+    assert polygon_area(np.array([[1.0, 1.0], [2.0, 2.0]])) == 0
+
+
+def test_meshes_and_touching_points():
+    points, triangles = sphere_mesh(2)
+    assert (len(points), len(triangles)) == (162, 320)
+    body = EllipsoidBody(A)
+    np.testing.assert_allclose(ellipsoid_matrix(body), np.diag(A))
+    t = points[:20]
+    for kind in (body, Smooth(body), Radial(body)):
+        np.testing.assert_allclose(touching_points(kind, t), touching_points(body, t), atol=1e-8)
+        w, faces = surface_mesh(kind, 4)
+        a, b, c = (w[faces[:, i]] for i in range(3))
+        volume = np.einsum("mi,mi->m", a, np.cross(b, c)).sum() / 6
+        assert 0.99 * body.volume < volume < body.volume
+    cube = PolytopeBody(np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3))
+    w, faces = surface_mesh(cube, 0)
+    assert np.linalg.det(w[faces]).sum() / 6 == pytest.approx(8, rel=1e-12)
+    assert polytope_volume(cube.vertices) == pytest.approx((8, 4))
+
+
+@pytest.mark.long
+def test_a_pose_takes_milliseconds():
+    """0.8 ms were measured."""
+    contacts = tilted(10, 10)
+    assert min(timeit.repeat(lambda: pose_volume(*contacts, 1, 1), number=10, repeat=5)) / 10 < 10e-3
