@@ -53,7 +53,7 @@ class QuarticFit:
 
 
 def least_squares_quartic(
-    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 1.0
+    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01
 ) -> Quartic | Image:
     """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, which may fail to be convex.
 
@@ -64,8 +64,8 @@ def least_squares_quartic(
     T : (m, d) array
         Unit motions; needed unless ``gamma`` is 0 [-].
     beta, gamma : float
-        Weights of wrenches and of motions. The gradient of ``P`` is four times as long as the wrench: with 1 and 1
-        the directions weigh more; with ``gamma = 0`` the errors of `lsfit.misfit` in the radius are least.
+        Weights of wrenches and of motions. A little weight on the motions bends the surface the right way between
+        samples; with 1 and 1 the directions are bought with radii that are off by some per cent.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def least_squares_quartic(
     return placed(v, samples, samples.flag | flag)
 
 
-def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 1.0) -> QuarticFit:
+def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
     """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
 
     The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
