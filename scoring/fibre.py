@@ -71,6 +71,7 @@ class Fibre(Protocol):
     """One contact's part in the volume of a grasp."""
 
     exact: bool
+    finest: int
 
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone K and area of its shadow along T."""
@@ -95,6 +96,7 @@ class EllipsoidFibre:
     """Parts of an ellipsoid in closed form; only the sides are divided into ``128 * 2**level`` pieces."""
 
     exact = False
+    finest = 7
 
     def __init__(self, A: FloatArray, span: Span) -> None:
         axes, vectors = np.linalg.eigh(A)
@@ -187,6 +189,7 @@ class MeshFibre:
     def __init__(self, body: Body, span: Span) -> None:
         self.body, self.span = body, span
         self.exact = hasattr(body, "vertices")
+        self.finest = 7 if self.exact else 5
         self.meshes: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
 
     def _mesh(self, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:

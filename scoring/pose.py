@@ -34,7 +34,7 @@ from scoring.fibre import Fibre, Span, fibre_of
 from scoring.plane import joint_pairs, mixed_area
 
 FloatArray = NDArray[np.float64]
-LEVELS = 6
+ROUNDING = 1e-13
 TURN = 1e-9  # keeps a direction off sides that are parallel to it, where the share of least force is not unique
 
 
@@ -65,7 +65,8 @@ def pose_volume(
     centre_of_mass : (3,) array
         Point about which torques are taken [m]; the volumes do not depend on it.
     relative_error : float
-        Pieces of surface are divided until two divisions agree so far, or 6 times.
+        Pieces of surface are divided until two divisions agree so far, or to the finest division, which leaves
+        up to 1e-4 for bodies that are neither ellipsoids nor polytopes.
 
     Returns
     -------
@@ -91,9 +92,9 @@ def cone_volume(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body, relati
     delta = delta + TURN * np.array([-delta[1], delta[0]])
     coarse = _volumes(fibres, delta, 0)
     if all(fibre.exact for fibre in fibres):
-        return PoseVolume(*(J * coarse).tolist(), 1e-9)
+        return PoseVolume(*(J * coarse).tolist(), TURN)
     before = coarse
-    for level in range(1, LEVELS + 1):
+    for level in range(1, min(fibre.finest for fibre in fibres) + 1):
         fine = _volumes(fibres, delta, level)
         # Errors go with the square of the size of the pieces.
         better = fine + (fine - coarse) / 3
@@ -101,7 +102,7 @@ def cone_volume(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body, relati
         if error <= relative_error:
             break
         coarse, before = fine, better
-    return PoseVolume(*(J * np.maximum(better, 0)).tolist(), error)
+    return PoseVolume(*(J * np.maximum(better, 0)).tolist(), max(error, ROUNDING))
 
 
 def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int) -> FloatArray:
