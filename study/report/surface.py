@@ -44,8 +44,11 @@ def _shadows(data: Data, index: tuple[int, ...], known: dict[str, StoredSurface]
         panel.axhline(0, color=pictures.SOFT, lw=0.4, zorder=0)
         panel.axvline(0, color=pictures.SOFT, lw=0.4, zorder=0)
     axes[0, 0].set_aspect("equal", adjustable="datalim")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    named = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
+    labels = sorted(named, key=lambda label: list(known).index(label.partition(",")[0]))
+    drawn.legend(
+        [named[label] for label in labels], labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8
+    )
     exact = "Dots are exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
     caption = (
         f"{data.place(index, force=True)}: the loads that one contact carries without slipping, seen along each axis. "
@@ -98,7 +101,7 @@ def _space(data: Data, index: tuple[int, ...], known: dict[str, StoredSurface]) 
         panel.set(xlabel=_label(0), ylabel=_label(1), zlabel=_label(2))
         for axis, most in zip("xyz", reach * factors, strict=True):
             getattr(panel, f"set_{axis}lim")(-1.05 * most, 1.05 * most)
-        panel.set_title(f"{model} model")
+        panel.set_title(f"{model} model", y=0.9)
         panel.view_init(22, -55)
         panel.set_box_aspect(None, zoom=0.88)  # leaves room for the label at the right
         panel.locator_params(nbins=5)

@@ -29,6 +29,10 @@ elements = [8, 4, 2]
 [friction]
 cor_grid = 3
 
+[limit_surface]
+samples = 80
+wrench_samples = [2, 5]
+
 [candidates]
 stations_mm = [0, 30]
 angles_deg = [0, 5, 185]
@@ -95,7 +99,8 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     assert f"{CASES} of {CASES} cases to solve on {ranks} rank" in output
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
-    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure", "status/crc"):
+    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure", "status/crc",
+                 "quality_fitted/flat", "limit_surface/coefficients", "wrenches/wrench"):  # fmt: skip
         assert f"study/{name}" in expected
     assert once(differing, path, expected) == []
 
