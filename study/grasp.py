@@ -22,7 +22,7 @@ from study.quantity import MODELS
 from study.scene import Scene
 
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
-ROUGH = 0.05  # difference of divisions at which a quartic's volume ends; extrapolated it is good to some 1e-3
+ROUGH = 0.2  # ends a quartic's volume after two divisions; extrapolated it is good to some 1e-3
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 
 

@@ -30,9 +30,6 @@ from study.scene.score_sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
-# Weight of the directions in the fit of a quartic. With 1 the steep gradients of a long patch pull the surface off the
-# wrenches by up to a tenth of the radius; with 0.01 radii and directions are both about as good as they can be.
-MOTIONS = 0.01
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.finger_quantities says
 
@@ -101,7 +98,7 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
             case "full", _:
                 return zhou_ellipsoid(W, T).surface, ELLIPSOID
             case _, "least_squares":
-                fit = convex_quartic(W, T, gamma=MOTIONS)
+                fit = convex_quartic(W, T)
                 return fit.surface, AS_FITTED if fit.certificate.by == "least squares" else PROGRAMME
         return zhou_quartic(W, T).surface, PROGRAMME
     except (FitError, CollapsedFitError):

@@ -71,7 +71,16 @@ def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list
         f"There a contact holds up to {value['f_x_max']} N along the pad, {value['f_y_max']} N across it and "
         f"{value['tau_z_max']} N mm of torque about its normal (curved model{friction}; weaker finger)."
     )
-    return [first, second, *_planar(data, best), *_other_force(data, best)]
+    return [first, second, *_weight(data, best), *_planar(data, best), *_other_force(data, best)]
+
+
+def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
+    """How many times its own weight the object could have, where its mass is known."""
+    factor = data.at("safety_factor", index)
+    if not np.isfinite(factor):
+        return []
+    what = f"The grasp holds {number(factor)} times the object's weight at this force (curved model)"
+    return [f"{what}." if factor >= 1 else f"{what}: it would lose the object."]
 
 
 def _error(data: Data, index: tuple[int, ...]) -> str:

@@ -232,10 +232,11 @@ TEXTS = (axis("material", (0, 1), "", "gripper.material (0 = blatz_ko, 1 = neo_h
         (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "No grasp is solved."),
         (Layout(SMALL, 24), {"maps/quality": None, "maps/e_n": None}, "which has no score"),
         (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "does not pass its checks: min det f -0.1"),
+        (Layout(SMALL, 0, patches=False, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "it would lose the object"),
         (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "Best grasp at 2 N per finger: right"),
         (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "material blatz_ko"),
     ],
-    ids=["one case", "all failed", "nothing done", "no scores", "bad check", "poses", "sweep of texts"],
+    ids=["one case", "all failed", "nothing done", "no scores", "bad check", "weight", "poses", "sweep of texts"],
 )  # fmt: skip
 def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     page = page_of(make(tmp_path / "odd.hdf", layout, **options))

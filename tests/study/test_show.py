@@ -12,7 +12,7 @@ from study import contact
 from study.cli import main
 from study.commands import RANK
 from study.layout import DONE, FAILED
-from study.quantities import MAPS
+from study.quantities import MAPS, quantities
 from study.reading import StoredAxis
 from study.show import FLAGS, as_csv, as_text, best, place
 from study.status import reasons
@@ -99,3 +99,11 @@ def test_a_force_that_is_none_is_bad_usage(force, capsys, monkeypatch):
 def test_a_force_between_the_levels_is_answered_with_the_nearest():
     assert best(study([[1.0]]), force=400.0).title.endswith("at 5 N, the level nearest to 400 N")
     assert best(study([[1.0]]), force=5.0).title.endswith("at 5 N")
+
+
+def test_the_safety_factor_has_a_column_where_the_mass_is_known():
+    heavy = study([[2.0], [1.0]])
+    assert "safety" not in as_text(best(heavy))
+    heavy.layout.quantities = quantities(["mass"])
+    assert "safety" in as_text(best(heavy)).splitlines()[1]
+    assert "safety_factor" in as_csv(best(heavy)).splitlines()[0]
