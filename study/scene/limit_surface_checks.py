@@ -36,7 +36,7 @@ def sampled_candidates(surface: LimitSurface, candidates: Candidates) -> Iterato
             yield Finding(path, f"{name}", f"a candidate's number, 0 to {last}", "numbers count stations, then angles")
         elif isinstance(name, str) and name not in labels:
             near = closest(name, labels)
-            remedy = f"did you mean {shown(near)}?" if near else "write a number, or a label as `softjaw plan` lists it"
+            remedy = f"did you mean {shown(near)}?" if near else f"write the candidate's number, 0 to {len(labels) - 1}"
             yield Finding(path, shown(name), f"a candidate's label, as {shown(labels[0])}", remedy)
 
 

@@ -6,6 +6,7 @@ import itertools
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
-from study.report import build, write_report
+from study.report import build, words, write_report
 from study.report.curvature import difference_pictures
 from study.report.data import Data, number
 from study.report.outline import read_scene, shape_outline, slice_polygon
@@ -230,18 +231,30 @@ TEXTS = (axis("material", (0, 1), "", "gripper.material (0 = blatz_ko, 1 = neo_h
         (Layout(SMALL, 0, patches=False), {}, "The grasp at 3 N per finger: station 10 mm"),
         (Layout(SMALL, 24), {"state": lambda i: "it failed"}, "No grasp is solved. 0 of 1 cases are solved, 1 failed"),
         (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "No grasp is solved."),
-        (Layout(SMALL, 24), {"maps/quality": None, "maps/e_n": None}, "which has no score"),
-        (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "does not pass its checks: min det f -0.1"),
-        (Layout(SMALL, 0, patches=False, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "it would lose the object"),
+        (Layout(SMALL, 0, patches=False), {"maps/quality": None, "maps/e_n": None}, "which has no score"),
         (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "Best grasp at 2 N per finger: right"),
         (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "material blatz_ko"),
     ],
-    ids=["one case", "all failed", "nothing done", "no scores", "bad check", "weight", "poses", "sweep of texts"],
+    ids=["one case", "all failed", "nothing done", "no scores", "poses", "sweep of texts"],
 )  # fmt: skip
 def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     page = page_of(make(tmp_path / "odd.hdf", layout, **options))
     assert page.balanced
     assert expected in page.text
+
+
+@pytest.mark.parametrize(
+    ("layout", "values", "expected"),
+    [
+        (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "does not pass its checks: min det f -0.1"),
+        (Layout(SMALL, 0, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "0.5 times the object&#x27;s weight"),
+        (Layout(SMALL, 0, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "it would lose the object"),
+    ],
+    ids=["bad check", "weight", "too heavy"],
+)
+def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
+    with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
+        assert expected in words.verdict(Data(result), 0.8)
 
 
 def test_the_same_file_gives_the_same_bytes(tmp_path):
