@@ -39,7 +39,7 @@ class WallState:
     q : (6 k,) array
         State, see ``fem.shell_model`` [m].
     load : (k, 3) array
-        Contact forces on its nodes [N].
+        Contact forces on the shell's nodes [N].
     reaction : (3,) array
         Force of supports and springs on the whole object [N].
     snapped : bool
@@ -173,7 +173,7 @@ class Grip:
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
                 work if k == 0 else Work(), part,
             ))  # fmt: skip
-        load = problem.wall_load(x)
+        load = problem.model.everywhere(problem.wall_load(x))
         q = problem.model.state(x[: problem.model.size], load)
         worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(BALANCE, self.settings.residual) * force:

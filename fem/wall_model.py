@@ -39,8 +39,11 @@ class WallModel(Protocol):
     def tangent(self, y: FloatArray, before: FloatArray | None) -> FloatArray:
         """Values of the tangent at ``y``; ``before`` is the state at the last tangent of the same solve, if any."""
 
+    def everywhere(self, load: FloatArray) -> FloatArray:
+        """Forces on this model's nodes as forces on all nodes of the shell."""
+
     def state(self, y: FloatArray, load: FloatArray) -> FloatArray:
-        """State of the whole shell ``(6 k,)`` that belongs to ``y`` under the contact forces ``load (k, 3)``."""
+        """State of the whole shell ``(6 k,)`` that belongs to ``y`` under the contact forces ``load`` on all nodes."""
 
 
 class NonlinearWall:
@@ -75,6 +78,10 @@ class NonlinearWall:
     def tangent(self, y: FloatArray, before: FloatArray | None) -> FloatArray:
         """See `WallModel`."""
         return self.shell.tangent(self._full(y), None if before is None else self._full(before))
+
+    def everywhere(self, load: FloatArray) -> FloatArray:
+        """See `WallModel`."""
+        return load
 
     def state(self, y: FloatArray, load: FloatArray) -> FloatArray:
         """See `WallModel`."""
@@ -142,8 +149,12 @@ class LinearWall:
         """See `WallModel`."""
         return self.stiffness[self._entries]
 
+    def everywhere(self, load: FloatArray) -> FloatArray:
+        """See `WallModel`."""
+        full = np.zeros((self.shell.nodes, 3))
+        full[self.nodes] = load
+        return full
+
     def state(self, y: FloatArray, load: FloatArray) -> FloatArray:
         """See `WallModel`."""
-        f = np.zeros((self.linear.shell.nodes, 6))
-        f[self.nodes, :3] = f[self.nodes, 3:] = load
-        return self.linear.solve(f.ravel())
+        return self.linear.solve(np.hstack([load, load]).ravel())

@@ -178,14 +178,14 @@ def _run_on(comm: Any, options: Namespace) -> int:
         return scene, target(options, scene)
 
     scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
-    from study import curvature, pipeline
+    from study import derived, pipeline
     from study.status import summary
 
     plan = on_rank0(comm, _prepare, scene, options)
     work = Work(
         solve_unit=pipeline.solve_unit,
         image=pipeline.image,
-        finalise=lambda writer: curvature.finalise(writer, scene),
+        finalise=lambda writer: derived.finalise(writer, scene),
         summary=summary,
     )
     return run_study(plan, work, path, comm, retry_failed=options.retry_failed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -33,6 +33,9 @@ REMARKS = {
     COARSE: "the mesh is coarse for this contact",
     NODAL_INSTEAD: "weighted gaps had no solution, nodal gaps were taken",
     1 | 2: "a contact carries no torque, or no force along an axis",
+    8192: "the wall has snapped in",
+    16384: "the object slides out of the grasp along its axis",
+    32768: "the wall yields, the dent stays",
 }
 UNSTABLE = "foam lost ellipticity, strains may localise"
 
@@ -40,13 +43,21 @@ UNSTABLE = "foam lost ellipticity, strains may localise"
 class Contact:
     """One finger at one force: patch in the pad's frame, contact frame, friction limits and ellipsoid per model.
 
-    ``unit_limits`` are the friction limits for mu = 1, ``ellipsoids`` go through the three motions of ``limits``.
+    ``seen`` brings the patch of the state into the finger's own frame where another one was solved. ``unit_limits`` are
+    the friction limits for mu = 1, ``ellipsoids`` go through the three motions of ``limits``.
     """
 
-    def __init__(self, scene: Scene, finger: Finger, state: Pressed) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        finger: Finger,
+        state: Pressed,
+        seen: Callable[[ContactPatch], ContactPatch] | None = None,
+    ) -> None:
         self.finger, self.state, self.symmetry = finger, state, state.pad.symmetry
         self.nodal_instead = state.pad.contact != scene.accuracy.contact
-        self.patch: ContactPatch = extract(state.pad, state)
+        patch = extract(state.pad, state)
+        self.patch: ContactPatch = seen(patch) if seen else patch
         self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
         self.local: ContactPatch = in_frame(self.patch, self.frame)
         self.rho = contact_length(self.local)

@@ -137,7 +137,7 @@ def _labels(q: Quantity | None, column: Column) -> tuple[str, ...]:
         return ()
     finger = ("finger",) if q.per == "finger" else ()
     face = ("face",) if q.group == "patch" else ()
-    sample = {"cor_wrench": ("cor",), "wrench": ("sample",)}.get(q.name, ())
+    sample = {"cor_wrench": ("cor",), "wrench": ("sample",), "place": ("wall_place",)}.get(q.name, ())
     labels = finger + face + (("model",) if q.by_model else ()) + sample
     parts = {6: ("wrench", "wrench_2"), 15: ("monomial",)}.get(column.shape[-1], ("component", "component_2"))
     return labels + parts[: len(column.shape) - len(labels)]

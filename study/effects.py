@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from study.limit_surface import dropped_share
-from study.quantities import REASONS
+from study.quantities import EFFECTS, REASONS
 from study.scene import Scene
 
-ONLY, FORCED, SYMMETRY, DEFAULT = (REASONS.index(r) for r in (REASONS[0], REASONS[1], REASONS[4], REASONS[5]))
+ONLY, FORCED, BELOW, ABOVE, SYMMETRY, DEFAULT = range(6)  # of REASONS
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
@@ -23,11 +23,12 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
 def effects_of(
-    scene: Scene, contacts: Sequence[Any], bounds: Sequence[Mapping[str, Any]]
+    scene: Scene, contacts: Sequence[Any], bounds: Sequence[Mapping[str, Any]], solving: Any
 ) -> dict[str, tuple[str, float, int]]:
     """Level, indicator and reason of every effect of one case; keys and levels as in ``study.quantities.EFFECTS``.
 
-    The indicators are those that a choice between levels is made by: the largest strain for the pad, the share of the
+    The indicators are those that a choice between levels is made by: the dent that a linear wall would get at the
+    largest force, over the wall's thickness, for the object, the largest strain for the pad, the share of the
     normal force that the tilt of the loaded normals takes away for the friction model, the mean share of the three
     dropped components for the wrench, the radial misfit for the limit surface.
     """
@@ -42,15 +43,29 @@ def effects_of(
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
     radial = float(np.max([b.misfit.Erad for b in curved]))
     six = "3-D" if wanted.wrench == "auto" else wanted.wrench
-    size = MODEL_SIZES[min(sum(c.symmetry) for c in contacts)]
+    size = MODEL_SIZES[solving.planes]
     return {
-        "object": ("rigid", nan, only("object")),
+        "object": _object(solving.level),
         "pad": ("hyperelastic", strain, only("pad")),
         "sheet": ("rigid", nan, only("sheet")),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
-        "fingers": ("two", nan, only("fingers")),
+        "fingers": _fingers(solving, only("fingers")),
         "friction": ("curved", 1.0 - F_N / S, only("friction")),
         "wrench": (six, dropped, DEFAULT if wanted.wrench == "auto" else FORCED),
         "limit_surface": (SURFACES[scene.limit_surface.model], radial, FORCED),
         "friction_pressure_coupling": ("none", nan, ONLY),
     }
+
+
+def _object(level: Any) -> tuple[str, float, int]:
+    """Level of the object's compliance: the cheapest that its indicator allows."""
+    names = EFFECTS["object"]
+    if level is None:
+        return names[0], nan, REASONS.index("the object has no wall")
+    reason = FORCED if level.forced else BELOW if level.number < len(names) - 1 else ABOVE
+    return names[level.number], level.indicator, reason
+
+
+def _fingers(solving: Any, only: int) -> tuple[str, float, int]:
+    """One finger where a plane of symmetry lies between two that press on one wall."""
+    return ("one", nan, SYMMETRY) if solving.fingers_solved == 1 else ("two", nan, only)

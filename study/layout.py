@@ -21,6 +21,7 @@ from study.datasets import Column, Dataset, columns_of, datasets_of
 from study.finger_quantities import PATCH
 from study.quantities import definitions, quantities
 from study.quantity import FINGERS, MODELS, NEEDS, Quantity
+from study.wall_quantities import ALONG, AROUND
 
 PROGRAM, VERSION = "softjaw", 2
 DONE, FAILED = 1, 2
@@ -109,6 +110,8 @@ class Layout:
         parts |= {"component_2": 3, **({"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {})}
         if self.cor_grid:
             parts["cor"] = self.cor_grid**2
+        if NEEDS[3] in self.has:
+            parts["wall_place"] = AROUND * ALONG
         if self.sampled:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}

@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import CheckError, ConvergenceError
-from fem.press import Press, Pressed, Settings
 from friction.motion import cor_grid
 from friction.wrench import friction_wrench
 from study import model
-from study.build import build_object, pad_shape
-from study.candidates import turn_of_pose
+from study.build import build_object
 from study.contact import Contact, angles, flags, remark
 from study.effects import effects_of
 from study.grasp import grasp_values
@@ -27,6 +25,8 @@ from study.limit_surface import Bound, bound, surface_values
 from study.quantity import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
+from study.solving import Solved, Solver, solver
+from study.wall import wall_flags
 from study.weight import safety_factors
 
 FloatArray = NDArray[np.float64]
@@ -39,37 +39,34 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     scene = unit.scene
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in unit.candidate.poses]
-    shared = turn_of_pose(*unit.candidate.poses, scene.object.axis_symmetry) is not None
-    meshes = (False, True)[: scene.accuracy.meshes]
-    presses = [[_press(scene, f, coarser) for coarser in meshes] for f in (fingers[:1] if shared else fingers)]
+    solving = solver(scene, fingers, unit.candidate.poses)
     try:
-        for k, outcome in enumerate(_states(presses, scene.load.normal_force)):
+        for k, outcome in enumerate(_outcomes(solving, scene.load.normal_force)):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
                 continue
             start = time.perf_counter()
-            contacts = [[Contact(scene, f, state) for state in own] for f, own in zip(fingers, outcome, strict=False)]
-            bounds = [_bounds(scene, fine) for fine, *_ in contacts]
-            if shared:  # an image finger has its partner's states; only its place differs
-                contacts.append([c.of(fingers[1]) for c in contacts[0]])
-                bounds *= 2
-            values = _values(scene, obj, [fine for fine, *_ in contacts], bounds)
+            fine = [c for c, *_ in outcome.contacts]
+            bounds = [_bounds(scene, fine[0])]
+            bounds.append(bounds[0] if fine[1].patch is fine[0].patch else _bounds(scene, fine[1]))
+            values = _values(scene, obj, fine, bounds)
+            if outcome.grips:
+                values |= solving.wall_values(outcome)
+                values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
             if scene.accuracy.meshes == 2:
-                values |= _mesh_errors(*zip(*contacts, strict=True))
+                values |= _mesh_errors(*zip(*outcome.contacts, strict=True))
             seconds = time.perf_counter() - start
-            effects = effects_of(scene, [fine for fine, *_ in contacts], bounds)
-            yield k, _result(values, contacts, [s for own in outcome for s in own], seconds, effects)
+            yield k, _result(values, outcome, seconds, effects_of(scene, fine, bounds, solving))
     finally:
-        for press in (p for own in presses for p in own):
-            press.destroy()
+        solving.destroy()
 
 
-def _states(presses: list[list[Press]], forces: Sequence[float]) -> Iterator[list[list[Pressed]] | CaseFailure]:
-    """For every force the states of all fingers on all meshes, or why there are none."""
-    ladders = [[press.ladder(forces) for press in own] for own in presses]
+def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
+    """For every force the contacts of both fingers, or why there are none."""
+    ladder = solving.ladder(forces)
     for k, force in enumerate(forces):
         try:
-            yield [[next(ladder) for ladder in own] for own in ladders]
+            yield next(ladder)
         except (ConvergenceError, CheckError) as error:
             good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
             yield CaseFailure(f"{error}; {good}")
@@ -88,14 +85,6 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
     values["fingers/pose_rotation"] = turn @ values["fingers/pose_rotation"]
     values["fingers/pose_origin"] = values["fingers/pose_origin"] @ turn.T
     return replace(result, values=values)
-
-
-def _press(scene: Scene, finger: model.Finger, coarser: bool) -> Press:
-    elements = pad_shape(scene.gripper, coarser).elements
-    symmetry = model.usable_symmetry(scene, finger, elements)
-    wanted, nodal = (model.pad(scene.gripper, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
-    settings = Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
-    return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, settings)
 
 
 def _bounds(scene: Scene, contact: Contact) -> dict[str, Bound]:
@@ -174,15 +163,13 @@ def _mesh_errors(fine: Sequence[Contact], coarse: Sequence[Contact]) -> dict[str
     return errors | {f"maps/{key}_error": abs(value - rough[key]) for key, value in shares.items()}
 
 
-def _result(
-    values: dict[str, Any], contacts: list[list[Contact]], states: list[Pressed], friction: float, effects: dict
-) -> CaseResult:
+def _result(values: dict[str, Any], outcome: Solved, friction: float, effects: dict) -> CaseResult:
     """Values, checks, work and patches of one case."""
-    fine = [c for c, *_ in contacts]
+    fine = [c for c, *_ in outcome.contacts]
     checks = {f"checks/{name}": [getattr(c.state.checks, name) for c in fine] for name in vars(fine[0].state.checks)}
     for key, name in (("newton_iterations", "iterations"), ("load_steps", "steps"), ("cuts", "cuts")):
         values[f"work/{key}"] = [getattr(c.state, name) for c in fine]
-    spent = [s.seconds for s in states]
+    spent = [s.seconds for s in outcome.spent]
     for part in ("assembly", "factorisation", "rest"):
         values[f"work/seconds_{part}"] = sum(getattr(s, part) for s in spent)
     values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}

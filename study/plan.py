@@ -42,7 +42,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     """The plan of a scene; builds its objects, so a mesh is read here."""
     from study import sweep
     from study.build import check_object, pad_shape
-    from study.curvature import derived
+    from study.derived import derived
 
     check_object(scene)
     patches = scene.output.patches != "none"
@@ -74,6 +74,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantity.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    asked["wall"] = getattr(scene.object, "wall", None) is not None
     return tuple(name for name, wanted in asked.items() if wanted)
 
 

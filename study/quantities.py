@@ -10,6 +10,7 @@ from collections.abc import Collection
 
 from study.finger_quantities import CHECKS, FINGER, LIMIT_SURFACE, WORK
 from study.quantity import Quantity, finger
+from study.wall_quantities import WALL
 
 MAPS = (
     Quantity("quality", "", "grasp quality", "Volume of the grasp wrench space spanned by both contacts with unit"
@@ -54,7 +55,10 @@ MAPS = (
              " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
              " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
              " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"
-             " the travel, or fewer than six elements carry load."),
+             " the travel, or fewer than six elements carry load; 8192 the wall has snapped in: the force fell on the"
+             " way to this case while the fingers closed; 16384 the pads push the object along its axis with more than"
+             " friction can hold: it slides out; 32768 the wall's stress is above its yield strength: the dent"
+             " stays."),
     *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
                f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved"
                f" contact cannot carry ({note}); of the finger where it is largest.")
@@ -75,6 +79,7 @@ MAPS = (
              " before the grasp, with the normal force of this case on both fingers, lost it, with the hull of the"
              " sampled wrenches as limit surface (on the safe side). Below 1 it cannot hold the object. The centre of"
              " mass is that of [task], or the middle of the box round the object.", by_model=True, needs="mass"),
+    *(q for q in WALL if q.group == "maps"),
 )
 
 # Levels of each effect, cheapest first; effects/<name>_level holds the position in this list.
@@ -96,6 +101,7 @@ REASONS = (
     "indicator above the target",
     "exact by symmetry",
     "the default level of this version",
+    "the object has no wall",
 )
 
 
@@ -131,7 +137,7 @@ def quantities(has: Collection[str] = (), cor_grid: int = 0, samples: int = 0) -
     samples : int
         Motions whose wrenches are stored for some candidates; 0 for none.
     """
-    everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE
+    everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE + tuple(q for q in WALL if q.group != "maps")
     more = [cor_wrench(cor_grid)] * bool(cor_grid) + [wrench_samples(samples)] * bool(samples)
     return tuple(q for q in (*everything, *more) if not q.needs or q.needs in has)
 

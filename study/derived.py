@@ -1,0 +1,25 @@
+"""Datasets that are filled once, after all cases: each kind of study adds its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from study import curvature, window
+from study.layout import Derived
+from study.scene import Scene
+
+if TYPE_CHECKING:
+    from study.store import ResultWriter
+
+KINDS = (curvature, window)
+
+
+def derived(scene: Scene) -> list[Derived]:
+    """Everything that is derived for a scene."""
+    return [d for kind in KINDS for d in kind.derived(scene)]
+
+
+def finalise(writer: ResultWriter, scene: Scene) -> None:
+    """Fill all of it, by one rank, after all cases."""
+    for kind in KINDS:
+        kind.finalise(writer, scene)

@@ -1,0 +1,187 @@
+"""Solvers of one candidate: both fingers on a rigid object, each by itself, or on a thin wall, together.
+
+Either climbs the ladder of forces and gives the contacts of every force; what comes after does not ask which it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from fem.extract import half_turned, mirrored
+from fem.grip import Grip, Gripped
+from fem.grip_problem import GripProblem
+from fem.press import Press, Pressed, Settings
+from fem.spring_bed import SpringBed
+from fem.thin_walled import Grasp, WallMesh, grasp, linear_wall, nonlinear_wall
+from friction.patch import ContactPatch
+from study import model
+from study.build import pad_shape
+from study.candidates import turn_of_pose
+from study.contact import Contact
+from study.model import Finger
+from study.scene import Scene
+from study.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Contacts of one force: for every finger that on each mesh, the finest first.
+
+    ``spent`` are the states whose work was done for it; ``grips`` those of both fingers on the wall, if it has one.
+    """
+
+    contacts: list[list[Contact]]
+    spent: list[Pressed]
+    grips: list[Gripped]
+
+
+class Solver(Protocol):
+    """Climbs the forces of one candidate.
+
+    ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
+    """
+
+    level: Level | None
+    fingers_solved: int
+    planes: int
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+
+
+def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
+    """Solver for both fingers at first touch, at the level of the object's compliance that the candidate calls for."""
+    if getattr(scene.object, "wall", None) is None:
+        return OnRigid(scene, fingers, poses, None)
+    held = _grasp(scene, fingers, False)
+    pad = model.pad(scene.gripper, held.pad_symmetry, scene.accuracy.contact, False)
+    travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
+    level = choose_level(scene, fingers, held, travel)
+    if level.number == RIGID:
+        return OnRigid(scene, fingers, poses, level)
+    return OnWall(scene, fingers, level)
+
+
+class OnRigid:
+    """Fingers on a rigid object do not feel each other."""
+
+    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: Level | None) -> None:
+        self.scene, self.fingers, self.level = scene, fingers, level
+        self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
+        meshes = (False, True)[: scene.accuracy.meshes]
+        solved = fingers[:1] if self.shared else fingers
+        self.presses = [[_press(scene, f, coarser) for coarser in meshes] for f in solved]
+        self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """See `Solver`."""
+        for states in zip(*(zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses), strict=True):
+            contacts = [
+                [Contact(self.scene, f, state) for state in own] for f, own in zip(self.fingers, states, strict=False)
+            ]
+            if self.shared:  # an image finger has its partner's states; only its place differs
+                contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
+            yield Solved(contacts, [s for own in states for s in own], [])
+
+    def destroy(self) -> None:
+        """See `Solver`."""
+        for press in (p for own in self.presses for p in own):
+            press.destroy()
+
+
+class OnWall:
+    """Fingers on a thin wall press against each other through it."""
+
+    def __init__(self, scene: Scene, fingers: list[Finger], level: Level) -> None:
+        self.scene, self.fingers, self.level = scene, fingers, level
+        meshes = (False, True)[: scene.accuracy.meshes]
+        self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
+        self.grips = [
+            _grip(scene, fingers, held, level, coarser) for held, coarser in zip(self.held, meshes, strict=True)
+        ]
+        self.fingers_solved, self.planes = len(self.held[0].poses), sum(self.held[0].mirrors)
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """See `Solver`."""
+        for states in zip(*(g.ladder(forces) for g in self.grips), strict=True):
+            each = [self._contacts(held, state) for held, state in zip(self.held, states, strict=True)]
+            yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
+
+    def wall_values(self, solved: Solved) -> dict[str, Any]:
+        """What the wall bears at one force, keyed as in ``study.quantities``."""
+        shell = self.grips[0].problem.model.shell
+        return wall_values(self.scene, self.held[0], solved.grips[0], shell)
+
+    def _contacts(self, held: Grasp, state: Gripped) -> list[Contact]:
+        """Contacts of both fingers in their own frames."""
+        contacts = [
+            Contact(self.scene, f, own, half_turned if turned else None)
+            for f, own, turned in zip(self.fingers, state.fingers, held.flipped, strict=False)
+        ]
+        if len(state.fingers) == 1:
+            own = state.fingers[0]
+
+            def image(patch: ContactPatch) -> ContactPatch:
+                return mirrored(own.pad, patch)
+
+            contacts.append(Contact(self.scene, self.fingers[1], own, image))
+        return contacts
+
+    def destroy(self) -> None:
+        """See `Solver`."""
+        for g in self.grips:
+            g.destroy()
+
+
+def _settings(scene: Scene) -> Settings:
+    return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
+
+
+def _press(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    elements = pad_shape(scene.gripper, coarser).elements
+    symmetry = model.usable_symmetry(scene, finger, elements)
+    wanted, nodal = (model.pad(scene.gripper, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
+    return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, _settings(scene))
+
+
+def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
+    """Grasp frame and the planes of symmetry that meshes and scene allow."""
+    even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
+    wanted = scene.effects.model_size
+    allowed = {"full": (False, False), "half": (False, even)}.get(wanted, (True, even))
+    return grasp(thin_body(scene.object), tuple(f.pose for f in fingers), allowed)
+
+
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarser: bool) -> Grip:
+    """Both fingers on the wall."""
+    size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
+    mesh = size.halved() if coarser else size
+    wall_of = linear_wall if level.number == LINEAR else nonlinear_wall
+    wall, faces = wall_of(thin_body(scene.object), held, scene.gripper.pad_size, mesh)
+
+    def problem(rule: str) -> GripProblem:
+        pad = model.pad(scene.gripper, held.pad_symmetry, rule, coarser)
+        return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
+
+    gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
+    rule = scene.accuracy.contact
+    fallback = None if rule == "nodal" else lambda: problem("nodal")
+    return Grip(problem(rule), gaps, held.mirrors, dict(scene.petsc), _settings(scene), fallback)
+
+
+def _gap(finger: Finger, turned: bool):
+    """Gap function in the frame of the pad as it is solved."""
+    if not turned:
+        return finger.gap
+    sign = [-1.0, -1.0, 1.0]
+
+    def gap(x):
+        g, normal, hessian = finger.gap(x * sign)
+        return g, normal * sign, hessian * [[s * t for t in sign] for s in sign]
+
+    return gap
