@@ -1,0 +1,269 @@
+"""Thin-walled bodies traced on triangle meshes: closeness, symmetry, refusals, and shells against closed forms."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fem.mesh_check import MeshError
+from fem.mesh_object import MeshObject
+from fem.outer_surface import Section, of_sections
+from fem.revolution import Revolution
+from fem.section_rays import cast, centroids
+from fem.shape import grid_triangles
+from fem.shell_body import body_mesh
+from fem.shell_grid import MeshSize
+from fem.shell_linear import LinearShell
+from fem.shell_support import supported
+from fem.smoothing import smooth_rings, smooth_spline
+from fem.stacked import Stacked
+from fem.thin_walled import ThinWalled
+from fem.traced_surface import traced
+from fem.turned import Turned
+from fem.wall_material import wall_material
+from tests.fem.grips import can, grip, thin
+from tests.fem.test_grip import e_n
+
+FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
+PET = wall_material("pet")
+RNG = np.random.default_rng(8)
+BOTTLE = Revolution(np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [135, 12]]) / 1e3)
+LEANING = of_sections(
+    [
+        Section(0.0, 0.030, 0.022),
+        Section(0.03, 0.032, 0.022, 2.2, (0.001, 0.0)),
+        Section(0.06, 0.031, 0.023, 2.4, (0.003, 0.001)),
+        Section(0.09, 0.027, 0.022, 2.1, (0.006, 0.002)),
+        Section(0.12, 0.025, 0.022, 2.0, (0.010, 0.002)),
+    ]
+)
+
+
+def grid_mesh(points):
+    """Closed mesh of rings ``points (k, n, 3)`` from bottom to top, closed by fans about their middles."""
+    k, n = points.shape[:2]
+    i, last = np.arange(n), (k - 1) * n
+    j = (i + 1) % n
+    bottom, top = (np.stack([a, b, np.full(n, k * n + m)], 1) for a, b, m in ((j, i, 0), (last + i, last + j, 1)))
+    x = np.concatenate([points.reshape(-1, 3), points[0].mean(axis=0)[None], points[-1].mean(axis=0)[None]])
+    return MeshObject(x, np.concatenate([grid_triangles(k, n, closed=True), bottom, top]))
+
+
+def revolved(body, facet, start=0.0):
+    """Mesh of a body of revolution with triangles of about one size."""
+    s = np.linspace(0, body.curve.breaks[-1], int(body.curve.breaks[-1] / facet))[1:-1]
+    z, r = body.curve.derivative(s).T
+    theta = start + np.linspace(0, 2 * np.pi, 4 * int(np.pi * r.max() / (2 * facet)), endpoint=False)
+    x = np.broadcast_arrays(r[:, None] * np.cos(theta), r[:, None] * np.sin(theta), z[:, None])
+    return grid_mesh(np.stack(x, axis=-1))
+
+
+def sampled(surface, facet):
+    """Mesh of an outer surface."""
+    s = np.linspace(0, surface.end, int(surface.end / facet))[1:-1]
+    theta = np.linspace(0, 2 * np.pi, 4 * int(0.05 / facet), endpoint=False)
+    S, T = np.meshgrid(s, theta, indexing="ij")
+    return grid_mesh(surface.jets(T, S)[:, 0].reshape(*S.shape, 3))
+
+
+def places(surface, n=1500):
+    return RNG.uniform(0, 2 * np.pi, n), RNG.uniform(*surface.wall, n)
+
+
+def test_rays_find_radii_centroids_and_how_often_they_cross():
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.02 + [0.003, 0.001]
+    mesh = grid_mesh(np.stack([np.column_stack([square, np.full(4, h)]) for h in (0.0, 0.02, 0.04)]))
+    z = np.array([0.01, 0.02])  # between the rows of corners and through one
+    assert centroids(mesh.points, mesh.triangles, z) == pytest.approx(np.tile([0.003, 0.001], (2, 1)), abs=1e-15)
+    rays = cast(mesh.points, mesh.triangles, np.array([0.01, 0.02, 0.05]), np.zeros((3, 2)), 8)
+    assert (rays.hits[:2] == 1).all()
+    assert (rays.hits[2] == 0).all()
+    assert np.isnan(rays.outer[2]).all()
+    for row in rays.outer[:2]:
+        assert row[::2] == pytest.approx([0.023, 0.021, 0.017, 0.019], rel=1e-12)
+        assert row[1::2] == pytest.approx(np.sqrt(2) * np.array([0.021, 0.017, 0.017, 0.019]), rel=1e-12)
+
+
+def test_smoothing_keeps_long_waves_and_takes_short_ones():
+    x = np.linspace(0, 1, 801)
+    for length, share in ((0.2, 1 / (1 + 0.5**6)), (0.05, 1 / (1 + 2.0**6))):
+        wave = np.sin(2 * np.pi * x / length)
+        f = smooth_spline(x, wave, 0.1, (0.0, 1.0))(x)
+        inside = np.abs(x - 0.5) < 0.3
+        assert f[inside] @ wave[inside] / (wave[inside] @ wave[inside]) == pytest.approx(share, abs=0.02)
+        ring = smooth_rings(wave[None, :-1], np.array([10.0]), 400)
+        assert ring[0] == pytest.approx(share * wave[:-1:2], abs=1e-12)
+    parabola = 1 + x - 3 * x**2
+    kept = (x < 0.3) | (x > 0.6)
+    assert smooth_spline(x[kept], parabola[kept], 0.1, (0.0, 1.0))(x) == pytest.approx(parabola, abs=1e-9)
+
+
+def test_the_surface_approaches_the_body_with_the_square_of_the_facet_size():
+    """Up to the edges at both ends; on the straight wall by two thirds of the sagitta, inside."""
+    errors, reported, straight = [], [], []
+    for facet in (0.006, 0.003, 0.0015):
+        surface, report = traced(revolved(BOTTLE, facet))
+        assert surface.round
+        assert surface.symmetric == (True, True)
+        theta, s = places(surface)
+        x = surface.jets(theta, s)[:, 0]
+        x = x[(x[:, 2] > 0.01) & (x[:, 2] < 0.125)]
+        gap = BOTTLE.gap(x)[0]
+        errors.append(np.abs(gap).max())
+        columns = 4 * int(np.pi * 0.03 / (2 * facet))
+        sagitta = 0.03 * (1 - np.cos(np.pi / columns))
+        straight.append(gap[np.abs(x[:, 2] - 0.035) < 0.008].mean() / sagitta)
+        reported.append(report.rms)
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 1.7).all(), errors
+    assert (np.log2(np.divide(reported[:-1], reported[1:])) > 1.7).all(), reported
+    assert errors[-1] < 2e-5
+    assert straight == pytest.approx([-2 / 3] * 3, rel=0.02)
+
+
+def test_a_leaning_body_is_followed():
+    exact = Stacked(LEANING)
+    for facet, most in ((0.003, 2e-4), (0.0015, 6e-5)):
+        surface, report = traced(sampled(LEANING, facet))
+        assert surface.symmetric == (False, False)
+        assert not surface.round
+        gap = np.abs(exact.gap(surface.jets(*places(surface, 400))[:, 0])[0])
+        assert gap.max() < most
+        assert report.largest < 2 * most
+        centre = np.array([float(f(np.array([0.11]))[0]) for f in (surface.shift_x, surface.shift_y)])
+        assert centre == pytest.approx(
+            [float(f(np.array([0.11]))[0]) for f in (LEANING.shift_x, LEANING.shift_y)], abs=5e-4
+        )
+
+
+@cache
+def flask():
+    return traced(MeshObject.from_file(FLASK, "mm"))
+
+
+def test_derivatives_and_normals_of_the_surface():
+    surface, h = flask()[0], np.array([1e-4, 1e-6])
+    theta, s = RNG.uniform(-4, 9, 300), RNG.uniform(1e-3, surface.end - 1e-3, 300)
+    lines = np.concatenate([surface.curve.breaks, surface.shape.s])
+    s = s[np.abs(s[:, None] - lines).min(axis=1) > 1e-5]
+    theta = theta[: len(s)]
+    D = surface.jets(theta, s)
+    for axis, pairs in ((0, ((0, 1), (1, 3), (2, 4))), (1, ((0, 2), (1, 4), (2, 5)))):
+        dt, ds = h * (np.arange(2) == axis)
+        found = (surface.jets(theta + dt, s + ds) - surface.jets(theta - dt, s - ds)) / (2 * h[axis])
+        for of, derivative in pairs:
+            assert np.abs(found[:, of] - D[:, derivative]).max() < 1e-4 * np.abs(D[:, derivative]).max()
+    n = surface.normals(theta, s)
+    assert np.abs(np.einsum("nki,ni->nk", D[:, 1:3], n)).max() < 1e-15
+    wall = (s > surface.wall[0]) & (s < surface.wall[1])
+    assert (np.einsum("ni,ni->n", n[wall, :2], D[wall, 0, :2]) > 0).all()
+    assert surface.normals(np.zeros(2), np.array([0.0, surface.end])) == pytest.approx(
+        np.array([[0, 0, -1], [0, 0, 1]]), abs=1e-12
+    )
+
+
+def test_the_flask_of_the_examples():
+    surface, report = flask()
+    assert surface.symmetric == (True, True)
+    assert not surface.round
+    assert report.largest < 3e-4
+    assert report.rms < 6e-5
+    assert max(report.lids) < 4e-4
+    assert report.heights == pytest.approx((0.002, 0.118), abs=1e-3)
+    assert Stacked(surface).axis_symmetry == 2
+    turned = Turned(surface, 0.5 * np.pi, surface.round)
+    assert turned.symmetric == (True, True)
+    mesh = body_mesh(turned, 4e-4, MeshSize(heights=(0.03, 0.05), around=0.004, along=0.006), (True, True))
+    on = np.abs(mesh.theta) < 1e-12
+    assert np.abs(mesh.X[mesh.number[on], 1]).max() < 1e-15
+
+
+@cache
+def traced_can(facet=0.0015):
+    surface, _ = traced(revolved(can(), facet))
+    return ThinWalled(surface, surface.round, 4e-4, PET, "standing")
+
+
+def test_a_traced_can_between_two_fingers_is_the_can():
+    """Force 1 N and 3 N; the facets' sagitta is 8 um, the travels are about 1 mm."""
+    exact, found = (list(grip(body).ladder((1.0, 3.0))) for body in (thin(), traced_can()))
+    for a, b in zip(exact, found, strict=True):
+        assert b.fingers[0].travel == pytest.approx(a.fingers[0].travel, rel=0.01)
+        assert e_n(b.fingers[0]) == pytest.approx(e_n(a.fingers[0]), rel=0.01)
+
+
+def test_a_traced_tube_under_pressure():
+    """Membrane of a long tube with free ends: wider by p R^2 / (E t)."""
+    tube = revolved(Revolution(np.array([[0.0, 0.03], [0.03, 0.03], [0.06, 0.03]])), 0.0015)
+    surface, _ = traced(tube, heights=(0.01, 0.05))
+    mesh = body_mesh(surface, 5e-4, MeshSize(heights=(0.02, 0.04), half_width=1.0), (True, True), open_bottom=True)
+    body, p, R = supported(mesh, PET), 10.0, 0.03 - 2.5e-4
+    load = np.zeros((len(mesh.X), 6))
+    load[:, :3] = p * body.shell.node_area[:, None] * mesh.D / 2.5e-4
+    load = np.where(mesh.symmetric.reshape(-1, 6), 0, load).ravel()
+    q = LinearShell(body.shell, body.fixed).solve(load).reshape(-1, 6)
+    wider = np.einsum("nk,nk->n", q[:, :3], mesh.D) / 2.5e-4
+    assert wider == pytest.approx(p * R**2 / (PET.young_modulus * 5e-4), rel=0.01)
+
+
+def rings(radius, z, n=48):
+    """Mesh from ``radius(theta, z)``."""
+    Z, T = np.meshgrid(z, np.linspace(0, 2 * np.pi, n, endpoint=False), indexing="ij")
+    r = radius(T, Z)
+    return grid_mesh(np.stack([r * np.cos(T), r * np.sin(T), Z], axis=-1))
+
+
+def cup_with_handle():
+    """A cup, and a bar beside it as a handle would be cut."""
+    cup = rings(lambda t, z: 0.03 + 0 * t, np.linspace(0, 0.1, 30))
+    bar = rings(lambda t, z: 0.004 + 0 * t, np.linspace(0.03, 0.07, 12), 12)
+    points = np.concatenate([cup.points, bar.points + np.array([0.0, 0.05, 0.0])])
+    return MeshObject(points, np.concatenate([cup.triangles, bar.triangles + len(cup.points)]))
+
+
+def test_a_handle_is_refused_with_its_place_and_can_be_left_out():
+    with pytest.raises(
+        MeshError, match=r"between z = 0.030\d* m and 0.0[67]\d* m .* most often at (8|9)\d degrees"
+    ) as found:
+        traced(cup_with_handle())
+    assert "choose stations elsewhere" in str(found.value)
+    surface, report = traced(cup_with_handle(), heights=(0.0, 0.029))
+    assert report.largest < 2e-4
+    assert surface.curve.derivative(np.array(surface.wall))[:, 0] == pytest.approx([0.002, 0.029], abs=1e-4)
+    assert np.isnan(report.lids[1])
+
+
+def test_what_does_not_fit_is_refused():
+    ledge = rings(
+        lambda t, z: np.where(z < 0.05, 0.03, 0.022), np.r_[np.linspace(0, 0.0499, 20), np.linspace(0.05, 0.1, 20)]
+    )
+    with pytest.raises(MeshError, match=r"near z = 0.0[45]\d* m at .* (\d|\.)+ mm off the mesh"):
+        traced(ledge)
+    _, report = traced(ledge, heights=(0.0, 0.045))
+    assert report.largest < 1e-4
+    flat = rings(lambda t, z: 0.002 + 4 * z, np.linspace(0, 0.02, 20))
+    with pytest.raises(MeshError, match="no upright wall"):
+        traced(flat)
+    with pytest.raises(MeshError, match="no upright wall"):
+        traced(rings(lambda t, z: 0.03 + 0 * t, np.linspace(0, 0.1, 30)), heights=(0.2, 0.3))
+
+
+def test_round_ends_become_domes():
+    rows = np.linspace(0.04, np.pi - 0.04, 60)
+    surface, report = traced(rings(lambda t, z: np.sqrt(0.03**2 - (z - 0.03) ** 2), 0.03 * (1 - np.cos(rows)), 96))
+    assert surface.flat == (0.0, surface.end)
+    assert surface.round
+    assert max(report.lids) < 1e-4
+    ball = surface.jets(*places(surface))[:, 0] - [0, 0, 0.03]
+    assert np.linalg.norm(ball, axis=1) == pytest.approx(0.03, abs=3e-5)
+
+
+def test_prisms_count_as_round_and_turned_flasks_as_unsymmetric():
+    assert traced(rings(lambda t, z: 0.03 + 0 * t, np.array([0.0, 0.1]), 32))[0].round
+    oval = traced(rings(lambda t, z: 0.03 + 0.002 * np.cos(2 * t - 0.3), np.linspace(0, 0.1, 30)))[0]
+    assert (oval.symmetric, oval.round) == ((False, False), False)
+    egg = traced(rings(lambda t, z: 0.03 + 0.001 * np.cos(3 * t), np.linspace(0, 0.1, 30)))[0]
+    assert egg.symmetric == (False, True)
+    x = np.array([[1.0, -1.0, 1.0]])
+    theta, s = places(egg, 50)
+    assert egg.jets(-theta, s)[:, 0] == pytest.approx(egg.jets(theta, s)[:, 0] * x, abs=1e-15)
