@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import pipeline
+from study import pipeline, solving
 from study.build import build_object
 from study.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
 from study.environment import launch_environment
@@ -122,7 +122,7 @@ def test_both_definitions_of_e_n_say_the_same_torque():
     (OVAL, ("candidates.roll_deg=30",)), (BALL, ("candidates.roll_deg=70",)), (BOX, ()), (OVAL, ()),
 ])  # fmt: skip
 def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overrides):
-    monkeypatch.setattr(pipeline, "turn_of_pose", lambda *_: None)  # solve them one after the other
+    monkeypatch.setattr(solving, "turn_of_pose", lambda *_: None)  # solve them one after the other
     solved.cache_clear()
     for values in cases(shape, *overrides):
         for name, both in values.items():
@@ -138,7 +138,7 @@ def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overri
 def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, shape):
     place = dict(stations="[75]" if shape == CONE else "[0]", angles="[20]")
     shared = cases(shape, **place)
-    monkeypatch.setattr(pipeline, "turn_of_pose", lambda *_: None)
+    monkeypatch.setattr(solving, "turn_of_pose", lambda *_: None)
     solved.cache_clear()
     separate = cases(shape, **place)
     solved.cache_clear()
