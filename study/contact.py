@@ -13,6 +13,7 @@ from fem.extract import extract
 from fem.press import Pressed
 from friction.frame import Frame, contact_frame, contact_length, in_frame
 from friction.patch import ContactPatch
+from friction.torque import pure_torque
 from friction.wrench import FrictionLimits, friction_limits
 from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from study.model import Finger
@@ -67,6 +68,7 @@ class Contact:
             name: replace(found, f_x=mu * found.f_x, f_y=mu * found.f_y, tau_z=mu * found.tau_z)
             for name, found in self.unit_limits.items()
         }
+        self.tau_pure = pure_torque(self.local, mu)
         self.ellipsoids: dict[str, Ellipsoid] = {
             name: three_motion_ellipsoid(*found.per_unit_force, self.rho) for name, found in self.limits.items()
         }

@@ -9,6 +9,7 @@ FINGER = (
     finger("fingers", "f_y_max", "N", "largest friction along y", "As the map, for each finger.", by_model=True),
     finger("fingers", "tau_z_max", "N m", "largest friction torque about z", "As the map, for each finger.",
             by_model=True),
+    finger("fingers", "tau_pure", "N m", "largest torque without a net force", "As the map, for each finger."),
     finger("fingers", "S", "N", "pressure times area", "As the map, for each finger."),
     finger("fingers", "F_N", "N", "normal force", "As the map, for each finger."),
     finger("fingers", "travel", "m", "travel of the pad", "As the map, for each finger."),

@@ -104,6 +104,7 @@ def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, B
     scores, score_flag = grasp_values(scene, obj, contacts, bounds)
     areas = [float(c.patch.area[c.patch.pressure > 0].sum()) for c in contacts]
     values = {
+        "maps/tau_pure": min(c.tau_pure for c in contacts),
         "maps/S": S.mean(),
         "maps/F_N": F_N.mean(),
         "maps/travel": np.mean([c.state.travel for c in contacts]),
@@ -113,6 +114,7 @@ def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, B
         "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
         "maps/misalignment": max(angles(*contacts)),
         "maps/flags": flags(contacts, scene.friction.mu, score_flag),
+        "fingers/tau_pure": [c.tau_pure for c in contacts],
         "fingers/S": S,
         "fingers/F_N": F_N,
         "fingers/travel": [c.state.travel for c in contacts],

@@ -37,6 +37,9 @@ MAPS = (
              " the pad slides along y; of the weaker finger.", by_model=True),
     Quantity("tau_z_max", "N m", "largest friction torque about z", "Total friction torque about the contact normal"
              " when the pad turns about it; of the weaker finger.", by_model=True),
+    Quantity("tau_pure", "N m", "largest torque without a net force", "Largest torque about the contact normal that the"
+             " contact carries while it transmits no force in its plane; tau_z_max comes with such a force where the"
+             " patch is not symmetric. Curved model, of the weaker finger."),
     Quantity("S", "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", "N", "normal force", "Sum of pressure times area times (n . N), the force along the contact normal;"
              " mean of both fingers."),

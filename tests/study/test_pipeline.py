@@ -87,6 +87,14 @@ def test_on_a_plane_all_models_are_one_and_nothing_is_overestimated():
         assert values["maps/flags"] == 0
 
 
+def test_the_torque_without_a_force_is_the_largest_one_on_symmetric_patches_and_less_elsewhere():
+    for values in cases(PLATE):
+        assert values["fingers/tau_pure"] == pytest.approx(values["fingers/tau_z_max"][:, CURVED], rel=1e-8)
+    lower = [v["maps/tau_pure"] / v["maps/tau_z_max"][CURVED] for v in cases(CONE, stations="[75]")]
+    assert 0.9 < min(lower)
+    assert max(lower) < 1 - 1e-6
+
+
 @pytest.mark.parametrize("angle", [0, 30, 90])
 def test_the_curved_limits_lie_between_the_planar_ones(angle):
     for values, force in zip(cases(OVAL, angles=f"[{angle}]", elements="[8, 8, 4]"), (2.0, 5.0), strict=True):
