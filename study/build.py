@@ -67,6 +67,11 @@ def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
 
     if shape.shape == "revolution":
         return of_revolution(build_object(shape)), True
+    if shape.shape == "mesh":
+        from fem.traced_surface import traced
+
+        surface, _ = traced(build_object(shape))
+        return surface, surface.round
     sections = [Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections]
     return of_sections(sections), shape.axis_symmetry == 0
 
@@ -98,6 +103,8 @@ def check_object(scene: Scene) -> None:
             return
         try:
             build_object(shape)
+            if shape.shape == "mesh" and shape.wall is not None:
+                outer_surface(shape)
         except ValueError as error:
             raise StudyError(USAGE, f"{key}: {error}") from error
         if shape.shape == "mesh":
