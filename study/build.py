@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fem.outer_surface import OuterSurface
     from fem.pad_shape import PadShape
     from fem.shape import GapObject
+    from fem.traced_surface import TracedSurface, TraceReport
     from study.scene import Scene
     from study.scene.sections import Gripper
     from study.scene.shapes import Shape, Walled
@@ -68,12 +69,18 @@ def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
     if shape.shape == "revolution":
         return of_revolution(build_object(shape)), True
     if shape.shape == "mesh":
-        from fem.traced_surface import traced
-
-        surface, _ = traced(build_object(shape))
+        surface, _ = _traced(shape)
         return surface, surface.round
     sections = [Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections]
     return of_sections(sections), shape.axis_symmetry == 0
+
+
+@lru_cache(maxsize=8)
+def _traced(shape: Walled) -> tuple[TracedSurface, TraceReport]:
+    """Smooth surface of a mesh's wall, and how far it is from the mesh."""
+    from fem.traced_surface import traced
+
+    return traced(build_object(shape))
 
 
 def shapes_of(scene: Scene) -> list[Shape]:
@@ -133,8 +140,21 @@ def axis_span(shape: Shape) -> tuple[float, float] | None:
 
 def warnings(scene: Scene) -> tuple[str, ...]:
     """Sentences about values that are allowed but seldom meant; builds the object if it is a mesh."""
-    edges = (station_warnings(shape, axis_span(shape), scene.candidates, scene.gripper) for shape in shapes_of(scene))
-    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()))
+    shapes = shapes_of(scene)
+    edges = (station_warnings(shape, axis_span(shape), scene.candidates, scene.gripper) for shape in shapes)
+    walls = [_distance(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
+    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls)
+
+
+def _distance(shape: Walled) -> str:
+    """How far the wall that is simulated lies from the mesh that it was traced on."""
+    _, report = _traced(shape)
+    z, theta = report.place
+    return (
+        f"the wall traced on {shape.mesh} lies {1e3 * report.rms:.2g} mm (rms), at most {1e3 * report.largest:.2g} mm,"
+        f" from the mesh, farthest at z = {1e3 * z:.3g} mm, {math.degrees(theta):.3g} deg; waves shorter than"
+        f" {1e3 * report.wavelength:.2g} mm are smoothed out"
+    )
 
 
 def pad_material(gripper: Gripper) -> Material:
