@@ -6,14 +6,15 @@ import csv
 import io
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from study.layout import DONE
+from study.ranking import BORNE, FLAGS, OF_FILE, borne_level, judged, ranking
 
-DISPLAY = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / np.pi)}  # what people read; programs get SI
+DISPLAY = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / np.pi), "Pa": ("MPa", 1e-6)}  # people read this; programs get SI
 COLUMNS = (  # map, friction model ("" where it has none), unit
     ("quality", "curved", ""),
     ("quality_fitted", "curved", ""),
@@ -24,59 +25,46 @@ COLUMNS = (  # map, friction model ("" where it has none), unit
     ("f_y_max", "curved", "N"),
     ("tau_z_max", "curved", "N m"),
 )
-SOMETIMES = (("safety_factor", "curved", ""), ("e_n_error", "", ""))  # columns of files that have the map
-LOST = 1024 | 2048  # flags of a grasp that does not hold as it was computed
-FLAGS = (  # as study.quantities defines them
-    (1, "no torque", "a contact carries no torque about its normal"),
-    (2, "no force", "a contact carries no force along one of its axes"),
-    (8, "hole", "the centre of pressure lies over a hole of the patch"),
-    (4 + 16, "frame", "the contact frame came from a rule for degenerate patches"),
-    (32, "mixed", "normals of a patch point to opposite sides: its normal force and frame cannot be trusted"),
-    (64, "overhang", "some loaded faces of a patch are turned more than 90 deg from the contact normal"),
-    (256, "askew", "contacts more than 5 deg from antipodal"),
-    (512, "nodal", "solved with nodal gaps, because weighted ones had no solution"),
-    (1024, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"),
-    (2048, "overlap", "the fingers' pads run into each other beside the object"),
-    (4096, "coarse", "the mesh is coarse for this contact: take more elements before trusting the numbers"),
+SOMETIMES = (  # columns of files that have the map
+    ("safety_factor", "curved", ""),
+    ("dent", "", "m"),
+    ("wall_stress", "", "Pa"),
+    ("e_n_error", "", ""),
 )
-HEADS = {"quality_fitted": "fitted", "safety_factor": "safety"}  # names that are too long for a line of text
+WINDOW = ("force_low", "force_high")  # derived bounds; people see them in one column
+WINDOW_MEANS = "normal forces that hold the object's weight and that its wall bears, as far as forces were solved"
+# names that are too long for a line of text
+HEADS = {"quality_fitted": "fitted", "safety_factor": "safety", "wall_stress": "stress"}
 Columns = tuple[tuple[str, str], ...]  # names and units
 
 
 @dataclass(frozen=True)
 class Table:
-    """Grasps in the order of their quality: names and units of the columns, and the rows."""
+    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows."""
 
     title: str
     columns: Columns
     rows: tuple[tuple[Any, ...], ...]
-
-
-def ranking(score: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """Positions from the best to the worst: by score, but grasps that slip or whose pads meet come last.
-
-    >>> ranking(np.array([1.0, 3.0, 2.0]), np.array([0, 1024, 0])).tolist()
-    [2, 0, 1]
-    """
-    lost = (np.nan_to_num(flags).astype(int) & LOST) > 0
-    return np.lexsort((-np.nan_to_num(score, nan=-np.inf), lost))
+    force: float
 
 
 def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
-    """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N], by default at the highest one.
+    """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N].
 
+    The default is the highest level, or the highest at which a grasp is within its window of forces where there is one.
     With ``whole_lines`` images of one grasp, which share a line of `as_text`, count as one.
     """
-    forces = result.axes[-1].values
-    k = len(forces) - 1 if force is None else int(np.abs(forces - force).argmin())
+    forces, flags = result.axes[-1].values, judged(result)
+    k, why = _level(result, flags, force)
     maps = {(name, units): found[..., k].ravel() for name, units, found in _maps(result)}
     score = next(maps[c] for c in (("quality", ""), ("e_n", "m")) if c[0] == "e_n" or np.isfinite(maps[c]).any())
     done = np.flatnonzero(result.status[..., k].ravel() == DONE)
-    flags = np.nan_to_num(result.map("flags")[..., k].ravel())
+    flags = flags[..., k].ravel()
     order = done[ranking(score[done], flags[done])]
     labels = np.broadcast_to(result.labels, result.layout.shape[:-1]).ravel()
     named = [("label", "")] if has_poses(result) else []
     head = [(axis.name, axis.units) for axis in result.axes[:-1]]
+    maps |= {(name, "N"): bound.ravel() for name, bound in _window(result).items()}
     titles = (("rank", ""), *head, *maps, ("flags", ""), *named)
 
     def row(rank: int, i: int) -> tuple[Any, ...]:
@@ -86,9 +74,26 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
         return (rank, *place, *values, int(flags[i]), *([str(labels[i])] * len(named)))
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
-    nearest = "" if force is None or np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
-    return Table(f"{what} at {forces[k]:g} N{nearest}", titles, tuple(rows))
+    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]))
+
+
+def _level(result: Any, flags: np.ndarray, force: float | None) -> tuple[int, str]:
+    """Number of the force level that is shown, and why where that is not plain."""
+    forces = result.axes[-1].values
+    if force is not None:
+        k = int(np.abs(forces - force).argmin())
+        return k, "" if np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
+    k = borne_level(result.status, flags) if (flags & BORNE).any() else None
+    if k is None or k == len(forces) - 1:
+        return len(forces) - 1, ""
+    return k, ", the highest that a grasp holds and its wall bears"
+
+
+def _window(result: Any) -> dict[str, np.ndarray]:
+    """Derived bounds of the forces, over all axes but the force."""
+    there = {d.name for d in getattr(result.layout, "derived", ())}
+    return {name: result.derived(name) for name in WINDOW if name in there}
 
 
 def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
@@ -115,6 +120,7 @@ def as_text(table: Table) -> str:
     """Aligned columns, lengths in mm and angles in degrees; images of one grasp share a line, flags are words."""
     if not table.rows:
         return table.title
+    table = _for_people(table)
     shown = [DISPLAY.get(units, (units, 1.0)) for _, units in table.columns]
     names, flags = [name for name, _ in table.columns], 0
     short = [HEADS.get(name, name) for name in names]
@@ -131,7 +137,38 @@ def as_text(table: Table) -> str:
     widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [head, *body]]
     legend = [f"{word}: {meaning}" for mask, word, meaning in FLAGS if flags & mask]
+    legend += [f"window: {WINDOW_MEANS}"] * ("window" in names)
     return "\n".join([table.title, *lines, *legend])
+
+
+def _for_people(table: Table) -> Table:
+    """Both bounds of the window of forces in one column of text."""
+    at = [i for i, (name, _) in enumerate(table.columns) if name in WINDOW]
+    if not at:
+        return table
+
+    def merged(row: tuple[Any, ...], one: Any) -> tuple[Any, ...]:
+        return (*row[: at[0]], one, *row[at[-1] + 1 :])
+
+    names = [table.columns[i][0] for i in at]
+    rows = tuple(merged(row, _window_text(dict(zip(names, (row[i] for i in at), strict=True)))) for row in table.rows)
+    return replace(table, columns=merged(table.columns, ("window", "N")), rows=rows)
+
+
+def _window_text(bounds: dict[str, float]) -> str:
+    """The window of forces as people read it.
+
+    >>> _window_text({"force_low": 0.8, "force_high": 2.5}), _window_text({"force_high": 2.5})
+    ('0.8..2.5', '..2.5')
+    >>> _window_text({"force_low": 3.0, "force_high": 2.5}), _window_text({"force_low": np.nan})
+    ('none', '-')
+    """
+    low, high = (bounds.get(name, np.nan) for name in WINDOW)
+    if np.isnan([*bounds.values()]).all():
+        return "-"
+    if "force_low" in bounds and "force_high" in bounds and not low <= high:
+        return "none"
+    return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high))
 
 
 def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
@@ -159,10 +196,11 @@ def _words(flags: int) -> str:
 
 
 def as_json(table: Table) -> str:
-    """One object with the title, the units (SI) and a list of grasps; what is not there is null."""
+    """One object with the title, the force [N], the units (SI) and a list of grasps; what is not there is null."""
     names = [name for name, _ in table.columns]
     rows = [dict(zip(names, map(_plain, row), strict=True)) for row in table.rows]
-    return json.dumps({"title": table.title, "units": dict(table.columns), "grasps": rows}, indent=2)
+    told = {"title": table.title, "force": table.force, "units": dict(table.columns), "grasps": rows}
+    return json.dumps(told, indent=2)
 
 
 def as_csv(table: Table) -> str:
@@ -189,6 +227,9 @@ def place(result: Any, row: int) -> str:
 
 
 def _plain(value: Any) -> Any:
+    """A value for programs; flags, the only integers but ranks, as the file has them."""
+    if isinstance(value, int):
+        return value & OF_FILE
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
