@@ -22,6 +22,7 @@ def scene_text(scene: Any, file: str) -> str:
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
     rows = {
         "object": f"{o.shape}{name}{_extent(o)}",
+        "wall": wall_text(o),
         "candidates": where,
         "forces": _list(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; curved, flat and projected",
@@ -30,11 +31,54 @@ def scene_text(scene: Any, file: str) -> str:
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
         "effects": ", ".join(levels),
+        "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "results": scene.output.file,
     }
     told = [f"warning: {text}" for text in warnings(scene)]
     return "\n".join([f"{file}: no errors", *aligned(rows), *told])
+
+
+def has_wall(shape: Any) -> bool:
+    """Whether an object is hollow."""
+    return getattr(shape, "wall", None) is not None
+
+
+def wall_text(shape: Any) -> str:
+    """Thickness, material and support of an object's wall; empty for a rigid object."""
+    if not has_wall(shape):
+        return ""
+    from fem.wall_material import wall_material
+
+    name = None if shape.wall_material == "custom" else shape.wall_material
+    found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+    given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
+    thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
+    strength = (
+        f", yields at {found.yield_strength / 1e6:g} MPa" if found.yield_strength else ", yield strength not known"
+    )
+    words = [
+        f"{thickness} mm {shape.wall_material} ({found.young_modulus / 1e9:g} GPa{strength})",
+        shape.support,
+        "open top" if shape.open_top else "closed top",
+        f"dents up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "no limit for dents",
+    ]
+    return ", ".join(words)
+
+
+RULE = (  # as study.wall chooses
+    "by the dent that a linear wall would get at the largest force: rigid below 2 % of the pads' travel, linear shell"
+    " up to 0.6 of the wall's thickness, nonlinear shell beyond"
+)
+
+
+def compliance_text(scene: Any) -> str:
+    """How an object's wall will be simulated."""
+    level = scene.effects.object
+    if level == "auto":
+        return f"chosen for each candidate: {RULE}"
+    told = "no dent and no stress will be known" if level == "rigid" else "as the scene says"
+    return f"{level.replace('_', ' ')} for every candidate, {told}"
 
 
 def _extent(shape: Any) -> str:

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from study.layout import Header, Layout
-from study.overview import aligned
+from study.overview import aligned, has_wall
 from study.progress import duration
+from study.wall_cost import wall_size
+from study.wall_quantities import ALONG, AROUND
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -74,7 +76,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantity.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
-    asked["wall"] = getattr(scene.object, "wall", None) is not None
+    asked["wall"] = has_wall(scene.object)
     return tuple(name for name, wanted in asked.items() if wanted)
 
 
@@ -111,9 +113,16 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
 
 
 def memory(scene: Any) -> float:
-    """Rough memory of one rank [bytes]: the libraries, and the factors of the whole pad's stiffness."""
+    """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
     nx, ny, nz = (n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in scene.gripper.elements)
-    return LIBRARIES + 8.0 * FILL * (3.0 * nx * ny * nz) ** (4.0 / 3.0)
+    pad = 8.0 * FILL * (3.0 * nx * ny * nz) ** (4.0 / 3.0)
+    wall = wall_size(scene) if shells(scene) else None
+    return LIBRARIES + pad + (wall.memory if wall else 0.0)
+
+
+def shells(scene: Any) -> bool:
+    """Whether the object's wall may be simulated as a shell."""
+    return has_wall(scene.object) and scene.effects.object != "rigid"
 
 
 def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
@@ -141,26 +150,49 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     forces = layout.shape[-1]
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
-    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
+    shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
+    space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + (f", {shapes:.1f} MB of it deformed walls" if shapes else "")
     free = _free(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} ladders of {forces} forces{symmetric}",
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
-        "time": _time(plan, path, ranks),
+        "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
     }
     return "\n".join(aligned(rows))
 
 
-def _time(plan: Plan, path: Path, ranks: int) -> str:
+def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     seconds = _seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        return f"not known before a few ladders are in {path}: start the run, then plan again"
+        known = f"known better when a few ladders are in {path}: start the run, then plan again"
+        return (
+            f"{_wall_time(plan, scene, ranks)}; {known}"
+            if shells(scene)
+            else f"not {known.replace(' better when', ' before')}"
+        )
     whole = duration(makespan(expected, ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
+
+
+def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
+    """Rule of thumb for walls, between the cheapest and the costliest level of all candidates."""
+    wall = wall_size(scene)
+    if wall is None:
+        return "not known yet for this wall"
+    level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
+    times = sorted(level.get(scene.effects.object, wall.seconds))
+    ladders = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
+    whole = [duration(each * makespan(ladders, ranks)) for each in (times[0], times[-1])]
+    names = (
+        "all candidates rigid, or all on the costliest shell"
+        if len(times) > 1
+        else scene.effects.object.replace("_", " ")
+    )
+    return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
 
 
 def _seconds(layout: Layout, path: Path) -> Any:
