@@ -21,6 +21,7 @@ FEW = 64  # rays per height of that look
 STEEP = 1.0  # slope dr/dz from which a surface counts as bottom or top, not as wall
 STEEPEST = 4.0  # slope up to which the outline is followed by its length
 LEAST = 0.3  # of the height has to be wall
+END = 0.1  # of the height may be folded at either end, as a hollow bottom is, and count as bottom or top
 DOME = 0.9  # a rounding that reaches this far to the axis is drawn as a dome
 
 
@@ -65,7 +66,8 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     centre = np.nan_to_num(centroids(mesh.points, mesh.triangles, z))
     rays = cast(mesh.points, mesh.triangles, z, centre, FEW)
     r = np.nan_to_num(rays.outer).mean(axis=1)
-    bad, slope = folded(rays, facet).any(axis=1), np.gradient(r, z)
+    at_end = np.abs(z - 0.5 * (low + high)) > (0.5 - END) * (high - low)
+    bad, slope = folded(rays, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
     found = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     asked = wanted or (low, high)
