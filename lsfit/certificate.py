@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lsfit.form import hessian_tensor
+from lsfit.definite import definite_freedom
+from lsfit.form import hessian_tensor, substitute
 from lsfit.geometry import directions
-from lsfit.sos import MARGIN, ball_freedom, gram_matrix, most_definite
+from lsfit.quartic_surface import Quartic
+from lsfit.sos import MARGIN, ball_freedom, gram_matrix
+from lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
 
@@ -20,9 +24,6 @@ class Certificate:
 
     Parameters
     ----------
-    smallest_eigenvalue : float
-        Smallest eigenvalue of the second derivative of ``P`` over unit wrenches (of a flat body, those in its span).
-        Searched from many starts; the proof is the Gram matrix.
     gram_eigenvalue : float
         Smallest eigenvalue of ``gram``. Not negative: ``P`` is convex.
     gram : (r * r, r * r) array
@@ -31,27 +32,45 @@ class Certificate:
         ``B``.
     by : str
         ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
+    surface : Quartic or Image
+        What is proved convex.
     """
 
-    smallest_eigenvalue: float
     gram_eigenvalue: float
     gram: FloatArray
     frame: FloatArray
     by: str
+    surface: Quartic | Image = field(repr=False)
+
+    @cached_property
+    def smallest_eigenvalue(self) -> float:
+        """Smallest eigenvalue of the second derivative of ``P`` over unit wrenches (of a flat body, those in its span).
+
+        Searched from many starts; the proof is the Gram matrix.
+        """
+        # Curvature is at least this. Rounding of very unequal coefficients can hide it from the search.
+        bound = self.gram_eigenvalue * np.linalg.norm(self.frame, 2) ** -4
+        surface = self.surface
+        if isinstance(surface, Quartic):
+            return max(smallest_eigenvalue(surface.coefficients, surface.dimension), bound)
+        R, inner = np.linalg.qr(surface.B)[1], surface.inner
+        assert isinstance(inner, Quartic)
+        turned = substitute(inner.coefficients, inner.exponents, np.linalg.inv(R))
+        return max(smallest_eigenvalue(turned, inner.dimension), bound)
 
 
 def certify(v: FloatArray, dimension: int) -> FloatArray | None:
     """Gram matrix of the quartic with coefficients ``v`` if one is positive definite, else None.
 
-    Three ways in order of cost: the Gram matrix nearest to that of a ball; none if a direction of negative curvature
-    is found; the most definite one of the affine family.
+    The one nearest to that of a ball is tried first, then the others are searched, until one is found or none can be.
     """
     gram = gram_matrix(v, ball_freedom(dimension), dimension)
     if np.linalg.eigvalsh(gram)[0] >= MARGIN:
         return gram
-    if smallest_eigenvalue(v, dimension) < 0:
+    change = definite_freedom(gram, dimension, 2 * MARGIN)
+    if change is None:
         return None
-    gram = gram_matrix(v, most_definite(gram, dimension) + ball_freedom(dimension), dimension)
+    gram = gram_matrix(v, change + ball_freedom(dimension), dimension)
     return gram if np.linalg.eigvalsh(gram)[0] >= MARGIN else None
 
 

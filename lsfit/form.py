@@ -9,6 +9,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsfit.sums import fill_monomials
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -31,25 +33,25 @@ def exponents(dimension: int, degree: int) -> IntArray:
 
 def monomials(w: ArrayLike, E: IntArray) -> FloatArray:
     """Monomials ``w^E``, ``(m, d), (k, d) -> (m, k)``."""
-    power = _powers(w, int(E.max(initial=0)))
-    return _product(power, E)
+    W = np.ascontiguousarray(np.atleast_2d(np.asarray(w, float)))
+    out = np.empty((len(W), len(E)))
+    fill_monomials(W, E, out)
+    return out
 
 
 def monomial_gradients(w: ArrayLike, E: IntArray) -> FloatArray:
     """Gradients of the monomials, ``(m, d), (k, d) -> (m, k, d)``."""
-    power = _powers(w, int(E.max(initial=0)))
-    return np.stack([E[:, i] * _product(power, _lower(E, i)) for i in range(E.shape[1])], axis=-1)
+    return np.stack([E[:, i] * monomials(w, _lower(E, i)) for i in range(E.shape[1])], axis=-1)
 
 
 def monomial_hessians(w: ArrayLike, E: IntArray) -> FloatArray:
     """Second derivatives of the monomials, ``(m, d), (k, d) -> (m, k, d, d)``."""
-    power = _powers(w, int(E.max(initial=0)))
-    m, (k, d) = power.shape[1], E.shape
-    H = np.empty((m, k, d, d))
+    k, d = E.shape
+    H = np.empty((len(np.atleast_2d(w)), k, d, d))
     for i in range(d):
         for j in range(i + 1):
             low = _lower(E, i)
-            H[:, :, i, j] = H[:, :, j, i] = E[:, i] * low[:, j] * _product(power, _lower(low, j))
+            H[:, :, i, j] = H[:, :, j, i] = E[:, i] * low[:, j] * monomials(w, _lower(low, j))
     return H
 
 
@@ -104,21 +106,6 @@ def _interpolation(dimension: int, degree: int) -> tuple[FloatArray, FloatArray]
     points = np.random.default_rng(len(E)).normal(size=(3 * len(E), dimension))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     return points, np.linalg.pinv(monomials(points, E))
-
-
-def _powers(w: ArrayLike, degree: int) -> FloatArray:
-    """Powers 0 to ``degree``, ``(degree + 1, m, d)``."""
-    w = np.atleast_2d(np.asarray(w, float))
-    power = np.ones((degree + 1, *w.shape))
-    np.cumprod(np.broadcast_to(w, (degree, *w.shape)), axis=0, out=power[1:])
-    return power
-
-
-def _product(power: FloatArray, E: IntArray) -> FloatArray:
-    out = power[:, :, 0].take(E[:, 0], axis=0)
-    for i in range(1, E.shape[1]):
-        out *= power[:, :, i].take(E[:, i], axis=0)
-    return out.T
 
 
 def _lower(E: IntArray, i: int) -> IntArray:

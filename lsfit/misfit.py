@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsfit.samples import checked_motions
+from lsfit.sums import mean_errors
 from lsfit.surface import LimitSurface
 
 __all__ = ["LimitSurface", "Misfit", "misfit"]
@@ -43,6 +45,9 @@ def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
     W, motions = checked_motions(W, T)
     assert motions is not None
     P, G = model.value(W), model.gradient(W)
+    if model.rank == model.dimension:
+        E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
+        return Misfit(E1, Erad, math.degrees(angle))
     with np.errstate(divide="ignore"):
         radius = np.maximum(P, 0.0) ** (-1 / model.degree)
     return Misfit(
@@ -53,19 +58,15 @@ def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
 
 
 def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
-    """Angles ``(m,)`` between motions and gradients, or the gradients and all that is normal to the span."""
+    """Angles ``(m,)`` between motions and all that is normal to a flat surface: gradients plus what leaves its span."""
     length = np.linalg.norm(G, axis=1, keepdims=True)
     u = G / np.where(length > 0, length, 1.0)
-    if span.shape[1] < span.shape[0]:
-        across = T - T @ span @ span.T
-        ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
-        u = across + ahead * u
-        size = np.linalg.norm(u, axis=1, keepdims=True)
-        # A motion against the gradient is a right angle away from all that is normal to the span.
-        return np.where(size[:, 0] > 0, _angle(u / np.where(size > 0, size, 1.0), T), np.pi / 2)
-    return _angle(u, T)
-
-
-def _angle(u: FloatArray, t: FloatArray) -> FloatArray:
-    # The half-angle form keeps its digits where the arc cosine of a number near one loses them.
-    return 2 * np.arctan2(np.linalg.norm(u - t, axis=1), np.linalg.norm(u + t, axis=1))
+    across = T - T @ span @ span.T
+    ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
+    u = across + ahead * u
+    size = np.linalg.norm(u, axis=1, keepdims=True)
+    u /= np.where(size > 0, size, 1.0)
+    # The half-angle form keeps its digits where the arc cosine of a number near one loses them. A motion against the
+    # gradient is a right angle away from all that is normal to the span.
+    angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
+    return np.where(size[:, 0] > 0, angle, np.pi / 2)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.certificate import Certificate, certify, smallest_eigenvalue
+from lsfit.certificate import Certificate, certify
 from lsfit.ellipsoid import FAR, nearest_solution
 from lsfit.flag import FitError, FitFlag
-from lsfit.form import exponents, monomials, substitute
-from lsfit.geometry import directions
+from lsfit.geometry import half_sphere_monomials
 from lsfit.quartic_surface import Quartic
-from lsfit.round import ball_coefficients, placed, residuals, round_samples
+from lsfit.round import Residuals, ball_coefficients, placed, round_samples
 from lsfit.sos import MARGIN, convex_least_squares
 from lsfit.surface import Image
 
@@ -32,19 +32,30 @@ class QuarticFit:
         The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
     certificate : Certificate
         Proof that the quartic is convex.
-    objective : float
-        ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)`` over the samples.
-    least_objective : float
-        The same for the best quartic, convex or not; equal if that one is convex.
     flag : FitFlag
         What the reader should know.
+    residuals : Residuals
+        What was minimised.
+    found, least : (k,) array
+        Coefficients of the quartic, and of the best one, convex or not, in the coordinates of the residuals.
     """
 
     surface: Quartic | Image
     certificate: Certificate
-    objective: float
-    least_objective: float
     flag: FitFlag
+    residuals: Residuals = field(repr=False)
+    found: FloatArray = field(repr=False)
+    least: FloatArray = field(repr=False)
+
+    @cached_property
+    def objective(self) -> float:
+        """``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)`` over the samples."""
+        return self.residuals.objective(self.found)
+
+    @cached_property
+    def least_objective(self) -> float:
+        """The same for the best quartic, convex or not; equal if that one is convex."""
+        return self.residuals.objective(self.least)
 
     @property
     def rank(self) -> int:
@@ -73,7 +84,7 @@ def least_squares_quartic(
         If a sample is not finite, or all wrenches are zero.
     """
     samples = round_samples(W, T)
-    v, flag = nearest_solution(*residuals(samples, beta, gamma).normal(), ball_coefficients(samples.B.shape[1]))
+    v, flag = nearest_solution(*Residuals(samples, beta, gamma).normal(), ball_coefficients(samples.B.shape[1]))
     return placed(v, samples, samples.flag | flag)
 
 
@@ -99,33 +110,21 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     """
     samples = round_samples(W, T)
     r = samples.B.shape[1]
-    problem = residuals(samples, beta, gamma)
+    problem = Residuals(samples, beta, gamma)
     N, b = problem.normal()
     ball = ball_coefficients(r)
-    v, flag = nearest_solution(N, b, ball)
-    least, loose = problem.objective(v), bool(flag)
+    least, flag = nearest_solution(N, b, ball)
+    v, loose = least, bool(flag)
     by, gram = "least squares", certify(v, r)
     if gram is None:
         by = "semidefinite programme"
         v, gram = convex_least_squares(N, b, ball, r, loose)
-    u = directions(r, 200)
-    if (monomials(u, exponents(r, 4)) @ v).min() < FAR**-4:
+    if (half_sphere_monomials(r, 200) @ v).min() < FAR**-4:
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
         v, gram = convex_least_squares(N, b, ball, r, loose, 12 * FAR**-4)
     surface = placed(v, samples, samples.flag | flag)
     low = float(np.linalg.eigvalsh(gram)[0])
     if low < MARGIN / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    # Curvature at unit wrenches is at least this. Rounding of very unequal coefficients can hide it from the search.
-    bound = low * np.linalg.norm(samples.B, 2) ** -4
-    certificate = Certificate(max(_smallest(surface), bound), low, gram, samples.B, by)
-    return QuarticFit(surface, certificate, problem.objective(v), least, surface.flag)
-
-
-def _smallest(surface: Quartic | Image) -> float:
-    if isinstance(surface, Quartic):
-        return smallest_eigenvalue(surface.coefficients, surface.dimension)
-    R = np.linalg.qr(surface.B)[1]
-    inner = surface.inner
-    assert isinstance(inner, Quartic)
-    return smallest_eigenvalue(substitute(inner.coefficients, inner.exponents, np.linalg.inv(R)), inner.dimension)
+    certificate = Certificate(low, gram, samples.B, by, surface)
+    return QuarticFit(surface, certificate, surface.flag, problem, v, least)

@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsfit.flag import FitError, FitFlag
 from lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
-from lsfit.geometry import ball_integral, directions, quartic_shadow, round_frame, supported_shadow
+from lsfit.geometry import (
+    directions,
+    half_sphere_monomials,
+    quartic_shadow,
+    quartic_volume,
+    round_frame,
+    supported_shadow,
+)
 from lsfit.newton import support_points
 from lsfit.surface import LevelSet, checked_factors, rows
 
@@ -99,14 +106,14 @@ class Quartic(LevelSet):
     @cached_property
     def volume(self) -> float:
         """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-3 or better beyond."""
-        V = ball_integral(self._round.value, self.dimension, 4)
+        V = quartic_volume(self._round.coefficients, self.dimension)
         return abs(float(np.linalg.det(self.frame))) * V
 
     @cached_property
     def shadow_area(self) -> float:
         """Area of the shadow on the plane of the first two components, for a convex quartic."""
         if self.dimension == 3:
-            return quartic_shadow(self.coefficients, self.semi_axes)
+            return quartic_shadow(self.coefficients, np.linalg.norm(self.frame, axis=1))
         if self.dimension == 2:
             return self.volume
         return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
@@ -158,5 +165,6 @@ class Quartic(LevelSet):
 
     @cached_property
     def _surface_points(self) -> FloatArray:
-        u = directions(self.dimension, 30 * self.dimension**2)
-        return u * self._round.radius(u)[:, None]
+        n = 30 * self.dimension**2
+        P = half_sphere_monomials(self.dimension, n) @ self._round.coefficients
+        return directions(self.dimension, n) * (P**-0.25)[:, None]

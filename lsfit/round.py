@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -10,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsfit.ellipsoid import full_ellipsoid
 from lsfit.flag import FitFlag
-from lsfit.form import derivative, exponents, monomials, substitute
+from lsfit.form import IntArray, exponents, substitute
 from lsfit.quartic_surface import Quartic
 from lsfit.samples import checked_motions, principal_frame
+from lsfit.sums import mean_square, normal_equations
 from lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
@@ -49,40 +51,39 @@ def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
     return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.UNDERDETERMINED)
 
 
-class Residuals(NamedTuple):
-    """Rows of the least-squares problem: the mean of ``|rows v - right|^2`` over ``count`` samples is the objective."""
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Least squares of ``sqrt(beta) (P - 1)`` and ``sqrt(gamma) (I - t t') grad P`` over the samples.
 
-    rows: FloatArray
-    right: FloatArray
-    count: int
+    Gradients are in the wrench's components, coefficients in the coordinates of the samples.
+    """
+
+    samples: RoundSamples
+    beta: float
+    gamma: float
+
+    def __post_init__(self) -> None:
+        """Refuse to weigh motions that are not there."""
+        if self.gamma != 0 and self.samples.T is None:
+            raise ValueError(f"gamma is {self.gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
 
     def objective(self, v: FloatArray) -> float:
-        """Mean over the samples of the weighted squares."""
-        return float(((self.rows @ v - self.right) ** 2).sum()) / self.count
+        """Mean over the samples of the weighted squares, for coefficients ``v (k,)``."""
+        return float(mean_square(*self._data, v))
 
     def normal(self) -> tuple[FloatArray, FloatArray]:
         """Matrix ``N (k, k)`` and right side ``b (k,)`` of the normal equations."""
-        return self.rows.T @ self.rows / self.count, self.rows.T @ self.right / self.count
+        Y, *_, E, _, _ = self._data
+        N, b = np.zeros((len(E), len(E))), np.zeros(len(E))
+        normal_equations(*self._data, N, b)
+        return N / len(Y), b / len(Y)
 
-
-def residuals(samples: RoundSamples, beta: float, gamma: float) -> Residuals:
-    """Rows ``sqrt(beta) (P - 1)`` and ``sqrt(gamma) (I - t t') grad P``, gradients in the wrench's components."""
-    m, r = samples.Y.shape
-    M = np.sqrt(beta) * monomials(samples.Y, exponents(r, 4))
-    right = np.full(m, np.sqrt(beta))
-    if gamma == 0:
-        return Residuals(M, right, m)
-    T = samples.T
-    if T is None:
-        raise ValueError(f"gamma is {gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
-    d, k = T.shape[1], M.shape[1]
-    D = np.sqrt(gamma) * np.tensordot(samples.inverse, derivative(r, 4), axes=(0, 0))
-    G = monomials(samples.Y, exponents(r, 3)) @ D  # (d, m, k): one block for each component
-    across = T.T[:, :, None]
-    G -= across * (across * G).sum(axis=0)
-    if not (moving := T.any(axis=1)).all():
-        G[:, ~moving] = 0.0
-    return Residuals(np.vstack([M, G.reshape(d * m, k)]), np.concatenate([right, np.zeros(d * m)]), m)
+    @property
+    def _data(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, float, float]:
+        Y, T, _, inverse, _ = self.samples
+        E = exponents(Y.shape[1], 4)
+        arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
+        return (*arrays, E, float(self.beta), float(self.gamma))  # type: ignore[return-value]
 
 
 @lru_cache

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from lsfit.flag import FitFlag
 
 FloatArray = NDArray[np.float64]
+UNIT = 1e-5  # how far the length of a unit motion may be from 1
 THIN = 1e-3  # below this ratio of their principal lengths, samples are called thin
 
 
@@ -70,9 +71,10 @@ def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
         raise ValueError(f"W has shape {W.shape}: expected wrenches as rows, (m, {dimension or 'd'})")
     if not np.isfinite(W).all():
         raise ValueError(f"W[{int(np.argmin(np.isfinite(W).all(axis=1)))}] is not finite: drop it or correct it")
-    if not W.any():
+    pressed = W.any(axis=1)
+    if not pressed.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    return W[W.any(axis=1)]
+    return W if pressed.all() else W[pressed]
 
 
 def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, FloatArray | None]:
@@ -83,11 +85,11 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
     if W.shape != T.shape:
         raise ValueError(f"W has shape {W.shape} and T {T.shape}: every wrench needs its motion")
     wrenches = checked_wrenches(W)
-    length = np.linalg.norm(T, axis=1)
-    if not np.allclose(length, 1, atol=1e-6):
+    length = np.sqrt(np.einsum("md,md->m", T, T))
+    if not abs(length - 1).max() <= UNIT:
         n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
         raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
-    return wrenches, T[W.any(axis=1)]
+    return wrenches, T if len(wrenches) == len(T) else T[W.any(axis=1)]
 
 
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array, hstack
+from scipy.sparse import csc_array, csr_array
 
 from lsfit.flag import FitError
 from lsfit.form import exponents
@@ -122,21 +122,6 @@ def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: floa
             "the samples for outliers and components of very different size"
         )
     return x
-
-
-def most_definite(gram: FloatArray, dimension: int) -> FloatArray:
-    """Change ``(f,)`` of the free numbers for which the smallest eigenvalue of a Gram matrix is largest.
-
-    Only to the solver's tolerance, and whatever it finds if it stops short: what comes out is judged by its
-    eigenvalues.
-    """
-    triangle = _maps(dimension)[1]
-    k = len(exponents(dimension, 4))
-    column, row = np.tril_indices(dimension**2)
-    matrix = gram[row, column] * np.where(row == column, 1.0, np.sqrt(2))
-    A = hstack([-triangle[:, k:], csr_array((row == column).astype(float)[:, None])])
-    n = A.shape[1]
-    return _solve(csc_array((n, n)), -np.eye(n)[-1], csc_array(A), matrix, dimension**2)[0][:-1]
 
 
 def _solve(P, q, A, right, size):
