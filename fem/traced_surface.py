@@ -139,8 +139,8 @@ def traced(
         z, angle = report.place
         raise MeshError(
             f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall lies {report.largest * 1e3:.3g} mm "
-            "off the mesh (a ledge, an edge or a part that sticks out): leave these heights out with heights = "
-            "(low, high), allow it with largest_distance, or treat the object as rigid"
+            "off the mesh (a ledge, an edge or a part that sticks out): leave these heights out with "
+            "object.wall_heights_mm = [low, high], or treat the object as rigid"
         )
     return surface, report
 

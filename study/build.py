@@ -80,7 +80,7 @@ def _traced(shape: Walled) -> tuple[TracedSurface, TraceReport]:
     """Smooth surface of a mesh's wall, and how far it is from the mesh."""
     from fem.traced_surface import traced
 
-    return traced(build_object(shape))
+    return traced(build_object(shape), shape.wall_heights)
 
 
 def shapes_of(scene: Scene) -> list[Shape]:

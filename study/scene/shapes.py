@@ -158,7 +158,10 @@ class Mesh(Walled):
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(
         "auto", description="step of the grid on which the distance to the mesh is sampled"
     )
-    grid_step = si("grid_step_mm")
+    wall_heights_mm: Annotated[tuple[float, float], Field(strict=False)] | None = Field(
+        None, description="part of the mesh along its axis that a thin wall is traced on, [low, high]; else all of it"
+    )
+    grid_step, wall_heights = si("grid_step_mm"), si("wall_heights_mm")
 
     @property
     def unit_length(self) -> float:

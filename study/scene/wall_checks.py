@@ -11,7 +11,8 @@ from study.scene.shape import Shape, Walled
 from study.scene.shapes import Sections
 
 THICKEST = 0.1  # of the smallest extent: a thicker wall is no shell
-WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm")
+WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",
+             "wall_heights_mm")  # fmt: skip
 
 
 def wall(shape: Shape, effects: Effects) -> Iterator[Finding]:
@@ -27,9 +28,14 @@ def wall(shape: Shape, effects: Effects) -> Iterator[Finding]:
         where = ("object", "wall_profile_mm")
         yield Finding(where, "wall_mm and wall_profile_mm", "one of them", "keep the one that is meant")
     for key in WALL_KEYS if not hollow else ():
-        if getattr(shape, key) is not None:
+        if getattr(shape, key, None) is not None:
             yield Finding(("object", key), f"{key} without a wall", "wall_mm beside it",
                           "add wall_mm, for example `wall_mm = 0.4`, or remove the key")  # fmt: skip
+    heights = getattr(shape, "wall_heights_mm", None)
+    if heights is not None and not heights[0] < heights[1]:
+        low, high = heights
+        yield Finding(("object", "wall_heights_mm"), f"[{low:g}, {high:g}]", "two different heights, the lower first",
+                      f"write [{high:g}, {low:g}]")  # fmt: skip
     if hollow:
         yield from _thickness(shape)
         yield from _material(shape)
