@@ -181,7 +181,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     E = exponents(r, 2)
     M = monomials(Y, E)
     ball = (E == 2).any(axis=1) / r
-    N, b = M.T @ M / m, M.mean(axis=0)
+    N, b = M.T @ M / m, np.full(m, 1 / m) @ M
     a, flag = nearest_solution(N, b, ball)
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)

@@ -34,9 +34,9 @@ def exponents(dimension: int, degree: int) -> IntArray:
 def monomials(w: ArrayLike, E: IntArray) -> FloatArray:
     """Monomials ``w^E``, ``(m, d), (k, d) -> (m, k)``."""
     W = np.ascontiguousarray(np.atleast_2d(np.asarray(w, float)))
-    out = np.empty((len(W), len(E)))
+    out = np.empty((len(E), len(W)))
     fill_monomials(W, E, out)
-    return out
+    return out.T
 
 
 def monomial_gradients(w: ArrayLike, E: IntArray) -> FloatArray:

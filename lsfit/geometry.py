@@ -12,6 +12,7 @@ from scipy.special import roots_gegenbauer
 
 from lsfit.flag import FitError
 from lsfit.form import exponents, monomials
+from lsfit.sums import shadow_sum
 
 FloatArray = NDArray[np.float64]
 
@@ -128,10 +129,9 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     """
     E = exponents(3, 4)
     c = coefficients * np.prod(reach**E, axis=1)
-    power = (E[:, 2] == np.arange(5)[:, None]) * c  # (5, 15): which coefficients go with tau^j
     last = math.nan
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
-        area = float(np.pi / n * (1 / np.sqrt(_least_of_quartic(power @ _plane_monomials(n)))).sum())
+        area = np.pi / n * shadow_sum(c, E, _plane_monomials(n))
         if abs(area - last) <= 1e-13 * area:
             break
         last = area
@@ -140,22 +140,9 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
 
 @lru_cache
 def _plane_monomials(n: int) -> FloatArray:
-    """Quartic monomials of ``(cos phi, sin phi, 1)`` at ``n`` steps of half a turn, ``(15, n)``."""
+    """Quartic monomials of ``(cos phi, sin phi, 1)`` at ``n`` steps of half a turn, ``(n, 15)``."""
     phi = np.pi * np.arange(n) / n
-    return monomials(np.column_stack([np.cos(phi), np.sin(phi), np.ones(n)]), exponents(3, 4)).T.copy()
-
-
-def _least_of_quartic(a: FloatArray) -> FloatArray:
-    """Smallest values of convex polynomials ``a_0 + ... + a_4 tau^4``, ``(5, n) -> (n,)``."""
-    # tau = s - a_3 / (4 a_4) leaves s^3 + p s + q = 0, with p >= 0 as the polynomial is convex.
-    shift = a[3] / (4 * a[4])
-    p = np.maximum(a[2] / (2 * a[4]) - 3 * shift**2, 0.0)
-    q = 2 * shift**3 - a[2] * shift / (2 * a[4]) + a[1] / (4 * a[4])
-    u = np.cbrt(np.abs(q) / 2 + np.sqrt(q**2 / 4 + p**3 / 27))
-    with np.errstate(invalid="ignore"):
-        s = np.where(u > 0, np.sign(q) * (p / (3 * u) - u), 0.0)
-    tau = s - shift
-    return (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]
+    return monomials(np.column_stack([np.cos(phi), np.sin(phi), np.ones(n)]), exponents(3, 4)).copy()
 
 
 def shadow_area(support: FloatArray) -> float:

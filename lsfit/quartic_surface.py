@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -36,11 +36,14 @@ class Quartic(LevelSet):
         ``E``, each row with the sum 4.
     flag : FitFlag
         What the reader should know.
+    ball_map : (d, d) array, optional
+        Map from a ball onto an ellipsoid near the body, where one is known.
     """
 
     coefficients: FloatArray
     exponents: NDArray[np.int64]
     flag: FitFlag = FitFlag.CLEAN
+    ball_map: FloatArray | None = field(default=None, repr=False)
     degree = 4
 
     def __post_init__(self) -> None:
@@ -101,7 +104,7 @@ class Quartic(LevelSet):
     @cached_property
     def frame(self) -> FloatArray:
         """Map ``L (d, d)`` from a body that is nearly round onto this one."""
-        return round_frame(self.value, self.dimension, 4)
+        return round_frame(self.value, self.dimension, 4) if self.ball_map is None else self.ball_map
 
     @cached_property
     def volume(self) -> float:
@@ -157,7 +160,8 @@ class Quartic(LevelSet):
     def scaled(self, factors: ArrayLike) -> Quartic:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
         f = checked_factors(factors, self.dimension)
-        return Quartic(self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag)
+        ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
+        return Quartic(self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag, ball_map)
 
     @cached_property
     def _round(self) -> Quartic:

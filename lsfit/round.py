@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsfit.ellipsoid import full_ellipsoid
 from lsfit.flag import FitFlag
-from lsfit.form import IntArray, exponents, substitute
+from lsfit.form import exponents, substitute
 from lsfit.quartic_surface import Quartic
 from lsfit.samples import checked_motions, principal_frame
-from lsfit.sums import mean_square, normal_equations
+from lsfit.sums import fill_residuals
 from lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
@@ -67,23 +68,27 @@ class Residuals:
         if self.gamma != 0 and self.samples.T is None:
             raise ValueError(f"gamma is {self.gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
 
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Residuals per coefficient, ``(k, c m)``: of the wrenches, then of the ``c - 1`` directions across motions."""
+        Y, T, _, inverse, _ = self.samples
+        E = exponents(Y.shape[1], 4)
+        out = np.empty((len(E), 1 if T is None or self.gamma == 0 else T.shape[1], len(Y)))
+        arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
+        fill_residuals(*arrays, E, float(self.beta), float(self.gamma), out)
+        return out.reshape(len(E), -1)
+
     def objective(self, v: FloatArray) -> float:
         """Mean over the samples of the weighted squares, for coefficients ``v (k,)``."""
-        return float(mean_square(*self._data, v))
+        m = len(self.samples.Y)
+        found = v @ self.rows
+        found[:m] -= math.sqrt(self.beta)
+        return float(found @ found) / m
 
     def normal(self) -> tuple[FloatArray, FloatArray]:
         """Matrix ``N (k, k)`` and right side ``b (k,)`` of the normal equations."""
-        Y, *_, E, _, _ = self._data
-        N, b = np.zeros((len(E), len(E))), np.zeros(len(E))
-        normal_equations(*self._data, N, b)
-        return N / len(Y), b / len(Y)
-
-    @property
-    def _data(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, float, float]:
-        Y, T, _, inverse, _ = self.samples
-        E = exponents(Y.shape[1], 4)
-        arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
-        return (*arrays, E, float(self.beta), float(self.gamma))  # type: ignore[return-value]
+        R, m = self.rows, len(self.samples.Y)
+        return R @ R.T / m, R[:, :m] @ np.full(m, math.sqrt(self.beta) / m)
 
 
 @lru_cache
@@ -108,4 +113,5 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     turn = samples.B / reach[:, None]
     if np.linalg.cond(turn) > TILT:
         return Image(Quartic(v, E), samples.B, flag)
-    return Quartic(substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1), E, flag)
+    coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
+    return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None)

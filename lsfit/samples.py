@@ -38,10 +38,10 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
     w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
     W = (w[:, [0, 1, 5]] if w.shape[1] == 6 else w) / force / [1.0, 1.0, rho]
     T = t * [1.0, 1.0, rho]
-    length = np.linalg.norm(T, axis=1, keepdims=True)
-    if (length == 0).any():
+    length = np.sqrt(np.einsum("md,md->m", T, T))
+    if not length.all():
         raise ValueError(f"twist[{int(np.argmin(length))}] is zero: a sample needs a direction of motion")
-    return W, T / length
+    return W, T / length[:, None]
 
 
 def sample_rank(W: ArrayLike, tolerance: float = 1e-9) -> int:

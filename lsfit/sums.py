@@ -1,4 +1,4 @@
-"""Compiled sums over samples: monomials, normal equations of quartics, and mean errors.
+"""Compiled loops over samples: monomials, residuals of quartics, and mean errors.
 
 The order of every sum is fixed, so results are the same to the last bit wherever the code was compiled.
 """
@@ -13,18 +13,20 @@ from numba import njit
 
 @njit(cache=True)
 def fill_monomials(w, E, out):  # pragma: no cover - compiled
-    """Write the monomials ``w^E``, ``(m, d), (k, d) -> out (m, k)``."""
-    power = np.empty((w.shape[1], 1 + (E.max() if E.size else 0)))
-    for n in range(w.shape[0]):
-        _fill_row(w[n], E, power, out[n])
+    """Write the monomials ``w^E``, ``(m, d), (k, d) -> out (k, m)``."""
+    power = _powers(w, E)
+    for j in range(len(E)):
+        out[j] = power[0, E[j, 0]]
+        for i in range(1, w.shape[1]):
+            out[j] *= power[i, E[j, i]]
 
 
 @njit(cache=True)
-def normal_equations(Y, T, inverse, E, beta, gamma, N, b):  # pragma: no cover - compiled
-    """Add ``beta (P - 1)^2 + gamma |(I - t t') grad P|^2`` of every sample to normal equations.
+def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - compiled
+    """Write what ``sqrt(beta) P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
 
-    Two directions across a motion in three dimensions hold all of ``(I - t t') grad P``: columns of the reflection
-    that takes the motion to the last axis.
+    In ``d`` dimensions the ``d - 1`` directions across a motion hold all of the latter: columns of the reflection that
+    takes the motion to the last axis.
 
     Parameters
     ----------
@@ -36,68 +38,42 @@ def normal_equations(Y, T, inverse, E, beta, gamma, N, b):  # pragma: no cover -
         Pseudo-inverse of B, which takes gradients along ``y`` to those along ``w``.
     E : (k, r) array of int
         Exponents of degree 4.
-    N, b : (k, k) and (k,) arrays
-        Receive the sums.
+    out : (k, d, m) or (k, 1, m) array
+        Receives P and then its slopes, if there is room for them.
     """
-    k, r = E.shape
-    d = T.shape[1]
-    power, row, G = np.empty((r, 5)), np.empty(k), np.empty((r, k))
-    for n in range(len(Y)):
-        _fill_row(Y[n], E, power, row)
-        for i in range(k):
-            x = beta * row[i]
-            b[i] += x
-            for j in range(k):
-                N[i, j] += x * row[j]
-        t = T[n]
-        if gamma == 0.0 or not _any(t):
-            continue
-        _fill_gradient(E, power, G)
-        u = 1.0 / (1.0 + abs(t[d - 1]))
-        for c in range(d - 1):
-            row[:] = 0.0
-            for i in range(r):
-                x = 0.0
-                for a in range(d):
-                    x += inverse[i, a] * _across(t, u, a, c)
-                for j in range(k):
-                    row[j] += x * G[i, j]
-            for i in range(k):
-                x = gamma * row[i]
-                for j in range(k):
-                    N[i, j] += x * row[j]
-
-
-@njit(cache=True)
-def mean_square(Y, T, inverse, E, beta, gamma, v):  # pragma: no cover - compiled
-    """Mean of ``beta (P - 1)^2 + gamma |(I - t t') grad P|^2`` for coefficients ``v (k,)``, see `normal_equations`."""
-    k, r = E.shape
-    d = T.shape[1]
-    power, row, G, g = np.empty((r, 5)), np.empty(k), np.empty((r, k)), np.empty(d)
-    total = 0.0
-    for n in range(len(Y)):
-        _fill_row(Y[n], E, power, row)
-        P = 0.0
-        for i in range(k):
-            P += row[i] * v[i]
-        total += beta * (P - 1.0) ** 2
-        t = T[n]
-        if gamma == 0.0 or not _any(t):
-            continue
-        _fill_gradient(E, power, G)
-        g[:] = 0.0
-        for i in range(r):
-            x = 0.0
-            for j in range(k):
-                x += G[i, j] * v[j]
+    (k, r), d, m = E.shape, T.shape[1], len(Y)
+    power = _powers(Y, E)
+    for j in range(k):
+        out[j, 0] = math.sqrt(beta) * power[0, E[j, 0]]
+        for i in range(1, r):
+            out[j, 0] *= power[i, E[j, i]]
+    out[:, 1:] = 0.0
+    if out.shape[1] == 1:
+        return
+    along, slope = np.empty((r, d - 1, m)), np.empty(m)
+    for c in range(d - 1):
+        for n in range(m):
+            t = T[n]
+            u = t[c] / (1.0 + abs(t[d - 1]))
+            end = 1.0 if t[d - 1] >= 0.0 else -1.0
+            moving = 0.0
             for a in range(d):
-                g[a] += x * inverse[i, a]
-        along = 0.0
-        for a in range(d):
-            along += g[a] * t[a]
-        for a in range(d):
-            total += gamma * (g[a] - along * t[a]) ** 2
-    return total / len(Y)
+                moving = math.sqrt(gamma) if t[a] != 0.0 else moving
+            for i in range(r):
+                x = inverse[i, c] - u * end * inverse[i, d - 1]
+                for a in range(d):
+                    x -= u * t[a] * inverse[i, a]
+                along[i, c, n] = moving * x
+    for j in range(k):
+        for i in range(r):
+            if E[j, i] == 0:
+                continue
+            slope[:] = E[j, i] * power[i, E[j, i] - 1]
+            for a in range(r):
+                if a != i:
+                    slope *= power[a, E[j, a]]
+            for c in range(d - 1):
+                out[j, c + 1] += along[i, c] * slope
 
 
 @njit(cache=True)
@@ -126,49 +102,34 @@ def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _fill_row(y, E, power, row):  # pragma: no cover - compiled
-    """Powers of the components ``(d, degree + 1)`` and monomials ``(k,)`` of one vector."""
-    d, top = power.shape
+def shadow_sum(c, E, M):  # pragma: no cover - compiled
+    """Sum of ``1 / sqrt(min over tau of P(x, y, tau))`` for monomials ``M (n, 15)`` at tau 1."""
+    total = 0.0
+    a = np.empty(5)
+    for n in range(len(M)):
+        a[:] = 0.0
+        for j in range(len(c)):
+            a[E[j, 2]] += c[j] * M[n, j]
+        # tau = s - a_3 / (4 a_4) leaves s^3 + p s + q = 0, with p >= 0 as the polynomial is convex.
+        shift = a[3] / (4.0 * a[4])
+        p = max(a[2] / (2.0 * a[4]) - 3.0 * shift**2, 0.0)
+        q = 2.0 * shift**3 - a[2] * shift / (2.0 * a[4]) + a[1] / (4.0 * a[4])
+        u = (abs(q) / 2.0 + math.sqrt(q**2 / 4.0 + p**3 / 27.0)) ** (1.0 / 3.0)
+        tau = -shift
+        if u > 0.0:
+            tau += (p / (3.0 * u) - u) * (1.0 if q > 0.0 else -1.0)
+        total += 1.0 / math.sqrt((((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0])
+    return total
+
+
+@njit(cache=True)
+def _powers(w, E):  # pragma: no cover - compiled
+    """Powers of the components ``(d, degree + 1, m)``."""
+    m, d = w.shape
+    power = np.empty((d, 1 + (E.max() if E.size else 0), m))
     for i in range(d):
         power[i, 0] = 1.0
-        for e in range(1, top):
-            power[i, e] = power[i, e - 1] * y[i]
-    for j in range(len(E)):
-        x = power[0, E[j, 0]]
-        for i in range(1, d):
-            x *= power[i, E[j, i]]
-        row[j] = x
-
-
-@njit(cache=True)
-def _fill_gradient(E, power, G):  # pragma: no cover - compiled
-    """Partial derivatives ``(d, k)`` of the monomials from the powers."""
-    d, k = G.shape
-    for i in range(d):
-        for j in range(k):
-            e = E[j, i]
-            x = 0.0
-            if e > 0:
-                x = e * power[i, e - 1]
-                for a in range(d):
-                    if a != i:
-                        x *= power[a, E[j, a]]
-            G[i, j] = x
-
-
-@njit(cache=True)
-def _across(t, u, a, c):  # pragma: no cover - compiled
-    """Component ``a`` of the ``c``-th direction across the unit vector ``t``, with ``u = 1 / (1 + |t_last|)``."""
-    last = len(t) - 1
-    end = t[a]
-    if a == last:
-        end += 1.0 if t[last] >= 0.0 else -1.0
-    return (1.0 if a == c else 0.0) - u * t[c] * end
-
-
-@njit(cache=True)
-def _any(t):  # pragma: no cover - compiled
-    for x in t:
-        if x != 0.0:
-            return True
-    return False
+        for e in range(1, power.shape[1]):
+            for n in range(m):
+                power[i, e, n] = power[i, e - 1, n] * w[n, i]
+    return power

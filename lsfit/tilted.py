@@ -47,7 +47,7 @@ class TiltedEllipsoid(LevelSet):
         if abs(A - A.T).max() > 1e-9 * abs(A).max():
             raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
         F = _ball_map(A) if self.F is None else np.array(self.F, float)
-        inverse = np.linalg.pinv(F)
+        inverse = _inverse(F)
         for name, array in (("A", (A + A.T) / 2), ("F", F), ("inverse", inverse)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -55,7 +55,7 @@ class TiltedEllipsoid(LevelSet):
     @classmethod
     def of_ball(cls, F: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> TiltedEllipsoid:
         """Image ``{F y : |y| <= 1}`` of the unit ball, ``F (d, r)`` with independent columns; flat if ``r < d``."""
-        inverse = np.linalg.pinv(np.asarray(F, float))
+        inverse = _inverse(np.asarray(F, float))
         return cls(inverse.T @ inverse, np.asarray(F, float), flag)
 
     @property
@@ -119,6 +119,10 @@ class TiltedEllipsoid(LevelSet):
         F = self.F
         assert F is not None  # __post_init__ filled it in
         return F
+
+
+def _inverse(F: FloatArray) -> FloatArray:
+    return np.linalg.inv(F) if F.shape[0] == F.shape[1] else np.linalg.pinv(F)
 
 
 def _ball_map(A: FloatArray) -> FloatArray:
