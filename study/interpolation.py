@@ -1,0 +1,185 @@
+"""Values between the nodes of a grid of three axes: trilinear, with what the neighbours tell about the error.
+
+Straight lines never overshoot and stay between the values of the nodes around a point. Between two nodes a distance
+``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
+the three-point differences at both nodes, whichever is larger, and the errors along the axes add up.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ALIKE = 1e-9  # differences of coordinates that are only rounding, in units of their size
+WIDER = 1.5  # a gap that closes a circle may be this much wider than the others
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of one axis: coordinates ``x (k,)``, rising, and where their values stand along the file's axis.
+
+    A periodic axis brings coordinates into ``[x_0, x_0 + period)`` first; with ``half_turn`` every odd multiple of the
+    period exchanges the fingers, and ``swapped (k,)`` tells whose values have to be exchanged. Between the nodes of an
+    ``exact`` axis there is nothing.
+    """
+
+    name: str
+    units: str
+    x: FloatArray
+    take: IntArray
+    swapped: NDArray[np.bool_]
+    period: float = 0.0
+    half_turn: bool = False
+    exact: bool = False
+    free: bool = False
+
+    @property
+    def slack(self) -> float:
+        """How far beside the ends a coordinate still counts as on them."""
+        return ALIKE * max(abs(float(self.x[0])), abs(float(self.x[-1])))
+
+    @cached_property
+    def quick(self) -> tuple[list[float], list[float], int, float, float, bool]:
+        """The same for `place`, which is for one point and has no time for arrays."""
+        return self.x.tolist(), (1 / np.diff(self.x)).tolist(), len(self.x) - 2, self.slack, self.period, self.exact
+
+
+def plain(name: str, units: str, values: ArrayLike, exact: bool = False) -> Nodes:
+    """Axis without a period; one single value is a place where the grid can be asked, not beside it."""
+    x = np.asarray(values, float)
+    order = np.argsort(x)
+    if len(x) == 1:
+        x, order = _point(float(x[0])), np.zeros(2, np.int64)
+    return Nodes(name, units, x if len(order) > len(values) else x[order], order, np.zeros(len(x), bool), exact=exact)
+
+
+def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: bool = False) -> Nodes:
+    """Axis of angles with a period; period 0 is an object that looks the same at every angle.
+
+    The gap that closes the circle is bridged if it is not much wider than the others.
+    """
+    angles = np.asarray(values, float)
+    if not period:
+        x = np.array([angles[0], angles[0] + 2 * math.pi])
+        return Nodes(name, units, x, np.zeros(2, np.int64), np.zeros(2, bool), 2 * math.pi, free=True)
+    turns = np.floor((angles - angles[0]) / period + ALIKE)
+    folded = np.maximum(angles - turns * period, angles[0])
+    order = np.argsort(folded, kind="stable")
+    order = order[np.concatenate([[True], np.diff(folded[order]) > ALIKE * period])]
+    x, swapped = folded[order], half_turn & (turns[order] % 2 == 1)
+    if len(x) == 1:
+        return Nodes(name, units, _point(float(x[0])), order.repeat(2), swapped.repeat(2), period, half_turn)
+    if x[0] + period - x[-1] <= WIDER * np.diff(x).max():
+        x, order = np.append(x, x[0] + period), np.append(order, order[0])
+        swapped = np.append(swapped, swapped[0] ^ half_turn)
+    return Nodes(name, units, x, order, swapped, period, half_turn)
+
+
+def _point(x: float) -> FloatArray:
+    slack = ALIKE * max(abs(x), 1.0)
+    return np.array([x - slack, x + slack])
+
+
+class Corners(NamedTuple):
+    """Where ``m`` points lie: flat indices of the eight nodes around each, their weights, and the share of the cell.
+
+    The first corner is the cell's lower one; bit ``2 - a`` of a corner's number tells whether it is the upper one along
+    axis ``a``. ``swap`` tells which points see the fingers exchanged.
+    """
+
+    index: IntArray  # (m, 8)
+    weight: FloatArray  # (m, 8)
+    share: FloatArray  # (m, 3)
+    inside: NDArray[np.bool_]  # (m, 3)
+    swap: NDArray[np.bool_]  # (m,)
+
+
+def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
+    """Corners of the cells around ``points (m, 3)``; points outside are moved to the edge and marked."""
+    cell, share = np.empty(points.shape, np.int64), np.empty(points.shape)
+    inside, swap = np.empty(points.shape, bool), np.zeros(len(points), bool)
+    for a, nodes in enumerate(axes):
+        x, slack, v = nodes.x, nodes.slack, points[:, a]
+        if nodes.period:
+            turns = np.floor((v - x[0] + slack) / nodes.period)
+            v = v - turns * nodes.period
+            swap |= nodes.half_turn & (turns % 2 == 1)
+        inside[:, a] = (v >= x[0] - slack) & (v <= x[-1] + slack)  # NaN is outside
+        v = np.clip(np.nan_to_num(v), x[0], x[-1])
+        i = np.clip(np.searchsorted(x, v, "right") - 1, 0, len(x) - 2)
+        s = (v - x[i]) / (x[i + 1] - x[i])
+        s = np.where(s < ALIKE, 0.0, np.where(s > 1 - ALIKE, 1.0, s))
+        inside[:, a] &= (s == 0) | (s == 1) | (not nodes.exact)
+        cell[:, a], share[:, a] = i, s
+    upper = np.array(list(np.ndindex(2, 2, 2)))
+    at = cell[:, None] + upper
+    index = (at[..., 0] * len(axes[1].x) + at[..., 1]) * len(axes[2].x) + at[..., 2]
+    return Corners(index, np.where(upper, share[:, None], 1 - share[:, None]).prod(-1), share, inside, swap)
+
+
+def place(quick: tuple, v: float) -> tuple[int, float] | None:
+    """Cell and share of one coordinate, None outside; for `Nodes.quick`."""
+    x, inverse, last, slack, period, exact = quick
+    if period:
+        v -= (v - x[0] + slack) // period * period
+    i = bisect_right(x, v) - 1
+    if not 0 <= i <= last:
+        if not x[0] - slack <= v <= x[-1] + slack:
+            return None
+        return (0, 0.0) if i < 0 else (last, 1.0)
+    share = (v - x[i]) * inverse[i]
+    return None if exact and ALIKE < share < 1 - ALIKE else (i, share)
+
+
+def blend(table: FloatArray, at: Corners) -> FloatArray:
+    """Trilinear values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count."""
+    found = table[at.index]
+    weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
+    return np.where(weight > 0, found * weight, 0.0).sum(axis=1)
+
+
+def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
+    """``|f'' / 2| h^2`` of every cell along each axis, at the cell's lower node, ``(3, k_1, k_2, k_3)``.
+
+    Differences do not reach over values that are not there, nor from one ``side (k_1, k_2, k_3)`` of a jump to the
+    other. Where no three nodes are left, the difference of the cell's two values stands in: a guess.
+    """
+    found = np.zeros((3, *table.shape))
+    for a, nodes in enumerate(axes):
+        f, one, x = np.moveaxis(table, a, -1), np.moveaxis(side, a, -1), nodes.x
+        if closed := bool(nodes.period) and np.isclose(x[-1] - x[0], nodes.period, rtol=1e-6, atol=0):
+            x = np.concatenate([[x[-2] - nodes.period], x, [x[1] + nodes.period]])
+            f, one = (np.concatenate([v[..., -2:-1], v, v[..., 1:2]], axis=-1) for v in (f, one))
+        h, slope = np.diff(x), np.diff(f) / np.diff(x)
+        half = np.abs(np.diff(slope) / (h[1:] + h[:-1]))
+        half[(one[..., :-2] != one[..., 1:-1]) | (one[..., 1:-1] != one[..., 2:])] = np.nan
+        if not closed:
+            missing = np.full((*half.shape[:-1], 1), np.nan)
+            half = np.concatenate([missing, half, missing], axis=-1)
+        else:
+            h, f = h[1:-1], f[..., 1:-1]
+        cell = np.fmax(half[..., :-1], half[..., 1:]) * h**2
+        cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
+        np.moveaxis(found[a], a, -1)[..., :-1] = cell
+    return found.reshape(3, -1)
+
+
+def error(bend: FloatArray, at: Corners) -> FloatArray:
+    """Error of `blend` at ``m`` points from `bends` ``(3, nodes)``, ``(m,)``."""
+    upper = np.array(list(np.ndindex(2, 2, 2)))
+    total = np.zeros(len(at.index))
+    for a in range(3):
+        lower, higher = np.flatnonzero(upper[:, a] == 0), np.flatnonzero(upper[:, a])
+        weight = at.weight[:, lower] + at.weight[:, higher]
+        lines = np.where(weight > 0, bend[a][at.index[:, lower]] * weight, 0.0).sum(axis=1)
+        total += np.where(at.share[:, a] % 1.0 > 0, at.share[:, a] * (1 - at.share[:, a]) * lines, 0.0)
+    return total
