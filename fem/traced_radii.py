@@ -89,8 +89,8 @@ def _refuse_folds(z: FloatArray, rays: Rays, facet: float) -> None:
         raise MeshError(
             f"between z = {z[k[0]]:.4g} m and {z[k[-1]]:.4g} m a ray from the mesh's centre line does not meet the "
             f"surface exactly once, most often at {360 * ray / bad.shape[1]:.0f} degrees (a handle, fold or hollow): "
-            "choose stations elsewhere and leave these heights out with object.wall_heights_mm = [low, high], or treat the object as "
-            "rigid"
+            "choose stations elsewhere and leave these heights out with object.wall_heights_mm = [low, high], or treat "
+            "the object as rigid"
         )
 
 
