@@ -61,9 +61,21 @@ class Wall:
         return parameters[tree.query(points)[1]]
 
     @cached_property
+    def closed(self) -> bool:
+        """Whether the mesh runs once round; the surface does so even where a part of it is meshed."""
+        return bool(self.theta[-1] - self.theta[0] > 2 * np.pi - 1e-6)
+
+    @cached_property
+    def ends(self) -> tuple[float, float]:
+        """Part of s that can be faced: meshed, and known to the surface."""
+        return max(self.s[0], self.surface.s[0]), min(self.s[-1], self.surface.s[-1])
+
+    @cached_property
     def _grid(self) -> tuple[FloatArray, cKDTree]:
         """Parameters of the grid points, and a search tree of their places."""
-        t, s = (grid.ravel() for grid in np.meshgrid(self.theta, self.s, indexing="ij"))
+        low, high = self.ends
+        lines = np.unique(np.clip(self.s, low, high))
+        t, s = (grid.ravel() for grid in np.meshgrid(self.theta, lines, indexing="ij"))
         return np.column_stack([t, s]), cKDTree(self.surface.at(t, s)[0])
 
 
@@ -106,6 +118,26 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
     ArithmeticError
         If a point close to the wall finds no place.
     """
+    found = _search(wall, points, places, v, w)
+    again = np.flatnonzero(np.isnan(found.gap) | (found.gap == FAR))
+    if len(again):
+        # where a point was last may lie beyond a fold by now: begin once more from the nearest place of the whole wall
+        fresh = wall.places(points[again])
+        pick = (fresh[:, 1] > wall.ends[0]) & (fresh[:, 1] < wall.ends[1]) | np.isnan(found.gap[again])
+        again, fresh = again[pick], fresh[pick]
+        once_more = _search(wall, points[again], fresh, v, w)
+        good = once_more.gap < FAR
+        for one, other in zip(vars(found).values(), vars(once_more).values(), strict=True):
+            one[again[good]] = other[good]
+        places[again[good]] = fresh[good]
+    lost = np.flatnonzero(np.isnan(found.gap))
+    if len(lost):
+        raise ArithmeticError(f"a point of the pad at {points[lost[0]].tolist()} m finds no place on the deformed wall")
+    return found
+
+
+def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
+    """`face` from given places; the gap of a point that got lost is NaN."""
     n = len(points)
     found = Facing(
         np.empty(n),
@@ -118,36 +150,34 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         np.zeros((n, 4, 3, 3)),
     )
     surface = wall.surface
-    lost = _face(
+    _face(
         np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients, surface.closed,
-        wall.theta, wall.s, wall.nodes, wall.half, v, w, found.gap, found.normal, found.e, found.nodes, found.N,
-        found.H, found.G, found.A,
+        wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, found.gap, found.normal, found.e,
+        found.nodes, found.N, found.H, found.G, found.A,
     )  # fmt: skip
-    if lost >= 0:
-        raise ArithmeticError(f"a point of the pad at {points[lost].tolist()} m finds no place on the deformed wall")
     return found
 
 
 @njit(cache=True)
-def _face(points, places, lines_t, lines_s, coefficients, closed, theta, s, table, half, v, w, gap, normal, e, nodes,
-          N, H, G, A):  # fmt: skip
-    """Loop of `face`; returns the number of a point that was lost, or -1."""
+def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low, high, theta, s, table, half, v, w, gap,
+          normal, e, nodes, N, H, G, A):  # fmt: skip
+    """Loop of `_search`."""
     X, J, inverse = np.empty((6, 3)), np.empty((3, 3)), np.empty((3, 3))
     n, n_1, n_2, r, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     shape, shape_1, shape_2 = np.empty(4), np.empty(4), np.empty(4)
     at = np.empty(4, np.int32)
-    margin_t, margin_s = 1e-9, 1e-9 * (s[-1] - s[0])
+    margin_t, margin_s = 1e-9, 1e-9 * (high - low)
     for k in range(points.shape[0]):
         t0, s0, g = places[k, 0], places[k, 1], 0.0
         if closed:
             t0 = theta[0] + (t0 - theta[0]) % (theta[-1] - theta[0])
-        ok, length = False, 1.0
+        ok, length, size = False, 1.0, 1.0
         for iteration in range(MAX_ITERATIONS):
-            evaluate(lines_t, lines_s, coefficients, closed, t0, s0, X)
-            _element(theta, s, table, closed, t0, s0, at, shape, shape_1, shape_2)
+            evaluate(lines_t, lines_s, coefficients, periodic, t0, s0, X)
+            _element(theta, s, table, t0, s0, at, shape, shape_1, shape_2)
             length = _director(X, half, w, at, shape, shape_1, shape_2, n, n_1, n_2)
             if not length > 0.0:
-                return k
+                break
             if iteration == 0:
                 for c in range(3):
                     x_s = X[0, c]
@@ -178,14 +208,12 @@ def _face(points, places, lines_t, lines_s, coefficients, closed, theta, s, tabl
             if closed:
                 t0 = theta[0] + (t0 - theta[0]) % (theta[-1] - theta[0])
             # beyond an end of the wall there is nothing to face
-            if s0 < s[0] - 0.5 * (s[-1] - s[0]) or s0 > s[-1] + 0.5 * (s[-1] - s[0]):
+            if s0 < low - 0.5 * (high - low) or s0 > high + 0.5 * (high - low):
                 break
-        inside = s[0] - margin_s <= s0 <= s[-1] + margin_s
+        inside = low - margin_s <= s0 <= high + margin_s
         inside = inside and (closed or theta[0] - margin_t <= t0 <= theta[-1] + margin_t)
-        if not ok and inside and size > 1e-9 and abs(g) < 0.002:
-            return k
         if not inside or (not ok and size > 1e-9):
-            gap[k] = FAR
+            gap[k] = np.nan if inside and abs(g) < 0.002 else FAR
             continue
         places[k, 0], places[k, 1] = t0, s0
         gap[k] = g
@@ -200,11 +228,10 @@ def _face(points, places, lines_t, lines_s, coefficients, closed, theta, s, tabl
                 for d in range(3):
                     slide = shape_1[a] * inverse[0, d] + shape_2[a] * inverse[1, d]
                     A[k, a, c, d] = shape[a] * H[k, c, d] + n[c] * slide
-    return -1
 
 
 @njit(cache=True)
-def _element(theta, s, table, closed, t0, s0, at, N, N_1, N_2):
+def _element(theta, s, table, t0, s0, at, N, N_1, N_2):
     """Nodes of the element at ``(t0, s0)``, bilinear shape functions and their derivatives."""
     i = min(max(np.searchsorted(theta, t0, side="right") - 1, 0), theta.size - 2)
     j = min(max(np.searchsorted(s, s0, side="right") - 1, 0), s.size - 2)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fem.collapse import Opening
 from fem.contact import Gap
 from fem.errors import CheckError, ConvergenceError
 from fem.grip_problem import GripProblem
@@ -27,6 +28,7 @@ from fem.stepping import Settings, Stepping, Work
 LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
+GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
@@ -43,13 +45,16 @@ class WallState:
     reaction : (3,) array
         Force of supports and springs on the whole object [N].
     snapped : bool
-        Whether the force fell on the way here while the fingers closed: the wall has passed a limit.
+        Whether the wall has snapped in on the way here: the force fell while the fingers closed, or it hardly grew.
+    opening : float
+        Of the wall's inner faces towards each other, see ``fem.collapse``: 1 undeformed, 0 where they would meet.
     """
 
     q: FloatArray
     load: FloatArray
     reaction: FloatArray
     snapped: bool
+    opening: float
 
 
 @dataclass(frozen=True)
@@ -92,12 +97,13 @@ class Grip:
 
     def _set_up(self) -> None:
         fingers = self.problem.fingers
+        self.opening = Opening(self.problem.model.shell.mesh)
         self._beds = [SpringBed(f.pad, gap) for f, gap in zip(fingers, self.gaps, strict=True)]
         self.solver = NonlinearSolver(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
-            ROUNDING * self.problem.model.shell.young_modulus,
+            ROUNDING * self.problem.model.shell.young_modulus, lambda x, force: self._watch,
         )  # fmt: skip
 
     def _guess(self, travel: float) -> FloatArray:
@@ -125,7 +131,7 @@ class Grip:
                     raise
                 self._fall_back()
                 x, slope, fell = self._level(x, reached, force, compliance, work)
-            reached, compliance, snapped = force, slope, snapped or fell
+            reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
 
     def _fall_back(self) -> None:
@@ -143,6 +149,7 @@ class Grip:
         if x is None:
             travel = float(np.mean([bed.travel(force) for bed in self._beds]))
             x, reached = self._stepping.first(travel, force, work)
+            compliance = self.problem.travel(x) / reached  # foam gets stiffer, so this is more than what comes
         ahead, fell = self._climb(x, reached, force, compliance, work)
         way = self.problem.travel(ahead) - self.problem.travel(x)
         return ahead, way / (force - reached) if force > reached else np.inf, fell
@@ -162,6 +169,20 @@ class Grip:
         ahead = self._stepping.walk(x, force, work, LONGEST_STEP, forces)
         return ahead, bool((np.diff([reached, *forces]) < 0).any())
 
+    def _watch(self, x: FloatArray, force: float) -> None:
+        self.opening.watch(self.problem.wall_state(x), force)
+
+    def _gives_way(self, x: FloatArray, force: float) -> bool:
+        """Whether the force grows much more slowly with the travel here than it has done so far.
+
+        Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
+        when they snap in, and no force falls there.
+        """
+        fingers = self.problem.fingers
+        load = np.zeros(self.problem.size)
+        load[[f.travel for f in fingers]] = [f.pad.share for f in fingers]
+        return bool(self.problem.travel(self.solver.answer(load)) * force > self.problem.travel(x) / GIVES_WAY)
+
     def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
         """State of all parts, checked."""
         problem, residual = self.problem, np.abs(self.problem.residual(x))
@@ -173,15 +194,24 @@ class Grip:
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
                 work if k == 0 else Work(), part,
             ))  # fmt: skip
-        load = problem.model.everywhere(problem.wall_load(x))
-        q = problem.model.state(x[: problem.model.size], load)
+        load, q = problem.wall_load(x), problem.wall_state(x)
         worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(BALANCE, self.settings.residual) * force:
             raise CheckError(
                 f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
                 f"by {worst:.3g} N"
             )
-        return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped))
+        self._check_balance(fingers, load, force)
+        return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped, self.opening(q)))
+
+    def _check_balance(self, fingers: Sequence[Pressed], load: FloatArray, force: float) -> None:
+        """Refuse a state in which the wall does not bear what the pads press with."""
+        pads = sum(f.pose.rotation @ p.points.force for f, p in zip(self.problem.fingers, fingers, strict=True))
+        off = np.abs(pads - load.sum(axis=0)).max()
+        if not off <= BALANCE * force:
+            raise CheckError(
+                f"the state at {force:.4g} N converged but is wrong: pads and wall are out of balance by {off:.3g} N"
+            )
 
     def _reaction(self, load: FloatArray) -> FloatArray:
         """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""

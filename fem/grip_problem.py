@@ -32,6 +32,7 @@ from fem.wall_model import WallModel
 
 IntArray = NDArray[np.int32]
 LONGEST_TRAVEL = 1e-3  # of one iteration [m]
+CARRIED = 0.3  # part of a node's area that must face the wall for the node to carry load
 
 
 class Finger:
@@ -157,12 +158,13 @@ class GripProblem:
         for f, places in zip(self.fingers, self.places, strict=True):
             facing = face(f.wall, f.points(x)[1], places, v, w)
             pad, lam = f.pad, f.pressure(x)[f.nodes]
-            weighted, force = np.empty(f.nodes.shape), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
+            (weighted, part), force = np.empty((2, *f.nodes.shape)), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
             contact_forces(
                 pad.face_N, pad.face_area, lam, facing.gap, facing.normal, facing.nodes, facing.N, f.R,
-                weighted, force, wall_force,
+                weighted, part, force, wall_force,
             )  # fmt: skip
-            gaps = np.bincount(f.nodes.ravel(), weighted.ravel(), len(pad.node_area))
+            gaps, faced = (np.bincount(f.nodes.ravel(), sums.ravel(), len(pad.node_area)) for sums in (weighted, part))
+            gaps = np.where(faced > CARRIED * pad.node_area, gaps, FAR * pad.node_area)
             active = pad.node_area * (f.pressure(x) / f.kappa) - gaps > 0.0
             found.append(_Evaluated(facing, lam, gaps, active, force))
         return found
@@ -241,8 +243,7 @@ class GripProblem:
         return contact_tangent(
             pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
             facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressures, self.model.first,
-            self.model.second, self.model.both,
-            pattern.start, pattern.column, pattern.values,
+            self.model.second, pattern.start, pattern.column, pattern.values,
         )  # fmt: skip
 
     def _grow(self, contacts: list[_Evaluated]) -> None:
@@ -293,6 +294,10 @@ class GripProblem:
         force = self._no_force()
         self._contact(x, force)
         return -force
+
+    def wall_state(self, x: FloatArray) -> FloatArray:
+        """State of the whole shell ``(6 k,)`` [m]."""
+        return self.model.state(x[: self.model.size])
 
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the sheets [N], mean of the fingers."""

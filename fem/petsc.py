@@ -193,6 +193,16 @@ class NonlinearSolver:
             )
         return self._x.array.copy(), done
 
+    def answer(self, right: FloatArray) -> FloatArray:
+        """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
+        b, y = self._f.duplicate(), self._f.duplicate()
+        b.array[:] = right
+        self._snes.getKSP().solve(b, y)
+        found = y.array.copy()
+        b.destroy()
+        y.destroy()
+        return found
+
     def destroy(self) -> None:
         """Give the factors' memory back."""
         for thing in (self._snes, self._matrix, self._x, self._f):

@@ -17,6 +17,7 @@ from fem.spline_surface import SplineSurface, spline_surface
 
 NEAR = 0.004  # where the exact place on the wall is looked for [m]
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
+RIM = 17  # samples of a rounded edge, which is short
 DRAWN_AROUND, DRAWN_ALONG = 72, 90
 
 
@@ -104,14 +105,17 @@ class _NearWall:
         return self.body._gap(x, np.ones(len(x), dtype=bool))
 
 
-def wall_surface(outer, lower: float = -np.inf, upper: float = np.inf) -> SplineSurface:
-    """Splines through the part of an outer surface between two places ``s`` of its wall [m].
+def wall_surface(outer, lower: float | None = None, upper: float | None = None) -> SplineSurface:
+    """Splines through the part of an outer surface between two places ``s`` [m], by default the ends of its wall.
 
     ``outer`` offers ``wall``, ``curve`` and ``jets`` as ``fem.outer_surface.OuterSurface`` does.
     """
-    ends = max(outer.wall[0], lower), min(outer.wall[1], upper)
+    ends = outer.wall[0] if lower is None else lower, outer.wall[1] if upper is None else upper
     breaks = outer.curve.breaks
-    s = np.unique(np.concatenate([np.linspace(*ends, ALONG), breaks[(breaks > ends[0]) & (breaks < ends[1])]]))
+    breaks = breaks[(breaks > ends[0]) & (breaks < ends[1])]
+    inner = max(ends[0], outer.wall[0]), min(ends[1], outer.wall[1])
+    runs = np.linspace(ends[0], inner[0], RIM), np.linspace(*ends, ALONG), np.linspace(inner[1], ends[1], RIM)
+    s = np.unique(np.concatenate([*runs, breaks]))
     s = s[np.concatenate([[True], np.diff(s) > 1e-9])]
     theta = np.linspace(0.0, 2 * np.pi, AROUND + 1)
     T, S = np.meshgrid(theta, s, indexing="ij")

@@ -14,7 +14,9 @@ from fem.errors import ConvergenceError
 from fem.petsc import NonlinearSolver
 
 FloatArray = NDArray[np.float64]
+State = tuple[FloatArray, float]  # unknowns and force [N]
 WALK_STEPS = 60  # of the sheet, for one force
+SHORTEST = 1.0 / 64.0  # of the longest step of a walk, where that is bounded
 FIRST_TRIES = 12
 
 
@@ -70,6 +72,8 @@ class Stepping:
         Travel to the force that a residual there is judged by [N].
     floor : float
         Norm of the residual that rounding leaves [N].
+    watch : callable
+        Told every new state and its force [N]; what it raises ends the way.
     """
 
     problem: Pressing
@@ -80,6 +84,7 @@ class Stepping:
     guess: Callable[[float], FloatArray]
     force_scale: Callable[[float], float]
     floor: float = 0.0
+    watch: Callable[[FloatArray, float], None] = lambda x, force: None
 
     def solve(self, x: FloatArray, control: Control, work: Work) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
@@ -109,6 +114,7 @@ class Stepping:
                         raise
                     return self.walk(x, force, work)
                 continue
+            self.watch(x, target)
             done = goal
         return x
 
@@ -121,35 +127,52 @@ class Stepping:
         """
         problem = self.problem
         step, low = min(0.02 * self.thickness, longest), (x, problem.sheet_force(x))
+        shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
         for _ in range(WALK_STEPS):
             try:
                 ahead = self.solve(low[0], Control(travel=problem.travel(low[0]) + step), work)
                 high = (ahead, problem.sheet_force(ahead))
+                if high[1] >= force:
+                    return self._land(low, high, force, work)
+                self.watch(*high)
                 if forces is not None:
                     forces.append(high[1])
-                if high[1] >= force:
-                    share = (force - low[1]) / (high[1] - low[1])
-                    return self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
                 low, step = high, min(1.5 * step, longest)
             except ConvergenceError as error:
                 step *= 0.5
-                if step < 1e-5 * self.thickness:
+                if step < shortest:
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
         raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
 
-    def first(self, travel: float, force: float, work: Work) -> tuple[FloatArray, float]:
+    def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
+        """State at ``force`` between two on the way; Newton's method may jump to one further on, which is refused."""
+        share = (force - low[1]) / (high[1] - low[1])
+        x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
+        ends = self.problem.travel(low[0]), self.problem.travel(high[0])
+        margin = 1e-3 * (ends[1] - ends[0])
+        if not ends[0] - margin <= self.problem.travel(x) <= ends[1] + margin:
+            raise ConvergenceError(f"the state at {force:.4g} N lies beyond the one that was looked for")
+        self.watch(x, force)
+        return x
+
+    def first(self, travel: float, force: float, work: Work) -> State:
         """First state in contact and its force, by travel control near ``travel``: force control has no start."""
-        failure = "no force yet"
+        failure, best = "no force yet", None
         for _ in range(FIRST_TRIES):
             try:
                 x = self.solve(self.guess(travel), Control(travel=travel), work)
             except ConvergenceError as error:
+                if best:
+                    return best
                 travel, failure = 0.6 * travel, str(error)
                 continue
             reached = self.problem.sheet_force(x)
             if reached > 1e-3 * force:
                 return x, reached
+            best = (x, reached) if reached > 0.0 else best
             travel *= 1.5
+        if best:
+            return best
         raise ConvergenceError(
             f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
             f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"

@@ -16,7 +16,7 @@ import numpy as np
 
 from fem.facing import Wall
 from fem.outer_surface import OuterSurface
-from fem.pose import FloatArray, Pose
+from fem.pose import Pose
 from fem.shell_body import BodyMesh, body_mesh
 from fem.shell_grid import MeshSize
 from fem.shell_linear import LinearShell
@@ -131,39 +131,25 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     return Grasp(angle, kept[:n], flipped[:n], (between, across))
 
 
-def nonlinear_wall(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh):
+def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh, *, linear: bool = False):
     """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
     low, high, half = _footprint(held, pad_size)
     size = MeshSize((0.0, np.pi), (low, high), half, mesh.around, mesh.along, mesh.coarse)
-    supported_ = _supported(body, held, _within(body, size))
-    found = supported_.shell.mesh
+    one = _supported(body, held, _within(body, size))
+    found = one.shell.mesh
     wall = Wall(_surface(found), found.theta, found.s, found.number, 0.5 * found.thickness)
-    return NonlinearWall(supported_.shell, supported_.fixed), [wall] * len(held.poses)
-
-
-def linear_wall(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh):
-    """Linear shell condensed to what the pads of this grasp can touch, from factors that all grasps share."""
-    low, high, half = _footprint(held, pad_size)
-    linear, surface = object_factors(body, held.angle if not body.round else 0.0, held.mirrors, mesh, half)
-    found = linear.shell.mesh
-    regions = [_region(found, pose, low, high, half) for pose in held.poses]
-    nodes = np.unique(np.concatenate([number.ravel() for _, _, number in regions]))
-    model, half_wall = LinearWall(linear, nodes), 0.5 * found.thickness[nodes]
-    walls = [
-        Wall(surface, theta, s, np.searchsorted(nodes, number).astype(np.int32), half_wall)
-        for theta, s, number in regions
-    ]
-    return model, walls
+    return (LinearWall if linear else NonlinearWall)(one.shell, one.fixed), [wall] * len(held.poses)
 
 
 @lru_cache(maxsize=4)
-def object_factors(body: ThinWalled, angle: float, mirrors: tuple[bool, bool], mesh: WallMesh, half: float):
-    """First stiffness of the object, fine along its whole wall, and its outer surface; made once per rank."""
+def object_factors(
+    body: ThinWalled, angle: float, mirrors: tuple[bool, bool], mesh: WallMesh, half: float
+) -> LinearShell:
+    """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
     z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
     size = MeshSize((0.0, np.pi), (z.min(), z.max()), half, mesh.around, mesh.along, mesh.coarse)
-    held = Grasp(angle, (), (), mirrors)
-    one = _supported(body, held, _within(body, size))
-    return LinearShell(one.shell, one.fixed), _surface(one.shell.mesh)
+    one = _supported(body, Grasp(angle, (), (), mirrors), _within(body, size))
+    return LinearShell(one.shell, one.fixed)
 
 
 def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
@@ -174,8 +160,9 @@ def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
 
 
 def _surface(mesh: BodyMesh):
-    """Splines through the meshed part of the wall."""
-    return wall_surface(mesh.surface, mesh.s[0], mesh.s[-1])
+    """Splines through the meshed part of the wall and the rims of its flat ends."""
+    low, high = mesh.surface.flat
+    return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
 
 
 def _within(body: ThinWalled, size: MeshSize) -> MeshSize:
@@ -190,23 +177,9 @@ def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, fl
     margin = 0.1 * max(pad_size[:2])
     corners = np.array([[i * pad_size[0], j * pad_size[1], 0.0] for i in (-0.5, 0.5) for j in (-0.5, 0.5)])
     points = np.concatenate([pose.to_object(corners) for pose in held.poses])
-    return points[:, 2].min() - margin, points[:, 2].max() + margin, float(np.abs(points[:, 1]).max()) + margin
-
-
-def _region(mesh: BodyMesh, pose: Pose, low: float, high: float, half: float):
-    """Grid lines and node numbers of the part of a mesh that a pad at this pose can touch."""
-    side = 0.0 if pose.rotation[0, 2] < 0 else np.pi
-    outer = mesh.outer_grid()
-    middle = np.abs(np.mod(mesh.theta - side + np.pi, 2 * np.pi) - np.pi) < 0.5 * np.pi
-    near = (np.abs(outer[..., 1]) <= half) & middle[:, None] & (outer[..., 2] >= low) & (outer[..., 2] <= high)
-    i, j = _widened(near.any(axis=1)), _widened(near.any(axis=0))
-    return mesh.theta[i], mesh.s[j], mesh.number[i, j]
-
-
-def _widened(found: FloatArray) -> slice:
-    """Slice over all that was found and one more at both ends."""
-    k = np.flatnonzero(found)
-    return slice(max(k[0] - 1, 0), min(k[-1] + 2, len(found)))
+    ends = points[:, 2].min() - margin, points[:, 2].max() + margin, np.abs(points[:, 1]).max() + margin
+    low, high, half = (float(np.round(v, 9)) for v in ends)  # alike for candidates that differ by rounding alone
+    return low, high, half
 
 
 def _turned(pose: Pose, angle: float) -> Pose:

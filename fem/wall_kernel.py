@@ -1,12 +1,12 @@
 """Compiled loop over the points of a pad that press on a deformable wall.
 
 At a point with the pressure ``p = sum N_i lam_i`` the pad's node ``b`` gets ``-p dA N_b n`` and the wall's node ``a``
-gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Derivatives are those of
-``fem.facing``. Pad quantities are in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
+gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Points that face no wall are left out
+of both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``fem.facing``. Pad quantities are
+in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
 
-A node of the wall has unknowns ``first``, which move its outer face, and ``second``, which change its director and, if
-``both`` is set, move the outer face as well. (A shell element's are the displacement of the middle and the change of
-the director: both move the outer face.)
+A node of the wall has unknowns ``first``, the displacement of the middle, and ``second``, the change of the director:
+both move the outer face, and so the same force works on both.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fem.facing import FAR
 
 
 @njit(cache=True)
-def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, pad_force, wall_force):
+def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, facing, pad_force, wall_force):
     """Weighted gaps and nodal forces of one pad.
 
     Parameters
@@ -28,23 +28,26 @@ def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, p
     gap, normal : (faces * points,), (faces * points, 3) arrays
     wall_nodes, wall_N : (faces * points, 4) arrays
     R : (3, 3) array
-    weighted, pad_force : (faces, k), (faces, 3, k) arrays, out
-        [m^3], [N].
+    weighted, facing, pad_force : (faces, k), (faces, k), (faces, 3, k) arrays, out
+        Weighted gaps [m^3], areas ``int N_i dA`` of the part that faces the wall [m^2], forces [N].
     wall_force : (wall nodes, 3) array, added to
         [N].
     """
     points, k = N.shape
     n = np.empty(3)
     for f in range(area.shape[0]):
-        weighted[f] = 0.0
+        weighted[f] = facing[f] = 0.0
         pad_force[f] = 0.0
         for q in range(points):
             m = f * points + q
+            if gap[m] == FAR:
+                continue
             p = 0.0
             for i in range(k):
                 weighted[f, i] += area[f, q] * N[q, i] * gap[m]
+                facing[f, i] += area[f, q] * N[q, i]
                 p += N[q, i] * lam[f, i]
-            if p == 0.0 or gap[m] == FAR:
+            if p == 0.0:
                 continue
             load = p * area[f, q]
             for c in range(3):
@@ -57,7 +60,7 @@ def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, p
 
 @njit(cache=True)
 def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wall_N, H, G, A, R, pad_dofs, pressures,
-                    first, second, both, start, column, values):  # fmt: skip
+                    first, second, start, column, values):  # fmt: skip
     """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.
 
     Parameters
@@ -71,7 +74,6 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
     pad_dofs, pressures : (faces, 3, k), (faces, k) arrays
         Unknowns in the whole problem, -1 where fixed.
     first, second : (wall nodes, 3) arrays
-    both : bool
     start, column, values : arrays
         Compressed rows, columns ascending.
     """
@@ -95,7 +97,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
             p = 0.0
             for i in range(k):
                 p += N[q, i] * lam[f, i]
-            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, both, D, dn, dA)
+            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
             w = area[f, q]
             for j in range(t + 24):
                 for c in range(3):
@@ -128,8 +130,6 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
             for r in range(t + 24 + k):
                 if row_dof[r] < 0:
                     continue
-                if t + 12 <= r < t + 24 and not both:
-                    continue
                 # what moves the outer face carries the same force
                 local = r if r < t + 12 else r - 12
                 gap_row = r >= t + 24
@@ -148,7 +148,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
 
 
 @njit(cache=True)
-def _changes(N, gap, nodes, wall_N, H, G, A, R, both, D, dn, dA):
+def _changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
     """Changes with every local unknown: relative position ``D``, normal ``dn`` and nodal shares ``dA = d(N_a n)``."""
     k = N.size
     t = 3 * k
@@ -160,7 +160,7 @@ def _changes(N, gap, nodes, wall_N, H, G, A, R, both, D, dn, dA):
         for c in range(3):
             for d in range(3):
                 D[d, t + 3 * a + c] = -wall_N[a] if c == d else 0.0
-                D[d, t + 12 + 3 * a + c] = (D[d, t + 3 * a + c] if both else 0.0) - gap * wall_N[a] * G[d, c]
+                D[d, t + 12 + 3 * a + c] = D[d, t + 3 * a + c] - gap * wall_N[a] * G[d, c]
     for j in range(t + 24):
         for d in range(3):
             dn[d, j] = H[d, 0] * D[0, j] + H[d, 1] * D[1, j] + H[d, 2] * D[2, j]

@@ -84,6 +84,8 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
     values = dict(result.values)
     values["fingers/pose_rotation"] = turn @ values["fingers/pose_rotation"]
     values["fingers/pose_origin"] = values["fingers/pose_origin"] @ turn.T
+    if "wall/place" in values:
+        values["wall/place"] = values["wall/place"] @ turn.T
     return replace(result, values=values)
 
 

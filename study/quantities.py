@@ -58,10 +58,10 @@ MAPS = (
              " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
              " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
              " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"
-             " the travel, or fewer than six elements carry load; 8192 the wall has snapped in: the force fell on the"
-             " way to this case while the fingers closed; 16384 the pads push the object along its axis with more than"
-             " friction can hold: it slides out; 32768 the wall's stress is above its yield strength: the dent"
-             " stays."),
+             " the travel, or fewer than six elements carry load; 8192 the wall has snapped in: on the way to this case"
+             " the force fell while the fingers closed, or grew less than half as fast as before on average; 16384 the"
+             " pads push the object along its axis with more than friction can hold: it slides out; 32768 the wall's"
+             " stress is above its yield strength: the dent stays."),
     *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
                f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved"
                f" contact cannot carry ({note}); of the finger where it is largest.")

@@ -9,12 +9,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
+from fem.errors import CheckError
 from fem.extract import half_turned, mirrored
 from fem.grip import Grip, Gripped
 from fem.grip_problem import GripProblem
 from fem.press import Press, Pressed, Settings
 from fem.spring_bed import SpringBed
-from fem.thin_walled import Grasp, WallMesh, grasp, linear_wall, nonlinear_wall
+from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
 from friction.patch import ContactPatch
 from study import model
 from study.build import pad_shape
@@ -23,6 +26,8 @@ from study.contact import Contact
 from study.model import Finger
 from study.scene import Scene
 from study.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+
+STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 
 
 @dataclass(frozen=True)
@@ -58,10 +63,11 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
     """Solver for both fingers at first touch, at the level of the object's compliance that the candidate calls for."""
     if getattr(scene.object, "wall", None) is None:
         return OnRigid(scene, fingers, poses, None)
+    _refuse_along_axis(fingers)
     held = _grasp(scene, fingers, False)
     pad = model.pad(scene.gripper, held.pad_symmetry, scene.accuracy.contact, False)
     travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
-    level = choose_level(scene, fingers, held, travel)
+    level = choose_level(scene, held, travel)
     if level.number == RIGID:
         return OnRigid(scene, fingers, poses, level)
     return OnWall(scene, fingers, level)
@@ -127,7 +133,7 @@ class OnWall:
             own = state.fingers[0]
 
             def image(patch: ContactPatch) -> ContactPatch:
-                return mirrored(own.pad, patch)
+                return mirrored(own.pad, half_turned(patch) if held.flipped[0] else patch)
 
             contacts.append(Contact(self.scene, self.fingers[1], own, image))
         return contacts
@@ -136,6 +142,17 @@ class OnWall:
         """See `Solver`."""
         for g in self.grips:
             g.destroy()
+
+
+def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
+    """Lids, bottoms and rims of a thin-walled object are not pressed."""
+    steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
+    if steepest > np.sin(STEEPEST):
+        raise CheckError(
+            f"a finger approaches a thin-walled object at {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees to "
+            f"the planes across its axis; its wall is simulated up to {np.degrees(STEEPEST):.0f} degrees: turn the "
+            "approach, or remove wall_mm"
+        )
 
 
 def _settings(scene: Scene) -> Settings:
@@ -153,16 +170,26 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     """Grasp frame and the planes of symmetry that meshes and scene allow."""
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
     wanted = scene.effects.model_size
-    allowed = {"full": (False, False), "half": (False, even)}.get(wanted, (True, even))
-    return grasp(thin_body(scene.object), tuple(f.pose for f in fingers), allowed)
+    body, poses = thin_body(scene.object), tuple(f.pose for f in fingers)
+    held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
+    if wanted == "half" and all(held.mirrors):
+        held = grasp(body, poses, (False, True))
+    # a coarser mesh for error estimates takes what it can use
+    need = {"half": 1, "quarter": 2}.get(wanted, 0) if not coarser else 0
+    if sum(held.mirrors) < need:
+        raise ValueError(
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object, fingers and mesh share "
+            f"{sum(held.mirrors)} here; use 'auto'"
+        )
+    return held
 
 
 def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarser: bool) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size
-    wall_of = linear_wall if level.number == LINEAR else nonlinear_wall
-    wall, faces = wall_of(thin_body(scene.object), held, scene.gripper.pad_size, mesh)
+    body, linear = thin_body(scene.object), level.number == LINEAR
+    wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
     def problem(rule: str) -> GripProblem:
         pad = model.pad(scene.gripper, held.pad_symmetry, rule, coarser)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -17,7 +16,6 @@ from fem.shell_stress import faces
 from fem.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
 from fem.wall_material import wall_material
 from study.build import outer_surface
-from study.model import Finger
 from study.scene import Scene
 from study.scene.shape import Walled
 from study.wall_quantities import ALONG, AROUND
@@ -59,15 +57,14 @@ class Level:
     forced: bool
 
 
-def choose_level(scene: Scene, fingers: Sequence[Finger], held: Grasp, travel: float) -> Level:
+def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
     """Level of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
 
     ``travel`` is that of the pads on the rigid object at the largest force [m].
     """
     names = {"rigid": RIGID, "linear_shell": LINEAR, "nonlinear_shell": NONLINEAR}
     body = thin_body(scene.object)
-    dent = estimated_dent(body, held, scene, travel)
-    ratio = dent / body.thickness_at(float(fingers[0].pose.origin[2]))
+    dent, ratio = estimated_dent(body, held, scene, travel)
     if scene.effects.object != "auto":
         return Level(names[scene.effects.object], ratio, forced=True)
     if dent < STIFF * travel:
@@ -75,13 +72,14 @@ def choose_level(scene: Scene, fingers: Sequence[Finger], held: Grasp, travel: f
     return Level(LINEAR if ratio <= SMALL_DENT else NONLINEAR, ratio, forced=False)
 
 
-def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> float:
-    """Dent of the linear wall at the largest force, pressed on where undeformed pads would overlap it [m].
+def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> tuple[float, float]:
+    """Dent of the linear wall at the largest force, where undeformed pads would overlap it [m], and over the wall.
 
-    One right-hand side with factors that all candidates share.
+    The second is the largest ratio of an inward displacement to the wall's thickness there. One right-hand side with
+    factors that all candidates share.
     """
     length, width, _ = scene.gripper.pad_size
-    linear, _ = object_factors(body, 0.0 if body.round else held.angle, held.mirrors, ESTIMATE, 0.6 * width)
+    linear = object_factors(body, 0.0 if body.round else held.angle, held.mirrors, ESTIMATE, 0.6 * width)
     mesh, area = linear.shell.mesh, linear.shell.node_area
     load = np.zeros((linear.shell.nodes, 6))
     pressed = np.zeros(linear.shell.nodes, dtype=bool)
@@ -99,7 +97,8 @@ def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
     q = linear.solve(load.ravel()).reshape(-1, 6)
-    return float(_dents(linear.shell, q)[pressed].max(initial=0.0))
+    dents = _dents(linear.shell, q)
+    return float(dents[pressed].max(initial=0.0)), float((dents / mesh.thickness)[pressed].max(initial=0.0))
 
 
 def _dents(shell: Shell, q: FloatArray) -> FloatArray:
@@ -113,11 +112,10 @@ def _dents(shell: Shell, q: FloatArray) -> FloatArray:
 
 def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict[str, Any]:
     """What the wall bears in one case, keyed as in ``study.quantities``."""
-    pressed = np.linalg.norm(state.wall.load, axis=1) > 0
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
     return {
-        "maps/dent": float(_dents(shell, q)[pressed].max(initial=0.0)),
+        "maps/dent": float(_dents(shell, q).max(initial=0.0)),
         "maps/wall_stress": max(float(f.von_mises.max()) for f in both),
         "maps/wall_strain": max(float(np.abs(f.principal_strain).max()) for f in both),
         "maps/support_force": float(np.linalg.norm(state.wall.reaction)),
@@ -134,13 +132,16 @@ def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> int:
 
 
 def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
-    """Deformed outer face ``(AROUND * ALONG, 3)`` of the whole object in its own frame [m]."""
+    """Deformed outer face ``(AROUND * ALONG, 3)`` of the whole object in its own frame [m].
+
+    The angles begin at finger 1, so that images of a grasp are stored alike but for their turn.
+    """
     mesh = shell.mesh
     theta, s = np.meshgrid(
         2 * np.pi * np.arange(AROUND) / AROUND, np.linspace(mesh.s[0], mesh.s[-1], ALONG), indexing="ij"
     )
-    # into the frame of the mesh, and there to the side that is meshed
-    x, y = np.cos(theta - held.angle), np.sin(theta - held.angle)
+    # to the side that is meshed
+    x, y = np.cos(theta), np.sin(theta)
     side = np.stack([np.where((x < 0) & held.mirrors[0], -1.0, 1.0), np.where((y < 0) & held.mirrors[1], -1.0, 1.0)])
     own = np.arctan2(side[1] * y, side[0] * x).ravel()
     nodes, N, _ = mesh.locate(own, s.ravel())

@@ -12,7 +12,7 @@ from fem.pad import Pad
 from fem.pad_shape import PadShape
 from fem.pose import Pose
 from fem.revolution import Revolution
-from fem.thin_walled import ThinWalled, WallMesh, grasp, linear_wall, nonlinear_wall
+from fem.thin_walled import ThinWalled, WallMesh, grasp, wall_between
 from fem.wall_material import WallMaterial, wall_material
 
 SIZE = (0.03, 0.02, 0.02)
@@ -54,7 +54,7 @@ def grip(
     """Both fingers on the can at this height."""
     poses = pose(theta, z), pose(theta + np.pi, z)
     held = grasp(body, poses, allowed)
-    model, walls = (nonlinear_wall if level == "nonlinear" else linear_wall)(body, held, SIZE, mesh)
+    model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
     pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)
     problem = GripProblem(model, [(pad, p, wall) for p, wall in zip(held.poses, walls, strict=True)])
     return Grip(problem, [_gap(p) for p in held.poses], held.mirrors)
