@@ -18,7 +18,7 @@ MODEL_STYLE = {
     "flat": {"color": "#c05a00", "linestyle": "--", "marker": "s"},
     "projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
 }
-COLOURS = {"quality": "viridis", "e_n": "cividis", "pressure": "magma_r"}
+COLOURS = {"quality": "viridis", "e_n": "cividis", "pressure": "magma_r", "dent": "YlGnBu", "wall_stress": "YlOrRd"}
 RASTER = 600  # polygons above which a map is stored as pixels: a page must stay small
 _STYLE = {
     "font.family": "DejaVu Sans",

@@ -12,7 +12,7 @@ from typing import Any
 
 from study import pictures
 from study.exits import CANNOT_WRITE, StudyError
-from study.report import background, curvature, curves, words
+from study.report import background, curvature, curves, levels, wall_curves, wall_shape, wall_words, window, words
 from study.report import maps as report_maps
 from study.report import patch as report_patch
 from study.report import side as report_side
@@ -54,6 +54,8 @@ def build(result: Any) -> tuple[str, bytes]:
         ("verdict", "", words.verdict(data, mu) + words.best_tables(data)),
         ("maps", "Maps", _pictures(shapes) + paragraph(words.CAVEAT, "note")),
     ]
+    if data.best is not None and data.map("dent") is not None:
+        sections.append(("wall", "What the wall bears", _wall(data, scene, data.best)))
     if differences := curvature.difference_pictures(data, scene, best):
         sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in differences)))
         png = differences[0][1]  # what a sweep of the shape was made for
@@ -65,7 +67,7 @@ def build(result: Any) -> tuple[str, bytes]:
             sections.append(("surface", "Limit surface of the best case", _pictures(drawn)))
     sections += [
         ("cases", "Cases and checks", words.cases(data) + words.checks(data)),
-        ("effects", "What was simulated", background.effects(data)),
+        ("effects", "What was simulated", _effects(data, best)),
         ("definitions", "Definitions", background.definitions(data)),
         ("provenance", "Provenance and time", background.provenance(data) + background.time_split(data)),
         ("scene", "Scene in effect", background.scene_text(data)),
@@ -76,6 +78,21 @@ def build(result: Any) -> tuple[str, bytes]:
 
 def _pictures(shown: Iterable[Picture | None]) -> str:
     return "".join(picture(p) for p in shown if p)
+
+
+def _wall(data: Data, scene: Any, best: tuple[int, ...]) -> str:
+    """Limits, window of forces, shape, maps and force curves of a thin wall."""
+    several = data.status[..., 0].size > 1
+    maps = report_maps.force_maps(data, best, report_maps.OF_WALL)[0] if several else None
+    windows = window.window_picture(data, best) if several else None
+    allowed = getattr(scene.object, "allowed_dent", None) if scene else None
+    shown = [windows, wall_shape.shape_picture(data, scene, best), maps]
+    return wall_words.wall(data, scene) + _pictures([*shown, wall_curves.force_curves(data, best, allowed)])
+
+
+def _effects(data: Data, best: tuple[int, ...]) -> str:
+    shown = levels.level_picture(data, best)
+    return background.effects(data) + levels.rule(data) + _pictures([shown])
 
 
 def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from study.layout import DONE, FAILED, MISSING, ROOT
-from study.show import ranking
+from study.ranking import BORNE, LOST, borne_level, judged, ranking
 
 SHOWN = {
     "m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "Pa": ("kPa", 1e-3), "m^2": ("mm²", 1e6), "N m": ("N mm", 1e3),
     "1/m": ("1/m", 1.0),
 }  # fmt: skip
+OWN_UNITS = {"wall_stress": ("MPa", 1e-6)}  # maps whose numbers would be unwieldy in the unit of the others
 WIDE = 5e-3  # relative difference of widths that makes no place wider
 TIE = 1e-6  # relative difference of scores that is no difference: images of one grasp
 # What a check may be at most (or, for the last two, must exceed), and how the reader should take it.
@@ -115,7 +116,7 @@ class Data:
         found = self._paths[path].attributes if path in self._paths else {}
         units = found.get("units", "")
         label = found.get("long_name", name).removesuffix(f" [{units}]").removesuffix(", curved")
-        return label, *shown(units)
+        return label, *OWN_UNITS.get(name, shown(units))
 
     def label(self, name: str) -> str:
         """A map's name and unit for an axis or a column."""
@@ -128,8 +129,32 @@ class Data:
         return "quality" if self.map("quality") is not None else "e_n"
 
     @cached_property
+    def flags(self) -> np.ndarray:
+        """Flags of all cases as `study.ranking.judged` gives them."""
+        return judged(self.result)
+
+    @property
+    def lost(self) -> np.ndarray:
+        """Solved cases that slip, slide out, harm the object or do not hold it."""
+        return (self.flags & LOST > 0) & (self.status == DONE)
+
+    @property
+    def walled(self) -> bool:
+        """Whether the object has a thin wall."""
+        return "wall" in self.result.layout.has
+
+    def bound(self, name: str) -> np.ndarray | None:
+        """A bound of the window of forces [N], over all axes but the force; None if the file has no such bound."""
+        if name not in {d.name for d in self.result.layout.derived}:
+            return None
+        return self.result.derived(name)
+
+    @cached_property
     def k(self) -> int:
-        """The force level that is shown: the highest with a solved case."""
+        """The force level that is shown: the highest with a solved case that its wall bears, if there is one."""
+        borne = borne_level(self.status, self.flags) if (self.flags & BORNE).any() else None
+        if borne is not None:
+            return borne
         solved = np.flatnonzero((self.status == DONE).reshape(-1, len(self.forces)).any(axis=0))
         return int(solved[-1]) if solved.size else len(self.forces) - 1
 
@@ -138,8 +163,7 @@ class Data:
         found = self.map(self.score)
         done = np.flatnonzero(self.status[..., k].ravel() == DONE)
         score = np.full(done.shape, -np.inf) if found is None else found[..., k].ravel()[done]
-        flags = self.map("flags")
-        ranked = done[ranking(score, np.zeros(done.shape) if flags is None else flags[..., k].ravel()[done])]
+        ranked = done[ranking(score, self.flags[..., k].ravel()[done])]
         return [(*(int(i) for i in np.unravel_index(c, self.shape[:-1])), k) for c in ranked]
 
     @cached_property

@@ -14,8 +14,9 @@ from study.report.data import Data, number, shown
 from study.report.page import Picture
 
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
-SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]"}
-MAPS = tuple(SHORT)
+SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]", "dent": "dent [mm]", "wall_stress": "wall stress [MPa]"}
+MAPS = ("quality", "e_n")
+OF_WALL = ("dent", "wall_stress")
 HOW_TO_READ = "Crossed out: failed. Dotted: no value yet."
 
 
@@ -26,7 +27,7 @@ def main_axis(data: Data) -> int:
     return int(np.argmax(lengths)) if data.shape[place] == 1 and max(lengths, default=1) > 1 else place
 
 
-def _plane(data: Data, array: np.ndarray, x: int, y: int, index: Sequence[int]) -> np.ndarray:
+def plane(data: Data, array: np.ndarray, x: int, y: int, index: Sequence[int]) -> np.ndarray:
     """Two-dimensional cut ``(y, x)`` through an array over all cases, all other axes at ``index``."""
     cut = array[tuple(slice(None) if i in (x, y) else index[i] for i in range(array.ndim))]
     return cut if y < x else cut.T
@@ -38,7 +39,7 @@ def scaled(data: Data, name: str) -> np.ndarray:
     return np.full(data.shape, np.nan) if found is None else found * data.units(name)[2]
 
 
-def _scale(data: Data, position: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def ticks(data: Data, position: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Cell borders, tick places and tick texts of an axis; few levels get rows of equal width."""
     axis = data.axes[position]
     factor = shown(axis.units)[1]
@@ -87,8 +88,8 @@ def chosen_angles(data: Data, index: Sequence[int]) -> list[int]:
 
 
 def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], limits: tuple[float, float]) -> Any:
-    (xe, xt, xl), (ye, yt, yl) = _scale(data, x), _scale(data, y)
-    values, failed = _plane(data, scaled(data, name), x, y, index), _plane(data, data.status == FAILED, x, y, index)
+    (xe, xt, xl), (ye, yt, yl) = ticks(data, x), ticks(data, y)
+    values, failed = plane(data, scaled(data, name), x, y, index), plane(data, data.status == FAILED, x, y, index)
     drawn = pictures.heat(
         axes, xe, ye, values, failed, cmap=pictures.COLOURS[name], vmin=limits[0], vmax=limits[1]
     )  # fmt: skip
@@ -102,7 +103,17 @@ def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int]
         place = (0.5 * (xe[j] + xe[j + 1]), 0.5 * (ye[i] + ye[i + 1]))
         for colour, width in (("white", 2.6), (pictures.INK, 1.1)):
             axes.plot(*place, "o", ms=7, mfc="none", mec=colour, mew=width)
+    if data.walled:
+        _cross(axes, xe, ye, plane(data, data.lost, x, y, index))
     return drawn
+
+
+def _cross(axes: Any, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> None:
+    """Small crosses in the middle of cells between borders ``x`` and ``y``, one marker for all of them."""
+    i, j = np.nonzero(chosen)
+    places = 0.5 * (x[j] + x[j + 1]), 0.5 * (y[i] + y[i + 1])
+    for colour, width in (("white", 2.6), (pictures.INK, 1.0)):
+        axes.plot(*places, "x", ms=4, mec=colour, mew=width)
 
 
 def elsewhere(data: Data, index: Sequence[int], *drawn: int) -> str:
@@ -119,16 +130,16 @@ def elsewhere(data: Data, index: Sequence[int], *drawn: int) -> str:
     return ", ".join(words)
 
 
-def force_maps(data: Data, index: tuple[int, ...]) -> tuple[Picture, bytes]:
-    """Quality and e_n over the main axis and the force, one row for each angle; and the same as PNG."""
+def force_maps(data: Data, index: tuple[int, ...], names: tuple[str, str] = MAPS) -> tuple[Picture, bytes]:
+    """Two maps over the main axis and the force, one row for each angle; and the same as PNG."""
     x, y, angle = main_axis(data), len(data.shape) - 1, len(data.shape) - 2
     rows = chosen_angles(data, index)
     height = min(max(1.2 + 0.22 * data.shape[y], 1.7), 2.8)
-    names = _scale(data, x)[2]
-    upright = 0.07 * max(map(len, names), default=0) if len(names) > FEW else 0.0
+    texts = ticks(data, x)[2]
+    upright = 0.07 * max(map(len, texts), default=0) if len(texts) > FEW else 0.0
     drawn, axes = pictures.figure(10, height * len(rows) + 0.7 + upright, len(rows), 2, sharex=True, sharey=True)
     at = shown(data.axes[angle].units)[1]
-    for column, name in enumerate(MAPS):
+    for column, name in enumerate(names):
         values = scaled(data, name)
         limits, last = pictures.span(np.take(values, rows, angle)), None
         for row, j in enumerate(rows):
@@ -143,8 +154,10 @@ def force_maps(data: Data, index: tuple[int, ...]) -> tuple[Picture, bytes]:
         axes[-1, column].set_xlabel(data.axis_label(data.axes[x]))
     for row in range(len(rows)):
         axes[row, 0].set_ylabel("force per finger [N]")
-    png_title = f"{data.title}: grasp quality and eccentricity parameter"
-    caption = f"The circle marks the largest value of each panel. {HOW_TO_READ}"
+    labels = [data.units(name)[0] for name in names]
+    crossed = data.walled and data.lost.any()
+    marks = " Small cross: too weak or too strong for the object, or the grasp is lost." if crossed else ""
+    caption = f"The circle marks the largest value of each panel.{marks} {HOW_TO_READ}"
     if where := elsewhere(data, index, x, y, angle):
         caption = f"At {where}. {caption}"
     hidden = data.shape[angle] - len(rows)
@@ -152,16 +165,17 @@ def force_maps(data: Data, index: tuple[int, ...]) -> tuple[Picture, bytes]:
         images = len(different_angles(data)) == len(rows)
         why = "the same map" if images else "see the next picture or the file"
         caption += f" {hidden} more angle{'s' * (hidden > 1)} not drawn here: {why}."
-    alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and normal force. {extremes(data, index)}"
+    over = f"{data.name(data.axes[x])} and normal force"
+    alt = f"Heat maps of {' and '.join(labels)} over {over}. {extremes(data, index, names)}"
     shown_ = Picture(pictures.as_svg(drawn), alt, caption)
-    drawn.suptitle(png_title, fontsize=10, x=0.01, ha="left")
+    drawn.suptitle(f"{data.title}: {' and '.join(labels)}", fontsize=10, x=0.01, ha="left")
     return shown_, pictures.as_png(drawn)
 
 
-def extremes(data: Data, index: tuple[int, ...]) -> str:
-    """Ranges of both maps at the force shown, in words."""
+def extremes(data: Data, index: tuple[int, ...], names: tuple[str, ...] = MAPS) -> str:
+    """Ranges of maps at the force shown, in words."""
     words = []
-    for name in MAPS:
+    for name in names:
         values = scaled(data, name)[..., index[-1]]
         if np.isfinite(values).any():
             low, high = (np.unravel_index(f(values), values.shape) for f in (np.nanargmin, np.nanargmax))

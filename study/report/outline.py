@@ -58,7 +58,18 @@ def shape_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray] | N
     if kind == "box":
         x, y, z = shape.size
         return np.array([-0.5, 0.5]) * z, np.full(2, 0.5 * (x * c + y * s))
-    return None
+    return _stacked_outline(shape, angle) if kind == "sections" else None
+
+
+def _stacked_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """Heights and half widths of stacked sections along their wall."""
+    from study.build import outer_surface
+
+    surface = outer_surface(shape)[0]
+    theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, 73), np.linspace(*surface.wall, 161), indexing="ij")
+    place = surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)
+    along = place[..., 0] * math.cos(angle) + place[..., 1] * math.sin(angle)
+    return place[0, :, 2], 0.5 * np.ptp(along, axis=0)
 
 
 def _measured(data: Data, index: tuple[int, ...]) -> Outline | None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from study.layout import DONE, FAILED, MISSING
+from study.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
 from study.report.data import ABOVE, LIMITS, Data, number, passes, shown
 from study.report.page import box, paragraph, table
-from study.show import FLAGS
+from study.report.wall_words import SAFE, wall_sentence, window_text
 
 BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
+HARM = SLIDES_OUT | YIELDS | TOO_WEAK | TOO_STRONG
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
     "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
@@ -71,7 +73,8 @@ def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list
         f"There a contact holds up to {value['f_x_max']} N along the pad, {value['f_y_max']} N across it and "
         f"{value['tau_z_max']} N mm of torque about its normal (curved model{friction}; weaker finger)."
     )
-    return [first, second, *_weight(data, best), *_planar(data, best), *_other_force(data, best)]
+    wall = [text for text in (wall_sentence(data, best),) if text]
+    return [first, second, *_weight(data, best), *wall, *_planar(data, best), *_other_force(data, best)]
 
 
 def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
@@ -102,7 +105,7 @@ def _planar(data: Data, index: tuple[int, ...]) -> list[str]:
 
 def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
     """Where the score per unit of normal force is largest, if that is at another force."""
-    tops = [i for k in range(len(data.forces)) for i in data.order(k)[:1]]
+    tops = [i for k in range(len(data.forces)) for i in data.order(k)[:1] if not data.lost[i] or i == best]
     top = max(tops, key=lambda i: np.nan_to_num(data.at(data.score, i), nan=-np.inf))
     if top[-1] == best[-1] or not data.at(data.score, top) > data.at(data.score, best) * (1 + 1e-3):
         return []
@@ -118,7 +121,10 @@ def _warnings(data: Data, best: tuple[int, ...]) -> str:
         missing = data.count(MISSING)
         found.append(f"This study is unfinished: {missing} cases are missing, so a better grasp may be found.")
     if best[-1] < len(data.forces) - 1:
-        found.append(f"No case is solved above {number(data.forces[best[-1]])} N; all comparisons are made there.")
+        above = "grasp is safe" if np.any(data.status[..., best[-1] + 1 :] == DONE) else "case is solved"
+        found.append(f"No {above} above {number(data.forces[best[-1]])} N; all comparisons are made there.")
+    if reasons := [meaning for mask, _, meaning in _flags(data, best) if mask & HARM]:
+        found.append(f"Of all grasps at this force none is without a fault; of the best: {'; '.join(reasons)}.")
     if flagged := data.flagged(best):
         found.append(f"The best case does not pass its checks: {', '.join(flagged)}.")
     if note := str(data.result.messages[best]):
@@ -142,7 +148,8 @@ def best_tables(data: Data) -> str:
     order = data.order(data.k)
     if not order:
         return ""
-    head = ["grasp", *(HEADS[name] for name in COLUMNS), f"e_n {data.planar} [mm]", "checks and remarks"]
+    last = f"e_n {data.planar} [mm]" if data.bound("force_high") is None else "safe forces [N]"
+    head = ["grasp", *(HEADS[name] for name in COLUMNS), last, "checks and remarks"]
     chosen: list[tuple[int, ...]] = []
     merged: set[tuple[int, ...]] = set()
     for index in order:
@@ -162,6 +169,7 @@ def best_tables(data: Data) -> str:
         head = ["force [N]", *head]
         html += table("Best grasp at each force", head, rows, wide=(1, len(head) - 1))
     tops = [index for k in range(len(data.forces)) for index in data.order(k)[:1]]
+    html += paragraph(SAFE, "note") if data.bound("force_high") is not None else ""
     words = {word: meaning for index in (*chosen, *tops) for _, word, meaning in _flags(data, index)}
     return html + "".join(paragraph(f"{word}: {meaning}.", "note") for word, meaning in words.items())
 
@@ -177,8 +185,8 @@ def _with_angles(data: Data, index: tuple[int, ...]) -> str:
 
 
 def _flags(data: Data, index: tuple[int, ...]) -> list[tuple[int, str, str]]:
-    value = data.at("flags", index)
-    return [flag for flag in FLAGS if np.isfinite(value) and int(value) & flag[0]]
+    value = int(data.flags[tuple(index)])
+    return [flag for flag in FLAGS if value & flag[0]]
 
 
 def _row(data: Data, index: tuple[int, ...]) -> list[str]:
@@ -186,7 +194,8 @@ def _row(data: Data, index: tuple[int, ...]) -> list[str]:
     known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
     checks = data.flagged(index) or ["passed" if known else "not stored"]
     remarks = ", ".join([*checks, *(word for _, word, _ in _flags(data, index))])
-    return [*values, number(data.at("e_n", index, data.planar) * 1e3, 4), remarks]
+    planar = number(data.at("e_n", index, data.planar) * 1e3, 4)
+    return [*values, planar if data.bound("force_high") is None else window_text(data, index), remarks]
 
 
 # --- cases -----------------------------------------------------------------------------------------------------------
