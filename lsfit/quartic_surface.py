@@ -20,6 +20,7 @@ from lsfit.geometry import (
 )
 from lsfit.newton import support_points
 from lsfit.surface import LevelSet, checked_factors, rows
+from lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 
@@ -105,6 +106,11 @@ class Quartic(LevelSet):
     def frame(self) -> FloatArray:
         """Map ``L (d, d)`` from a body that is nearly round onto this one."""
         return round_frame(self.value, self.dimension, 4) if self.ball_map is None else self.ball_map
+
+    @property
+    def ellipsoid(self) -> TiltedEllipsoid:
+        """An ellipsoid near the body."""
+        return TiltedEllipsoid.of_ball(self.frame, self.flag)
 
     @cached_property
     def volume(self) -> float:

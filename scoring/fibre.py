@@ -51,17 +51,17 @@ class Span:
     T: FloatArray
     U: FloatArray
 
-    @property
+    @cached_property
     def M(self) -> FloatArray:
         """Shadow along T of ``(l, e)``, ``(2, 4)``."""
         return self.U.T @ self.C
 
-    @property
+    @cached_property
     def det(self) -> float:
         """Volume in the span per volume in ``(l, e)``."""
         return abs(float(np.linalg.det(np.hstack([self.T, self.U]).T @ self.C)))
 
-    @property
+    @cached_property
     def facet_map(self) -> FloatArray:
         """Part in T of a facet's normal given in ``(l, e)``, ``(2, 4)``."""
         return self.det * np.linalg.inv(np.hstack([self.T, self.U]).T @ self.C)[:, :2].T
@@ -102,11 +102,14 @@ class EllipsoidFibre:
         axes, vectors = np.linalg.eigh(A)
         self.W, self.c, self.v0, _ = _disc(axes, vectors, span.facet_map)
         self.rho = math.hypot(*self.v0)
-        # The rim of a flat body has normals only as the limit of thin ones.
-        thick = np.maximum(axes, THIN * axes[2])
-        self.rim = _disc(thick, vectors, span.facet_map)
+        self.axes, self.vectors, self.facet_map = axes, vectors, span.facet_map
         self.shadow_map, self.centre = span.M[:, 1:] @ A, span.M[:, 0]
         self.volume = math.pi / 3 * float(axes.prod()) * span.det
+
+    @cached_property
+    def rim(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """The disc for `ridge`: the rim of a flat body has normals only as the limit of thin ones."""
+        return _disc(np.maximum(self.axes, THIN * self.axes[2]), self.vectors, self.facet_map)
 
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone and area of the hull of an ellipse and 0."""

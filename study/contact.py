@@ -37,6 +37,7 @@ REMARKS = {
     8192: "the wall has snapped in",
     16384: "the object slides out of the grasp along its axis",
     32768: "the wall yields, the dent stays",
+    65536: "a limit surface could not be fitted, the ellipsoid from three motions stands in",
 }
 UNSTABLE = "foam lost ellipticity, strains may localise"
 

@@ -22,7 +22,6 @@ from study.quantity import MODELS
 from study.scene import Scene
 
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
-ROUGH = 0.2  # ends a quartic's volume after two divisions; extrapolated it is good to some 1e-3
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 
 
@@ -51,7 +50,7 @@ def grasp_values(
     size = lengths(scene, obj, contacts)
     facing = max(angles(*contacts)) <= FACING
     found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
-    tilt = math.nan  # what the pose makes of the closed form, for quartics
+    tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
     for m in MODELS:
         ellipsoids = [c.ellipsoids[m] for c in contacts]
         closed = score(*(e.semi_axes for e in ellipsoids), size.distance, size.arms, size.torques)
@@ -64,12 +63,10 @@ def grasp_values(
             continue
         found["quality"].append(_volume(contacts, ellipsoids, size))
         fitted = _bodies(own, scene.friction.mu)
-        if not all(isinstance(body, Quartic) for body in fitted):
+        if not any(isinstance(body, Quartic) for body in fitted):
             both = _volume(contacts, fitted, size)
-        elif math.isnan(tilt):  # the curved model comes first; the planar ones are of nearly the same shape
-            both, flat = _volume(contacts, fitted, size), both
-            tilt = both / flat
         else:
+            tilt = _tilt(contacts, fitted, size) if math.isnan(tilt) else tilt
             both *= tilt
         found["quality_fitted"].append(both)
         search = scene.score.epsilon == "everywhere"
@@ -90,6 +87,20 @@ def _closed_form(bounds: Sequence[Bound], mu: float, size: Lengths) -> float:
     return volume_linf(V[0], A[0], V[1], A[1], size.distance / size.arms)
 
 
+def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], size: Lengths) -> float:
+    """Volume in the pose by that of the same contacts face to face, for ellipsoids near the bodies.
+
+    It hardly depends on the shape: within 1e-3 it is that of the quartics themselves, whose volume in any pose takes
+    several times as long.
+    """
+    near = [body.ellipsoid if isinstance(body, Quartic) else body for body in bodies]
+    if any(body.rank < 3 for body in near):
+        return 0.0
+    V = [body.volume / size.torques for body in near]
+    A = [body.shadow_area for body in near]
+    return _volume(contacts, near, size) / volume_linf(V[0], A[0], V[1], A[1], size.distance / size.arms)
+
+
 def _soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact]:
     return [SoftContact(c.origin, c.axes, body) for c, body in zip(contacts, bodies, strict=True)]
 
@@ -98,8 +109,7 @@ def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], size: Lengths) -
     """Volume of the grasp wrench space in any pose; 0 for a contact that carries no load in some direction."""
     if any(body.rank < 3 for body in bodies):
         return 0.0
-    error = ROUGH if any(body.degree == 4 for body in bodies) else 1e-5
-    return pose_volume(*_soft(contacts, bodies), size.arms, size.torques, relative_error=error).linf
+    return pose_volume(*_soft(contacts, bodies), size.arms, size.torques, with_l1=False).linf
 
 
 def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], size: Lengths) -> float:

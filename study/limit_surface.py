@@ -6,7 +6,8 @@ for mu = 1: a contact without friction has a limit surface too, of size 0.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,13 +25,15 @@ from lsfit.six import six_samples, span_ellipsoid
 from lsfit.span import CollapsedFitError, sphere_motions
 from lsfit.surface import LimitSurface
 from lsfit.tilted import TiltedEllipsoid
-from lsfit.zhou import zhou_ellipsoid, zhou_quartic
+from lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
 from study.scene import Scene
 from study.scene.score_sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
+ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
+NO_FIT = 65536  # flag of a case, as study.quantities says
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.finger_quantities says
 
 
@@ -69,7 +72,7 @@ def bound(patch: ContactPatch, rho: float, limits: FrictionLimits, model: str, c
         Section ``[limit_surface]`` of the scene.
     """
     k = choice.samples
-    twist = np.vstack([fibonacci_twists(k, rho), judging_twists(k, rho)])
+    twist = _motions(k) / [1.0, 1.0, rho]
     wrench = friction_wrench(patch, twist, 1.0, model)
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
@@ -85,6 +88,12 @@ def judging_twists(fitted_to: int, rho: float) -> FloatArray:
     return fibonacci_twists(INDEPENDENT + (fitted_to == INDEPENDENT), rho)
 
 
+@lru_cache(maxsize=8)
+def _motions(fitted_to: int) -> FloatArray:
+    """Motions of the fit and those that it is judged by, for a contact of length 1."""
+    return np.vstack([fibonacci_twists(fitted_to, 1.0), judging_twists(fitted_to, 1.0)])
+
+
 def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objective: str) -> tuple[LimitSurface, int]:
     """Surface of a model fitted to normalised samples ``W, T (m, 3)``, and how it is known to be convex."""
     try:
@@ -96,13 +105,18 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
             case "full", "least_squares":
                 return full_ellipsoid(W), ELLIPSOID
             case "full", _:
-                return zhou_ellipsoid(W, T).surface, ELLIPSOID
+                return zhou_ellipsoid(W, T, ZHOU).surface, ELLIPSOID
             case _, "least_squares":
                 fit = convex_quartic(W, T)
                 return fit.surface, AS_FITTED if fit.certificate.by == "least squares" else PROGRAMME
-        return zhou_quartic(W, T).surface, PROGRAMME
+        return zhou_quartic(W, T, ZHOU).surface, PROGRAMME
     except (FitError, CollapsedFitError):
         return ellipsoid, STANDS_IN
+
+
+def fit_flag(bounds: Sequence[Mapping[str, Bound]]) -> int:
+    """`NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
+    return NO_FIT * any(b.certificate == STANDS_IN for own in bounds for b in own.values())
 
 
 def matrix(surface: LimitSurface) -> FloatArray:

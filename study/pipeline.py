@@ -21,7 +21,7 @@ from study.build import build_object
 from study.contact import Contact, angles, flags, remark
 from study.effects import effects_of
 from study.grasp import grasp_values
-from study.limit_surface import Bound, bound, surface_values
+from study.limit_surface import Bound, bound, fit_flag, surface_values
 from study.quantity import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
@@ -115,7 +115,7 @@ def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, B
         "maps/contact_distance": distance,
         "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
         "maps/misalignment": max(angles(*contacts)),
-        "maps/flags": flags(contacts, scene.friction.mu, score_flag),
+        "maps/flags": flags(contacts, scene.friction.mu, score_flag) | fit_flag(bounds),
         "fingers/tau_pure": [c.tau_pure for c in contacts],
         "fingers/S": S,
         "fingers/F_N": F_N,

@@ -31,6 +31,7 @@ FLAGS = (  # as study.quantities defines them
     (8192, "snapped", "the wall has snapped in on the way to this force"),
     (16384, "slides out", "the pads push the object along its axis with more than friction can hold"),
     (32768, "yields", "the wall's stress is above its yield strength: the dent stays"),
+    (65536, "no fit", "a limit surface could not be fitted: the ellipsoid from three motions stands in"),
     (TOO_WEAK, "too weak", "this force does not hold the object's weight"),
     (TOO_STRONG, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"),
 )

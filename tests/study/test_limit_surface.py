@@ -8,10 +8,13 @@ import pytest
 from friction.motion import fibonacci_twists
 from friction.patch import ContactPatch
 from friction.wrench import friction_wrench
+from lsfit.flag import FitError
 from lsfit.form import exponents, monomials
+from lsfit.quartic import Quartic
 from scoring.contact import EllipsoidBody, SoftContact
 from scoring.pose import pose_volume
-from study.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME
+from study import limit_surface
+from study.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, NO_FIT, PROGRAMME, STANDS_IN
 from study.quantity import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
@@ -76,6 +79,22 @@ def test_every_model_and_objective_gives_a_surface_near_the_wrenches(model, obje
         assert values["maps/quality_fitted"] == pytest.approx(values["maps/quality"], rel=1e-9)
 
 
+def test_a_fit_that_fails_leaves_the_ellipsoid_and_a_flag(monkeypatch):
+    def fail(*samples):
+        raise FitError("stopped")
+
+    monkeypatch.setattr(limit_surface, "convex_quartic", fail)
+    solved.cache_clear()
+    [(_, [result])] = solved(OVAL, "limit_surface.samples=60", forces="[5]")
+    solved.cache_clear()
+    assert (np.array(result.values["limit_surface/certificate"]) == STANDS_IN).all()
+    assert result.values["maps/flags"] & NO_FIT
+    assert "could not be fitted" in result.message
+    assert result.values["maps/misfit"] == result.values["maps/misfit_ellipsoid"]
+    monkeypatch.undo()
+    assert not cases(OVAL, "limit_surface.samples=60", forces="[5]")[0]["maps/flags"] & NO_FIT
+
+
 def test_sampled_wrenches_are_those_of_the_patch_times_mu():
     [(_, [result])] = solved(OVAL, "limit_surface.wrench_samples=all", "limit_surface.samples=60", forces="[5]")
     values = result.values
@@ -111,6 +130,18 @@ def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand():
         / (np.array(near["maps/quality_fitted"]) / near["maps/quality"])
     )
     assert gain == pytest.approx(1.0, abs=0.05)
+
+
+def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
+    """The pose enters by ellipsoids near the quartics; the division of the quartics' own surfaces is exact to 1e-4."""
+    [values] = cases(OVAL, angles="[30]", forces="[5]")
+    contacts = list(soft_contacts(values, CURVED))
+    for f, contact in enumerate(contacts):
+        quartic = Quartic(values["limit_surface/coefficients"][f][CURVED], exponents(3, 4))
+        body = quartic.scaled(MU * np.array([1.0, 1.0, values["limit_surface/rho"][f]]))
+        contacts[f] = SoftContact(contact.position, contact.axes, body)
+    expected = pose_volume(*contacts, 0.12, 0.05, relative_error=1e-4, with_l1=False).linf
+    assert values["maps/quality_fitted"][CURVED] == pytest.approx(expected, rel=2e-3)
 
 
 def test_epsilon_in_any_pose_is_computed_on_demand():
