@@ -5,6 +5,8 @@ box where a pad works it is therefore sampled on a grid and interpolated by a tr
 differentiable and costs the same for every mesh. The spline passes through the samples; it rounds edges over about one
 grid step and keeps everything larger, facets included. A quarter of the pad's element size is a good step; one far
 below the triangles' size only renders the facets more sharply.
+
+VTK is imported where it is used: loading it took a quarter of every start, and most objects need none of it.
 """
 
 from __future__ import annotations
@@ -12,21 +14,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkDoubleArray
-from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
-from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
-from vtkmodules.vtkIOPLY import vtkPLYReader
 
 from fem.mesh_check import MeshError, sound_mesh
 from fem.mesh_file import binary_stl, check_ply, checked_bytes
 from fem.pose import FloatArray, Pose
 from fem.shape import Gap, IntArray, Surface
 from fem.tricubic import coefficients, evaluate
+
+if TYPE_CHECKING:
+    import pyvista as pv
+    from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm
+    from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 
@@ -35,7 +36,6 @@ MARGIN = 3  # cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
 MOST_CENTRES = 4_000  # cells at whose centres the interpolation is compared with the distance itself
 TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
-READERS = {".stl": vtkSTLReader, ".obj": vtkOBJReader, ".ply": vtkPLYReader}
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +98,9 @@ class MeshObject:
 
     def distance(self, x: FloatArray) -> FloatArray:
         """Signed distance ``(n,)`` [m] to the triangles; the sign comes from normals weighted by angle."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkDoubleArray
+
         out = vtkDoubleArray()
         self._implicit.FunctionValue(numpy_to_vtk(np.ascontiguousarray(x, dtype=float)), out)
         return vtk_to_numpy(out).copy()
@@ -141,11 +144,15 @@ class MeshObject:
     @cached_property
     def _polydata(self) -> pv.PolyData:
         """Mesh as VTK knows it."""
+        import pyvista as pv
+
         return pv.PolyData.from_regular_faces(self.points, self.triangles)
 
     @cached_property
     def _implicit(self) -> vtkImplicitPolyDataDistance:
         """VTK's signed distance."""
+        from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
+
         implicit = vtkImplicitPolyDataDistance()
         implicit.SetInput(self._polydata)
         return implicit
@@ -219,15 +226,25 @@ class MeshRegion:
         return g, gradient @ R.T, R @ hessian @ R.T
 
 
+def _reader(ending: str) -> vtkAlgorithm:
+    """VTK's reader of files with this ending."""
+    from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+
+    return {".stl": vtkSTLReader, ".obj": vtkOBJReader, ".ply": vtkPLYReader}[ending]()
+
+
 def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
     """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of an STL, OBJ or PLY file, unchecked."""
+    import pyvista as pv
+
     data = checked_bytes(path)
     ending = path.suffix.lower()
     if ending == ".stl" and (corners := binary_stl(path, data)) is not None:
         return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     if ending == ".ply":
         check_ply(path, data)
-    reader, problems = READERS[ending](), []
+    reader, problems = _reader(ending), []
     reader.AddObserver("ErrorEvent", lambda *_: problems.append(None))
     reader.SetFileName(str(path))
     reader.Update()
@@ -245,5 +262,7 @@ def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
 
 def _corners(mesh: pv.PolyData) -> IntArray:
     """Corners of all faces, one behind the other."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
     faces = mesh.GetPolys()
     return vtk_to_numpy(faces.GetConnectivityArray()) if faces.GetNumberOfCells() else np.empty(0, dtype=np.int64)
