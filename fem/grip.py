@@ -103,7 +103,7 @@ class Grip:
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
-            ROUNDING * self.problem.model.shell.young_modulus, lambda x, force: self._watch,
+            ROUNDING * self.problem.model.shell.young_modulus, self._watch,
         )  # fmt: skip
 
     def _guess(self, travel: float) -> FloatArray:
