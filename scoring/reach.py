@@ -18,6 +18,7 @@ from scoring.contact import Body
 from scoring.gauge import gauge
 from scoring.inscribed import ellipsoid_inside, is_ellipsoid
 from scoring.polytope import fibonacci_vertices
+from scoring.simplex import best_columns
 
 FloatArray = NDArray[np.float64]
 
@@ -56,6 +57,7 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
     programme = _CuttingPlanes(C, bodies, w, kind)
     best = Reach(-np.inf if kind == "fixed" else 0.0, np.inf, w / (w @ w))
     programme.cut(best.u)
+    programme.cut_vertices()
     for _ in range(_CUTS):
         lower, u = programme.solve()
         upper = programme.support(u)
@@ -101,6 +103,19 @@ class _CuttingPlanes:
         """Add the point of each body that matters for the direction."""
         for i, (C, body) in enumerate(zip(self.C, self.bodies, strict=True)):
             self._add(i, body_point(body, C[:, 1:].T @ u))
+
+    def cut_vertices(self) -> None:
+        """Add the vertices that matter in the end, if all bodies are polytopes whose normal forces can be zero."""
+        points = [getattr(body, "vertices", None) for body in self.bodies]
+        if self.kind == "fixed" or any(p is None for p in points):
+            return
+        G = np.vstack([C[:, 0] + p @ C[:, 1:].T for C, p in zip(self.C, points, strict=True)])
+        body = np.repeat(np.arange(len(points)), [len(p) for p in points])
+        first = np.searchsorted(body, np.arange(len(points)))
+        for j in best_columns(G, body % self.k, self.k, self.w):
+            if j >= 0:
+                i = body[j]
+                self._add(i, points[i][j - first[i]])
 
     def solve(self) -> tuple[float, FloatArray]:
         """Reach of the polytopes and its direction."""

@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
 from scoring.polytope import fibonacci_vertices
 from scoring.reach import body_point
+from scoring.simplex import best_columns
 from scoring.task import GRAVITY, hold_task, least_grip_force, weight_wrench
 
 A, B = (0.8, 0.6, 0.010), (0.5, 0.9, 0.008)
@@ -225,3 +226,23 @@ def test_least_grip_force_is_the_one_at_which_the_factor_is_reached():
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
         call()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_simplex_method_finds_the_vertices_that_matter(seed):
+    """The programme on its few vertices reaches as far as the one on all, up to what its tiny right sides change."""
+    random = np.random.default_rng(seed)
+    parts, r, k = 2, 6, 300
+    G, w = random.normal(size=(k, r)) + 0.5, random.normal(size=r)
+    owner = np.arange(k) % parts
+
+    def farthest(rows):
+        A = np.vstack([np.hstack([w[:, None], -G[rows].T]), np.zeros((parts, 1 + len(rows)))])
+        A[r + owner[rows], 1 + np.arange(len(rows))] = 1.0
+        cost = -np.eye(1 + len(rows))[0]
+        found = linprog(cost, A_eq=A[:r], b_eq=np.zeros(r), A_ub=A[r:], b_ub=np.ones(parts))
+        return -found.fun
+
+    basis = best_columns(G, owner, parts, w)
+    assert farthest(basis[basis >= 0]) == pytest.approx(farthest(np.arange(k)), rel=1e-6)
+    assert farthest(np.arange(k)) > 0.1
