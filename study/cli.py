@@ -90,9 +90,22 @@ def _parser() -> argparse.ArgumentParser:
         made.add_argument("file", metavar="FILE", help="result file (.hdf)")
     show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N [N] (default: the highest)")
     show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10)")
-    form = show.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
-    form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
+    compare = add("compare", commands.compare, "two maps side by side, with the settings and cases that differ",
+                  "softjaw compare a.hdf b.hdf --quantity e_n")  # fmt: skip
+    compare.add_argument("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b")
+    compare.add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)")
+    compare.add_argument("--top", type=_count, default=10, metavar="K", help="largest differences, 0: all (default 10)")
+    export = add("export", commands.export, "every case for planners: maps, frames, poses, limit surfaces",
+                 "softjaw export out.hdf --csv -o out.csv")  # fmt: skip
+    export.add_argument("file", metavar="FILE", help="result file (.hdf)")
+    export.add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    for made in (compare, export):
+        made.add_argument("--model", choices=("curved", "flat", "projected"), default="curved",
+                          help="friction model (default curved)")  # fmt: skip
+    for made in (show, compare, export):
+        form = made.add_mutually_exclusive_group(required=made is export)
+        form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
+        form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
     report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
     add_patch_options(add("patch", commands.patch, "friction, limit surface and score of a pressure field from "
                           "elsewhere", "softjaw patch jobs/cylinder-pressure.csv --distance 60"))  # fmt: skip

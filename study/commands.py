@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study.exits import BUG, DONE, USAGE, StudyError
+from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
 
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 
@@ -111,6 +111,36 @@ def show(options: Namespace) -> int:
     form = {"json": as_json, "csv": as_csv, None: as_text}[options.form]
     with open_result(options.file) as result:
         print(form(best(result, options.force, options.top, whole_lines=form is as_text)))
+    return DONE
+
+
+def compare(options: Namespace) -> int:
+    """Print two maps side by side."""
+    from study.compare import compare
+    from study.compare_text import comparison_csv, comparison_json, comparison_text
+    from study.store import open_result
+
+    form = {"json": comparison_json, "csv": comparison_csv, None: comparison_text}[options.form]
+    with open_result(options.files[0]) as one, open_result(options.files[1]) as other:
+        print(form(compare(one, other, options.quantity, options.model), options.top))
+    return DONE
+
+
+def export(options: Namespace) -> int:
+    """Write every case for planners."""
+    from study.export import as_csv, as_json
+    from study.store import open_result
+
+    with open_result(options.file) as result:
+        text = {"json": as_json, "csv": as_csv}[options.form](result, options.model)
+    if options.output is None:
+        print(text)
+        return DONE
+    try:
+        Path(options.output).write_text(f"{text}\n", encoding="utf-8")
+    except OSError as error:
+        raise StudyError(CANNOT_WRITE, f"{options.output}: cannot be written: {error.strerror}") from error
+    print(f"written: {options.output}")
     return DONE
 
 

@@ -18,15 +18,27 @@ def differences(theirs: str, ours: str) -> str:
     'friction.mu is 0.8 there and 0.5 here'
     """
     try:
-        one, other = (_values(text) for text in (theirs, ours))
+        changed = changes(theirs, ours)
     except ValueError:
         return "its scene cannot be read"
-    keys = [key for key in dict.fromkeys([*other, *one]) if one.get(key) != other.get(key)]
-    if not keys:
+    if not changed:
         return "the same keys, but another mesh file or another version"
-    named = [f"{key} is {_text(one.get(key))} there and {_text(other.get(key))} here" for key in keys[:MOST_NAMED]]
-    more = [f"and {len(keys) - MOST_NAMED} more keys"] if len(keys) > MOST_NAMED else []
-    return "; ".join([*named, *more])
+    named = [f"{key} is {value_text(one)} there and {value_text(other)} here" for key, one, other in changed]
+    more = [f"and {len(named) - MOST_NAMED} more keys"] if len(named) > MOST_NAMED else []
+    return "; ".join([*named[:MOST_NAMED], *more])
+
+
+def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
+    """Keys that change results and differ between two effective scenes, with both values; None is a key not set.
+
+    Raises
+    ------
+    ValueError
+        One of them is not TOML.
+    """
+    one, other = (_values(text) for text in (theirs, ours))
+    keys = [key for key in dict.fromkeys([*other, *one]) if one.get(key) != other.get(key)]
+    return [(key, one.get(key), other.get(key)) for key in keys]
 
 
 def _values(text: str) -> dict[str, Any]:
@@ -37,5 +49,6 @@ def _values(text: str) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key != "object.name"}
 
 
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """A value of a scene in a few words."""
     return "not set" if value is None else shown(value, WIDTH)

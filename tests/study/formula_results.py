@@ -1,0 +1,101 @@
+"""Result files whose maps are formulas of station, angle and force; nothing is solved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from study.layout import Derived, Header, Layout
+from study.reading import StoredAxis
+from study.store import create
+
+SCENE = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[candidates]
+stations_mm = [0, 10]
+[load]
+normal_force_n = [1, 5]
+"""
+SKELETONS: dict[str, bytes] = {}  # files without values: to copy one is ten times faster than to make it
+STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(6) * np.pi / 6, np.array([1.0, 2.0, 4.0, 8.0])
+
+
+def linear(station, angle, force):
+    """A map that straight lines hit: it does not depend on the angle."""
+    return 0.01 + 0.1 * station + 1e-3 * force + 0.05 * station * force
+
+
+def grid_axes(stations=STATIONS, angles=ANGLES, forces=FORCES, sweep=(), poses=False):
+    place = StoredAxis("station", np.asarray(stations, float), "" if poses else "m", "station")
+    turn = StoredAxis("angle", np.asarray(angles, float), "rad", "angle")
+    return (*sweep, place, turn, StoredAxis("normal_force", np.asarray(forces, float), "N", "force"))
+
+
+def quartic(x, y, t):
+    """Coefficients ``(15,)`` of ``x^4 + y^4 + t^4`` with these factors."""
+    found = np.zeros(15)
+    found[[0, 10, 14]] = x, y, t
+    return found
+
+
+def make(path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(), labels=(), **datasets) -> Path:
+    """A file with ``e_n`` of all models and friction limits by ``formula(*coordinates)``, everything done.
+
+    ``datasets`` are put in last, by their path below ``/study`` with ``__`` for ``/``: arrays, or functions that change
+    what is there.
+    """
+    axes = axes or grid_axes()
+    layout = Layout(axes, 0, meshes, patches=False, derived=derived)
+    kind = f"{[(axis.long_name, axis.values.tolist()) for axis in axes]}{layout.options()}{scene}{labels}"
+    if kind not in SKELETONS:
+        create(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
+        SKELETONS[kind] = path.read_bytes()
+    path.write_bytes(SKELETONS[kind])
+    grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
+    e_n = np.broadcast_to(formula(*grid), layout.shape)
+    force = np.broadcast_to(grid[-1], layout.shape)
+    two = np.stack([force, force], axis=-1)
+    with h5py.File(path, "r+") as file:
+        study = file["study"]
+        for k, model in enumerate(("curved", "flat", "projected")):
+            study[f"e_n/{model}"][...] = e_n * (1 + 0.1 * k)
+            study[f"quality/{model}"][...] = 10 * e_n
+            study[f"tau_z_max/{model}"][...] = e_n * force
+        study["flags/flags"][...] = 0.0
+        study["fingers/S"][...], study["fingers/F_N"][...] = two, two
+        study["fingers/f_x_max"][...] = 0.8 * two[..., None]
+        study["fingers/pose_rotation"][...] = np.eye(3)
+        study["fingers/pose_origin"][...] = [[0.0, 0.0, -0.02], [0.0, 0.0, 0.02]]
+        study["fingers/frame_axes"][...], study["fingers/frame_origin"][...] = np.eye(3), [0.0, 0.0, 0.001]
+        study["limit_surface/rho"][...] = 0.02
+        study["limit_surface/semi_axes"][...] = [0.8, 0.8, 0.008]
+        study["limit_surface/coefficients"][...] = quartic(1.0, 1.0, 4.0)
+        study["status/code"][...] = 1
+        for name, values in datasets.items():
+            target = study[name.replace("__", "/")]
+            target[...] = values(target[()]) if callable(values) else values
+    return path
+
+
+def without_result(code, message=""):
+    """Changes that make case ``(2, 1, 1)`` one without a result."""
+
+    def state(codes):
+        codes[2, 1, 1] = code
+        return codes
+
+    def text(messages):
+        messages[2, 1, 1] = message.encode()
+        return messages
+
+    return {"status__code": state, "status__message": text}
+
+
+def window(axes):
+    return (Derived("force_high", "N", "largest force", "as the test says", tuple(a.name for a in axes[:-1])),)

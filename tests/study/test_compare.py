@@ -1,0 +1,224 @@
+"""Two maps side by side, and cases for planners: what is told of files whose differences are known."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from friction.motion import fibonacci_twists
+from study.cli import main
+from study.commands import RANK
+from study.compare import compare
+from study.compare_text import comparison_csv, comparison_json, comparison_text
+from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
+from study.export import FINGER, MEANING, as_csv, as_json, cases
+from study.lookup import GraspMap
+from study.reading import StoredAxis
+from study.store import open_result
+from tests.study.formula_results import (
+    FORCES,
+    SCENE,
+    STATIONS,
+    grid_axes,
+    linear,
+    make,
+    window,
+    without_result,
+)
+
+SOFTER = SCENE + "[friction]\nmu = 0.5\n"
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """Maps that share three stations and two forces; the second has a larger e_n, a failed case and another mu."""
+    folder = tmp_path_factory.mktemp("compare")
+    a = make(folder / "a.hdf", axes=grid_axes(STATIONS[:4]), meshes=2, e_n_error__e_n_error=0.01)
+
+    def larger(station, angle, force):
+        return linear(station, angle, force) * np.where(angle < 0.1, 1.005, 1.1)
+
+    shared = grid_axes([*STATIONS[1:4], 0.1], forces=[2.0, 4.0, 5.0])
+    b = make(folder / "b.hdf", larger, shared, SOFTER, meshes=2, e_n_error__e_n_error=0.01, **without_result(2, "slid"))
+    return a, b
+
+
+def compared(one, other, **options):
+    with open_result(one) as a, open_result(other) as b:
+        return compare(a, b, **options)
+
+
+def told(words, monkeypatch):
+    for name in RANK:  # only the first rank of an mpirun speaks
+        monkeypatch.delenv(name, raising=False)
+    return main([str(word) for word in words])
+
+
+def test_common_places_are_found_by_value_and_the_others_named(pair):
+    found = compared(*pair)
+    assert found.asked.change.shape == (3, 6, 2)
+    assert found.axes[0].common == pytest.approx(STATIONS[1:4])
+    assert [only.tolist() for only in found.axes[0].only] == [[0.0], [0.1]]
+    text = comparison_text(found)
+    assert "common cases: 35 solved in both, 1 only in a" in text
+    assert "station only in a, left out: 0 mm" in text
+    assert "station only in b, left out: 100 mm" in text
+    assert "normal_force only in a, left out: 1 8 N" in text
+
+
+def test_differences_are_judged_by_the_errors_of_both_files(pair):
+    """0.5 % stays within 1 % + 1 %, 10 % does not; a failed case has no difference."""
+    d = compared(*pair).asked
+    failed = np.isnan(d.change)
+    assert np.argwhere(failed).tolist() == [[2, 1, 1]]
+    assert d.relative[:, 0] == pytest.approx(np.full((3, 2), 0.005))
+    assert d.relative[:, 1:][~failed[:, 1:]] == pytest.approx(np.full(29, 0.1))
+    assert d.beyond[:, 0].ravel().tolist() == [False] * 6
+    assert [v for v in d.beyond[:, 1:].ravel() if v is not None] == [True] * 29
+    summary = comparison_text(compared(*pair))
+    assert "29 of 35" in summary
+    assert [line.split()[-1] for line in summary.splitlines() if line.startswith("quality ")] == ["unknown"]
+
+
+def test_errors_of_one_file_alone_are_unknown(pair, tmp_path):
+    d = compared(pair[0], make(tmp_path / "c.hdf"))
+    assert set(d.asked.beyond.ravel()) == {None}
+    assert "unknown: no error map" in comparison_text(d)
+    assert not d.settings
+    assert "settings: no difference" in comparison_text(d)
+
+
+def test_settings_that_differ_are_listed(pair):
+    assert compared(*pair).settings == (("friction.mu", None, 0.5),)
+    assert any(
+        line.split() == ["friction.mu", "not", "set", "0.5"] for line in comparison_text(compared(*pair)).splitlines()
+    )
+
+
+def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
+    lines = comparison_text(compared(*pair), top=3).splitlines()
+    assert max(map(len, lines[2:])) <= 110
+    assert "largest 3 of 35 differences" in lines[-5]
+    changes = [float(line.split()[5]) for line in lines[-3:]]
+    assert changes == sorted(changes, reverse=True)
+    assert all(line.split()[-1] == "yes" for line in lines[-3:])
+    assert len(comparison_text(compared(*pair), top=0).splitlines()) == len(lines) + 32
+
+
+def test_programs_get_every_common_case_in_si(pair):
+    found = compared(*pair, quantity="quality", model="flat")
+    data = json.loads(comparison_json(found))
+    assert data["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
+    assert data["axes"]["station"]["only_b"] == [0.1]
+    rows = list(csv.reader(io.StringIO(comparison_csv(found))))
+    assert rows[0][:5] == ["station [m]", "angle [rad]", "normal_force [N]", "quality a", "quality b"]
+    assert len(rows) - 1 == len(data["cases"]) == 36
+    empty = [row for row in data["cases"] if row["b"] is None]
+    assert len(empty) == 1
+    assert empty[0]["difference"] is None
+    with open_result(pair[0]) as result:
+        assert data["cases"][0]["a"] == result.map("quality", "flat")[1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("axes", "word"),
+    [
+        (grid_axes([1.0]), "no common station [m]"),
+        (grid_axes(forces=[3.0]), "no common normal_force [N]"),
+        (grid_axes([0, 1], [0], poses=True), "different axes: station [m], angle [rad], normal_force [N] in"),
+        (grid_axes(sweep=(StoredAxis("mu", np.array([0.5]), "", "friction.mu"),)), "different axes"),
+    ],
+)
+def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, word):
+    other = make(tmp_path / "other.hdf", lambda *x: 0.01 + 0 * sum(x), axes)
+    with pytest.raises(StudyError, match=word.replace("[", r"\[").replace("]", r"\]")) as error:
+        compared(pair[0], other)
+    assert error.value.code == USAGE
+
+
+def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
+    poses = make(tmp_path / "a.hdf", axes=grid_axes([0, 1], [0], poses=True), labels=("lid", "neck"))
+    assert [row["label"] for row in json.loads(comparison_json(compared(poses, poses)))["cases"][::4]] == [
+        "lid",
+        "neck",
+    ]
+    assert " neck " in comparison_text(compared(poses, poses))
+
+    def swept(words):
+        legend = ", ".join(f"{i} = {w}" for i, w in enumerate(words))
+        axis = StoredAxis("material", np.arange(len(words), dtype=float), "", f"gripper.material ({legend})")
+        name = "-".join(words)
+        return make(tmp_path / f"{name}.hdf", lambda *x: 0.01 + x[0] + 0 * sum(x), grid_axes(sweep=(axis,)))
+
+    found = compared(swept(["blatz_ko", "linear"]), swept(["blatz_ko", "hyperfoam"]))
+    assert found.axes[0].common.tolist() == [0.0]
+
+
+def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch):
+    a, b = pair
+    assert told(["compare", a, b, "--top", 2], monkeypatch) == 0
+    assert "largest 2 of 35" in capsys.readouterr().out
+    assert told(["compare", a, b, "--json", "--model", "flat"], monkeypatch) == 0
+    assert json.loads(capsys.readouterr().out)["quantity"] == "e_n"
+    assert told(["compare", a, b, "--quantity", "beauty"], monkeypatch) == USAGE
+    assert "expected one that both files have: quality, " in capsys.readouterr().err
+    assert told(["compare", a, tmp_path / "none.hdf"], monkeypatch) == OTHER_FILE
+    assert told(["compare", a], monkeypatch) == USAGE
+    assert told(["export", a], monkeypatch) == USAGE
+    assert told(["export", a, "--csv", "-o", tmp_path / "out.csv"], monkeypatch) == 0
+    assert (tmp_path / "out.csv").read_text().count("\n") == 1 + 4 * 6 * 4
+    assert told(["export", a, "--csv", "-o", tmp_path / "no" / "out.csv"], monkeypatch) == CANNOT_WRITE
+    assert told(["export", tmp_path / "none.hdf", "--json"], monkeypatch) == OTHER_FILE
+
+
+def test_every_case_is_exported_with_its_state(pair):
+    with open_result(pair[1]) as result:
+        data, rows = json.loads(as_json(result, "flat")), list(csv.DictReader(io.StringIO(as_csv(result, "flat"))))
+        e_n = result.map("e_n", "flat").ravel()
+    assert len(data["cases"]) == len(rows) == 4 * 6 * 3
+    assert data["meaning"] == MEANING
+    row = int(np.ravel_multi_index((2, 1, 1), (4, 6, 3)))
+    assert (data["cases"][row]["state"], data["cases"][row]["message"]) == ("failed", "slid")
+    assert data["cases"][row]["maps"]["e_n"] is None
+    assert data["cases"][row]["fingers"][0]["pose_origin"] is None
+    assert rows[row]["e_n [m]"] == ""
+    done = [i for i in range(len(rows)) if i != row]
+    assert (
+        [float(rows[i]["e_n [m]"]) for i in done]
+        == [data["cases"][i]["maps"]["e_n"] for i in done]
+        == e_n[done].tolist()
+    )
+
+
+def test_frames_are_those_of_the_object(tmp_path):
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    path = make(tmp_path / "a.hdf", fingers__pose_rotation=turn, flags__flags=4096.0 + 256)
+    with open_result(path) as result:
+        case = next(cases(result))
+        data = json.loads(as_json(result))["cases"][0]
+    one = case["fingers"][0]
+    assert one["frame_origin"] == pytest.approx(turn @ [0, 0, 0.001] + [0, 0, -0.02])
+    assert one["frame_axes"] == pytest.approx(turn.T)  # rows x, y, N of a frame that is the pad's
+    assert data["flag_words"] == ["askew", "coarse"]
+
+
+def test_an_exported_surface_is_the_one_that_is_looked_up(tmp_path):
+    """``unit`` and ``coefficients`` as the export explains them, against ``GraspPoint.limit_surface``."""
+    axes = grid_axes()
+    bound = np.full((5, 6), 4.0)
+    path = make(tmp_path / "a.hdf", axes=axes, derived=window(axes), derived__force_high=bound)
+    with open_result(path) as result:
+        case = next(c for c in cases(result) if c["place"]["normal_force"] == FORCES[2])
+    one = case["fingers"][0]
+    surface = GraspMap(path).at(0, 0, FORCES[2]).limit_surface(1)
+    w = fibonacci_twists(20, 1.0) * one["unit"]
+    x, y, t = (w / one["unit"]).T
+    powers = [x**i * y**j * t ** (4 - i - j) for i in range(4, -1, -1) for j in range(4 - i, -1, -1)]
+    assert one["coefficients"] @ powers == pytest.approx(surface.value(w), rel=1e-12)
+    assert one["semi_axes"] == pytest.approx(GraspMap(path).at(0, 0, FORCES[2]).semi_axes()[0])
+    assert case["maps"]["force_high"] == 4.0
+    assert list(one) == [name for name, _, _ in FINGER]

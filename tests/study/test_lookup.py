@@ -1,0 +1,313 @@
+"""Lookup between candidates and forces: values, honest errors, symmetry, and points that have no value."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import timeit
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.lookup import GraspMap
+from study.lookup_point import INSIDE, NO_RESULT, OUTSIDE, SNAP
+from study.reading import StoredAxis
+from tests.study.formula_results import (
+    ANGLES,
+    FORCES,
+    SCENE,
+    STATIONS,
+    grid_axes,
+    linear,
+    make,
+    quartic,
+    window,
+    without_result,
+)
+
+ROOT = Path(__file__).parents[2]
+MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
+ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
+
+
+def smooth(station, angle, force):
+    return 0.01 * (1 + 0.3 * np.sin(60 * station + 1)) * (1 + 0.2 * np.cos(2 * angle)) * force**0.3
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory):
+    return GraspMap(make(tmp_path_factory.mktemp("lookup") / "straight.hdf"))
+
+
+def points(count, seed=1):
+    random = np.random.default_rng(seed)
+    return random.uniform(0, 0.04, count), random.uniform(-7, 7, count), random.uniform(1, 8, count)
+
+
+def test_what_is_linear_between_the_cases_is_met_and_says_so(straight):
+    found = straight.at(*points(300))
+    assert found.ok.all()
+    assert found.e_n == pytest.approx(linear(*points(300)), rel=1e-12)
+    assert found.error("e_n") == pytest.approx(np.zeros(300), abs=1e-15)
+    assert found.value("e_n", "flat") == pytest.approx(1.1 * found.e_n, rel=1e-12)
+
+
+def test_solved_cases_come_back_as_they_were_stored(tmp_path):
+    smoothed = GraspMap(make(tmp_path / "a.hdf", smooth))
+    grid = np.meshgrid(STATIONS, ANGLES, FORCES, indexing="ij")
+    assert smoothed.value("e_n", *grid) == pytest.approx(smooth(*grid), rel=1e-15)
+    assert not smoothed.error("e_n", *grid).any()
+
+
+@pytest.mark.parametrize("along", [0, 1, 2, None])
+def test_the_estimate_covers_the_true_error_of_cases_left_out(tmp_path, along):
+    """Every second node is left out of the file, along one axis or along all."""
+    fine = [np.linspace(0, 0.06, 13), np.arange(16) * np.pi / 16, np.linspace(1, 9, 13)]
+    kept = [x[::2] if along in (a, None) else x for a, x in enumerate(fine)]
+    coarse = GraspMap(make(tmp_path / "a.hdf", smooth, grid_axes(*kept)))
+    grid = np.meshgrid(*fine, indexing="ij")
+    true, estimate = np.abs(coarse.value("e_n", *grid) - smooth(*grid)), coarse.error("e_n", *grid)
+    left_out = estimate > 0
+    assert left_out.mean() > 0.4
+    assert (true <= 2 * estimate)[left_out].mean() >= 0.9
+    assert true[~left_out].max() < 1e-15
+    assert np.median(estimate[left_out]) < 3 * np.median(true[left_out])  # covers without crying wolf
+
+
+def test_one_point_is_the_same_as_an_array_of_points(straight):
+    place = points(200)
+    together = straight.value("tau_z_max", *place)
+    assert together.shape == (200,)
+    assert [straight.value("tau_z_max", *map(float, p)) for p in zip(*place, strict=True)] == pytest.approx(
+        together, rel=1e-12
+    )
+    grid = straight.at(STATIONS[:, None], 0.3, FORCES)
+    assert grid.e_n.shape == grid.state.shape == (5, 4)
+    assert grid.semi_axes().shape == (5, 4, 2, 3)
+
+
+def test_a_planner_gets_a_value_in_microseconds(straight):
+    straight.value("e_n", 0.011, 0.3, 2.5)
+    taken = min(timeit.repeat(lambda: straight.value("e_n", 0.011, 0.3, 2.5), number=1000, repeat=20)) / 1000
+    assert taken < 10e-6
+
+
+def test_units_of_people_and_missing_coordinates(straight):
+    assert straight.at(station_mm=15, angle_deg=40, force=3).e_n == straight.at(0.015, np.radians(40), 3).e_n
+    with pytest.raises(ValueError, match="station is given twice"):
+        straight.at(0.01, 0.1, 3, station_mm=10)
+    with pytest.raises(ValueError, match="angle is given nowhere"):
+        straight.at(0.01, force=3)
+    with pytest.raises(ValueError, match="force is missing"):
+        straight.at(0.01, 0.1)
+    with pytest.raises(ValueError, match="stations and angles"):
+        straight.at(candidate=0, force=3)
+    with pytest.raises(ValueError, match="model is 'round'"):
+        straight.value("e_n", 0.01, 0.1, 3.0, "round")
+    with pytest.raises(KeyError, match="safety_factor is not in"):
+        _ = straight.at(0.01, 0.1, 3).safety_factor
+
+
+@pytest.mark.parametrize(
+    ("place", "word"),
+    [
+        ((0.05, 0.0, 2.0), "station 50 mm, solved is 0 mm to 40 mm"),
+        ((0.01, 0.0, 9.0), "force 9 N, solved is 1 N to 8 N"),
+        ((-1e-6, 0.0, 2.0), "station -0.001 mm"),
+        ((np.nan, 0.0, 2.0), "station nan"),
+        ((0.01, 0.0, 0.5), "force 0.5 N"),
+    ],
+)
+def test_nothing_is_extrapolated(straight, place, word):
+    point = straight.at(*place)
+    assert (point.state, point.ok) == (OUTSIDE, False)
+    assert np.isnan([point.e_n, point.error("e_n"), straight.value("e_n", *place)]).all()
+    assert word in point.reason
+    assert point.reason in str(point)
+    assert straight.at(0.04 * (1 + 1e-12), 0, 8).ok  # rounding at the edge
+
+
+@pytest.mark.parametrize(("code", "word"), [(2, "failed: the contact slid off"), (0, "is not solved yet")])
+def test_beside_a_case_without_result_there_is_no_value(tmp_path, code, word):
+    there = GraspMap(make(tmp_path / "a.hdf", **without_result(code, "the contact slid off")))
+    beside = there.at(0.019, 0.5, 1.9)
+    assert beside.state == NO_RESULT
+    assert np.isnan([beside.e_n, there.value("e_n", 0.019, 0.5, 1.9)]).all()
+    assert np.isnan(beside.fingers("f_x_max")).all()
+    assert beside.reason.endswith(word)
+    assert "station 20 mm, angle 30 deg, normal_force 2 N" in beside.reason
+    assert there.at(0.01, ANGLES[1], 2).e_n == pytest.approx(linear(0.01, 0, 2))  # a solved case next to it
+    assert there.value("e_n", 0.02, float(ANGLES[0]), 1.5) == pytest.approx(linear(0.02, 0, 1.5))
+    with pytest.raises(ValueError, match="no value: the case beside it"):
+        beside.limit_surface(1)
+    assert list(there.at([0.019, 0.035], 0.5, 1.9).reason) == [beside.reason, ""]
+
+
+def test_nothing_is_interpolated_across_a_snap_in(tmp_path):
+    """Nor does the jump enter the estimated errors on either side."""
+
+    def flags(values):
+        values[..., 3:] = 8192
+        return values
+
+    def jump(station, angle, force):
+        return linear(station, angle, force) * np.where(force > 3.5, 0.5, 1.0)
+
+    there = GraspMap(make(tmp_path / "a.hdf", jump, grid_axes(forces=[1, 2, 3, 4, 6, 8]), flags__flags=flags))
+    between = there.at(0.011, 0.1, 3.2)
+    assert between.state == SNAP
+    assert np.isnan([between.e_n, there.value("e_n", 0.011, 0.1, 3.2)]).all()
+    assert "the wall snaps in between" in between.reason
+    assert "normal_force 3 N and" in between.reason
+    for force, sign in ((2.5, 0), (3, 0), (4, 8192), (4.5, 8192)):
+        point = there.at(0.011, 0.1, force)
+        assert (point.state, point.flags) == (INSIDE, sign)
+        assert point.e_n == pytest.approx(jump(0.011, 0.1, force))
+        assert point.error("e_n") == pytest.approx(0, abs=1e-15)
+
+
+def test_angles_repeat_with_the_objects_symmetry(tmp_path):
+    around = GraspMap(make(tmp_path / "a.hdf", smooth))  # 0 to 150 deg; an elliptic cylinder repeats after 180
+    last, first = (smooth(0.01, a, 2.0) for a in (ANGLES[5], ANGLES[0]))
+    assert around.at(0.01, np.radians(165), 2).e_n == pytest.approx((last + first) / 2)
+    assert around.at(0.01, np.radians([20, 200, -160, 380]), 2).e_n == pytest.approx(
+        around.at(0.01, np.radians(20), 2).e_n
+    )
+    assert around.at(0.01, np.radians(185), 2).error("e_n") == pytest.approx(
+        around.at(0.01, np.radians(5), 2).error("e_n")
+    )
+
+
+def test_a_gap_that_was_not_solved_is_not_bridged(tmp_path):
+    part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
+    assert part.at(0.01, 0.15, 2).ok
+    assert "angle 90 deg, solved is 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
+    assert part.at(0.01, 0.15 + np.pi, 2).ok
+    one = GraspMap(make(tmp_path / "b.hdf", axes=grid_axes(angles=[0.3])))
+    assert one.at(0.01, force=2).e_n == one.at(0.01, 0.3, 2).e_n
+    assert one.at(0.01, 0.4, 2).reason.endswith("solved is 17.189 deg only")
+
+
+def test_round_objects_may_be_asked_at_any_angle(tmp_path):
+    bottle = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0]), scene=ROUND))
+    assert bottle.value("e_n", 0.01, np.linspace(-9, 9, 50), 2) == pytest.approx(np.full(50, linear(0.01, 0, 2)))
+    assert bottle.at(0.01, force=2).ok
+
+
+def test_half_a_turn_of_the_gripper_exchanges_the_fingers(tmp_path):
+    def second_finger(values):
+        values[..., 1, :] *= 2
+        return values
+
+    there = GraspMap(make(tmp_path / "a.hdf", scene=MESH, fingers__f_x_max=second_finger))
+    one, other = (there.at(0.01, np.radians(a), 2).fingers("f_x_max") for a in (40, 220))
+    assert one == pytest.approx([1.6, 3.2])
+    assert other == pytest.approx([3.2, 1.6])
+    # between 150 deg and 180 deg, where 180 deg is 0 deg with the fingers exchanged
+    assert there.at(0.01, np.radians(165), 2).fingers("f_x_max") == pytest.approx([2.4, 2.4])
+
+
+def test_explicit_poses_go_by_number_and_force(tmp_path):
+    layout = grid_axes([0, 1, 2], [0], FORCES, poses=True)
+    poses = GraspMap(make(tmp_path / "a.hdf", axes=layout, labels=("lid", "neck", "belly")))
+    assert poses.at(candidate=1, force=3).e_n == pytest.approx(linear(1, 0, 3))
+    assert poses.at(candidate=[0, 2], force=3).e_n == pytest.approx([linear(0, 0, 3), linear(2, 0, 3)])
+    for wrong in (1.5, 3, -1):
+        assert "candidates 0 to 2 and nothing between" in poses.at(candidate=wrong, force=3).reason
+        assert np.isnan(poses.value("e_n", float(wrong), 0.0, 3.0))
+    with pytest.raises(ValueError, match="explicit poses"):
+        poses.at(0.01, 0.0, 3)
+
+
+def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
+    materials = "gripper.material (0 = blatz_ko, 1 = neo_hooke)"
+    sweep = (
+        StoredAxis("semi_axis_b", np.array([0.01, 0.025]), "m", "object.semi_axis_b_mm"),
+        StoredAxis("material", np.array([0.0, 1.0]), "", materials),
+    )
+
+    def formula(b, material, station, angle, force):
+        return b + 10 * material + 0 * station * angle * force
+
+    path = make(tmp_path / "a.hdf", formula, grid_axes(sweep=sweep), scene=ROUND)
+    for where, value in (
+        ({"object.semi_axis_b_mm": 10, "gripper.material": "neo_hooke"}, 10.01),
+        ({"semi_axis_b": 0.025, "material": "blatz_ko"}, 0.025),
+    ):
+        assert GraspMap(path, where=where).at(0.01, 0.1, 2).e_n == pytest.approx(value)
+    for where, word in (
+        ({}, r"missing object.semi_axis_b_mm: give one of .* = 10, 25"),
+        ({"semi_axis_b": 0.015, "material": "blatz_ko"}, "= 15: expected one of"),
+        ({"semi_axis_b": 0.025, "material": "steel"}, "expected one of gripper.material = blatz_ko, neo_hooke"),
+        ({"semi_axis_b": 0.025, "material": "blatz_ko", "mu": 1}, "where has mu"),
+    ):
+        with pytest.raises(ValueError, match=word):
+            GraspMap(path, where=where)
+
+
+def test_limit_surfaces_come_between_those_of_the_cases_around(tmp_path):
+    def growing(values):
+        values[..., 3, :, :, :] = quartic(16.0, 16.0, 16.0)  # at 8 N: half as far along every axis, in units of mu S
+        return values
+
+    there = GraspMap(make(tmp_path / "a.hdf", limit_surface__coefficients=growing))
+    exact = there.at(0.01, 0.1, 4).limit_surface(2)
+    assert exact.semi_axes == pytest.approx(np.array([1, 1, 0.02 / 4**0.25]) * 0.8 * 4, rel=1e-9)
+    between = there.at(0.01, 0.1, 6)
+    surface = between.limit_surface(1)
+    assert surface.semi_axes == pytest.approx(np.array([8.5**-0.25, 8.5**-0.25, 0.02 / 10**0.25]) * 0.8 * 6, rel=1e-9)
+    assert surface.holds([[2.8, 0, 0], [2.9, 0, 0]]).tolist() == [True, False]
+    t = np.random.default_rng(2).normal(size=(50, 3))
+    low, high = (there.at(0.01, 0.1, f).limit_surface(1).scaled(np.full(3, 6 / f)).support(t) for f in (8, 4))
+    assert ((low <= surface.support(t)) & (surface.support(t) <= high)).all()
+    assert between.limit_surface(1, fitted=False).semi_axes == pytest.approx([4.8, 4.8, 0.048])
+    assert between.coefficients().shape == (2, 15)
+    with pytest.raises(ValueError, match="expected 1 or 2"):
+        between.limit_surface(0)
+    with pytest.raises(ValueError, match="one point"):
+        there.at(0.01, [0.1, 0.2], 6).limit_surface(1)
+
+
+def test_bounds_of_the_force_are_maps_too(tmp_path):
+    layout = grid_axes()
+    bound = np.broadcast_to(3 + 100 * STATIONS[:, None], (5, 6))
+    there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived=window(layout), derived__force_high=bound))
+    assert there.at(0.015, 0.1, 2).value("force_high") == pytest.approx(4.5)
+    assert "force_high" in str(there.at(0.015, 0.1, 2))
+    assert there.quantities["force_high"][0] == "N"
+
+
+@pytest.mark.launches
+def test_it_needs_neither_mpi_nor_petsc(tmp_path):
+    path = make(tmp_path / "a.hdf")
+    code = (
+        f"import sys; from study.lookup import GraspMap; print(GraspMap({str(path)!r}).at(0.01, 0.1, 2).e_n);"
+        "print(sorted({'mpi4py', 'petsc4py', 'numba', 'skfem', 'scipy', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    value, loaded = done.stdout.splitlines()
+    assert float(value) == pytest.approx(linear(0.01, 0.1, 2))
+    assert loaded == "[]"
+
+
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    """Its cells in order, on a file that stands where the notebook's own run would put it."""
+    pytest.importorskip("matplotlib").use("Agg")
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    (tmp_path / "results").mkdir()
+    make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
+    monkeypatch.chdir(tmp_path)
+    book = json.loads((ROOT / "jobs" / "lookup.ipynb").read_text(encoding="utf-8"))
+    assert (book["nbformat"], book["nbformat_minor"] >= 5) == (4, True)
+    assert all({"id", "cell_type", "metadata", "source"} <= set(cell) for cell in book["cells"])
+    assert len({cell["id"] for cell in book["cells"]}) == len(book["cells"])
+    names: dict = {"__name__": "__main__"}
+    for cell in book["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            assert cell["execution_count"] is None
+            exec(compile("".join(cell["source"]), f"cell {cell['id']}", "exec"), names)
+    assert names["point"].ok
+    assert names["surface"].semi_axes.shape == (3,)
