@@ -55,7 +55,7 @@ def build(result: Any) -> tuple[str, bytes]:
         ("maps", "Maps", _pictures(shapes) + paragraph(words.CAVEAT, "note")),
     ]
     if data.best is not None and data.map("dent") is not None:
-        sections.append(("wall", "What the wall bears", _wall(data, scene, data.best)))
+        sections.append(("wall", "What the wall bears", wall_section(data, scene, data.best)))
     if differences := curvature.difference_pictures(data, scene, best):
         sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in differences)))
         png = differences[0][1]  # what a sweep of the shape was made for
@@ -67,7 +67,7 @@ def build(result: Any) -> tuple[str, bytes]:
             sections.append(("surface", "Limit surface of the best case", _pictures(drawn)))
     sections += [
         ("cases", "Cases and checks", words.cases(data) + words.checks(data)),
-        ("effects", "What was simulated", _effects(data, best)),
+        ("effects", "What was simulated", effects(data, best)),
         ("definitions", "Definitions", background.definitions(data)),
         ("provenance", "Provenance and time", background.provenance(data) + background.time_split(data)),
         ("scene", "Scene in effect", background.scene_text(data)),
@@ -80,7 +80,7 @@ def _pictures(shown: Iterable[Picture | None]) -> str:
     return "".join(picture(p) for p in shown if p)
 
 
-def _wall(data: Data, scene: Any, best: tuple[int, ...]) -> str:
+def wall_section(data: Data, scene: Any, best: tuple[int, ...]) -> str:
     """Limits, window of forces, shape, maps and force curves of a thin wall."""
     several = data.status[..., 0].size > 1
     maps = report_maps.force_maps(data, best, report_maps.OF_WALL)[0] if several else None
@@ -90,7 +90,8 @@ def _wall(data: Data, scene: Any, best: tuple[int, ...]) -> str:
     return wall_words.wall(data, scene) + _pictures([*shown, wall_curves.force_curves(data, best, allowed)])
 
 
-def _effects(data: Data, best: tuple[int, ...]) -> str:
+def effects(data: Data, best: tuple[int, ...]) -> str:
+    """Levels of all effects, and where and why the wall's were taken."""
     shown = levels.level_picture(data, best)
     return background.effects(data) + levels.rule(data) + _pictures([shown])
 

@@ -77,7 +77,7 @@ def window_text(data: Data, index: tuple[int, ...]) -> str:
     bottom = 0.0 if low is None else float(low[index[:-1]])
     if not np.isfinite(top):
         return "–"
-    more = "+" * (top >= data.forces[-1] * (1 - 1e-9))
+    more = "+" if top >= data.forces[-1] * (1 - 1e-9) else ""
     if not bottom <= top:
         return "none"
     return f"{f'{number(bottom)}–' if low is not None else '≤ '}{number(top)}{more}"

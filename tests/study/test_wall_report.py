@@ -1,0 +1,267 @@
+"""What check, plan, show and the report say of a thin wall: a can that was pressed, and files made up from it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from study import model, pictures, pipeline, report, wall, window
+from study.build import build_object
+from study.layout import DONE
+from study.overview import RULE, scene_text
+from study.plan import make_plan, memory, plan_text
+from study.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
+from study.record import blank, crc32, record
+from study.report import wall_words, words
+from study.report.data import Data
+from study.report.levels import level_picture, rule
+from study.report.outline import read_scene
+from study.report.wall_shape import Cut, shape_picture, undeformed
+from study.report.window import window_picture
+from study.scene import parse_scene
+from study.show import as_csv, as_json, as_text, best
+from study.solving import solver
+from study.store import create, open_result
+from study.wall_cost import wall_size
+from tests.study.test_report import Page
+
+SCENE = """
+[object]
+name = "can"
+shape = "revolution"
+profile_mm = [[0, 30], [40, 30], [70, 30], [100, 30]]
+wall_mm = 0.3
+wall_material = "PP"
+mass_g = 60
+allowed_dent_mm = 1.5
+[gripper]
+elements = [6, 4, 3]
+[accuracy]
+wall_around_mm = 4
+wall_along_mm = 6
+wall_coarse_mm = 12
+[candidates]
+stations_mm = [30, 50]
+angles_deg = [0]
+[load]
+normal_force_n = [1, 3]
+"""
+
+
+class Filled:
+    """As much of a writer as derived datasets need."""
+
+    def __init__(self, layout, file):
+        self.layout, self.file = layout, file
+
+    def codes(self):
+        return self.file["study/status/code"][()].ravel()
+
+    def read(self, path):
+        return self.file[f"study/{path}"][()]
+
+    def write_derived(self, name, values):
+        self.file[f"study/derived/{name}"][...] = values
+
+
+def write(path, scene, results):
+    """A result file of these cases by row; the others failed."""
+    plan = make_plan(scene, "can.toml")
+    layout = plan.layout
+    create(path, layout, plan.header)
+    with h5py.File(path, "r+") as file:
+        for row, index in enumerate(np.ndindex(layout.shape)):
+            done = row in results
+            values = record(layout, results[row]) if done else blank(layout, "the wall gave way")
+            for column, value in zip(layout.columns, values, strict=True):
+                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
+            file["study/status/crc"][index] = crc32(layout, row, values)
+            file["study/status/code"][index] = DONE if done else 2
+        window.finalise(Filled(layout, file), scene)
+    return path
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """Scene and cases of the can, by row."""
+    scene, results = parse_scene(SCENE), {}
+    for unit in make_plan(scene).units:
+        for k, result in pipeline.solve_unit(unit):
+            results |= {rows[k]: pipeline.image(result, unit, c) for c, rows in enumerate(unit.rows)}
+    return scene, results
+
+
+@pytest.fixture(scope="module")
+def can(tmp_path_factory, solved):
+    return write(tmp_path_factory.mktemp("can") / "can.hdf", *solved)
+
+
+@pytest.fixture(scope="module")
+def page(can, solved):
+    """The sections of a page that tell of a wall; the others are drawn slowly and tested elsewhere."""
+    with open_result(can) as result, pictures.style():
+        data, mu = Data(result), solved[0].friction.mu
+        told = words.verdict(data, mu) + words.best_tables(data)
+        return Page(told + report.wall_section(data, solved[0], data.best) + report.effects(data, data.best))
+
+
+def changed(path, folder, name, values, index=...):
+    """A copy of a result file with other values of one dataset."""
+    other = folder / "changed.hdf"
+    shutil.copy(path, other)
+    with h5py.File(other, "r+") as file:
+        file[f"study/{name}"][index] = values
+    return other
+
+
+def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
+    text = scene_text(solved[0], "can.toml")
+    assert "0.3 mm PP (1.3 GPa, yields at 31 MPa), standing, open top, dents up to 1.5 mm allowed" in text
+    assert RULE in text
+    # the sentence states the numbers that the choice is made by
+    assert f"below {100 * wall.STIFF:g} % of the pads' travel" in RULE
+    assert f"up to {wall.SMALL_DENT:g} of the wall's thickness" in RULE
+    forced = solved[0].with_values({"effects.object": "rigid"})
+    assert "rigid for every candidate, no dent and no stress will be known" in scene_text(forced, "can.toml")
+
+
+def test_a_rigid_object_has_no_line_about_a_wall(solved):
+    bare = "\n".join(line for line in SCENE.splitlines() if not line.startswith(("wall_", "allowed")))
+    text = scene_text(parse_scene(bare), "can.toml")
+    assert "  wall" not in text
+    assert "compliance" not in text
+
+
+def test_plan_counts_what_a_wall_stores_and_costs(solved, tmp_path):
+    scene = solved[0]
+    plan = make_plan(scene)
+    text = plan_text(plan, scene, tmp_path / "new.hdf", 1)
+    assert "0.2 MB of it deformed walls" in text  # 4 cases x 48 x 40 places x 3 numbers of 8 bytes
+    assert "very roughly" in text
+    assert "all candidates rigid, or all on the costliest shell" in text
+    rigid = scene.with_values({"effects.object": "rigid"})
+    assert "not known before" in plan_text(make_plan(rigid), rigid, tmp_path / "new.hdf", 1)
+    assert memory(scene) > memory(rigid)
+
+
+def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
+    scene = solved[0]
+    size = wall_size(scene)
+    unit = make_plan(scene).units[1]  # the middle station of an even number
+    fingers = [model.approach(build_object(scene.object), p, scene.gripper.pad_size) for p in unit.candidate.poses]
+    made = solver(scene, fingers, unit.candidate.poses)
+    assert size.shell == pytest.approx(6 * made.grips[0].problem.model.shell.nodes, rel=0.1)  # the axis is one node
+    made.destroy()
+    fine = wall_size(scene.with_values({"accuracy.wall_around_mm": 1.0, "accuracy.wall_along_mm": 1.5}))
+    assert fine.shell > 4 * size.shell
+    assert fine.memory > 4 * size.memory
+
+
+def test_show_has_dents_stress_and_the_window_of_forces(can):
+    with open_result(can) as result:
+        text = as_text(best(result))
+        strong = best(result, force=3.0)
+        low, high = result.derived("force_low"), result.derived("force_high")
+    head = text.splitlines()[1]
+    assert all(name in head for name in ("dent [mm]", "stress [MPa]", "window [N]", "safety"))
+    assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
+    assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
+    assert "window: normal forces" in text
+    # 3 N dents both stations deeper than 1.5 mm
+    assert as_text(strong).count("too strong") == 3
+    told = json.loads(as_json(strong))
+    assert told["force"] == 3.0
+    assert told["units"]["wall_stress"] == "Pa"
+    assert {"dent", "wall_stress", "force_low", "force_high", "safety_factor", "flags"} <= told["grasps"][0].keys()
+    assert [g["flags"] & (TOO_WEAK | TOO_STRONG) for g in told["grasps"]] == [0, 0]  # flags as the file has them
+    assert "force_low [N]" in as_csv(strong).splitlines()[0]
+
+
+@pytest.mark.parametrize(("bit", "word"), [(16384, "slides out"), (32768, "yields"), (8192, "snapped")])
+def test_grasps_that_slide_out_or_yield_come_last_and_are_named(tmp_path, can, bit, word):
+    with open_result(can) as result:
+        first = best(result, force=1.0).rows[0][1]
+        index = (int(np.abs(result.axes[0].values - first).argmin()), 0, 0)
+    with open_result(changed(can, tmp_path, "flags/flags", bit, index)) as result:
+        table = best(result, force=1.0)
+    assert (table.rows[0][1] == first) == (word == "snapped")
+    assert f"\n{word}: " in as_text(table)
+
+
+def test_cases_outside_their_window_are_judged_by_the_force():
+    """A weight held from 2 N on and a wall that bears 3 N leave 2 and 3 N of 1, 2, 3 and 4 N."""
+    layout = SimpleNamespace(derived=[SimpleNamespace(name=n) for n in ("force_low", "force_high")])
+    maps = {"flags": np.zeros((1, 4)), "safety_factor": np.array([[0.5, 1.0, 1.5, 2.0]])}
+    result = SimpleNamespace(
+        layout=layout, axes=[SimpleNamespace(values=np.array([1.0, 2, 3, 4]))],
+        map=lambda name, model=None: maps[name], derived=lambda name: np.array([3.0]),
+    )  # fmt: skip
+    flags = judged(result)
+    assert flags.tolist() == [[TOO_WEAK, 0, 0, TOO_STRONG]]
+    assert borne_level(np.full((1, 4), DONE), flags) == 2
+    assert borne_level(np.full((1, 4), DONE), flags | TOO_WEAK) is None
+    assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
+    layout.derived = []
+    assert judged(result).tolist() == [[0, 0, 0, 0]]
+
+
+def test_the_report_answers_at_a_force_that_the_wall_bears(page, can):
+    assert page.balanced
+    assert "Best grasp at 1 N per finger" in page.text
+    assert "No grasp is safe above 1 N" in page.text
+    with open_result(can) as result:
+        high = result.derived("force_high")[0, 0]
+    assert f"to {high:.3g} N, which its wall bears" in page.text
+    assert "The wall: 0.3 mm PP" in page.text
+    assert RULE in page.text
+    assert "too strong: this force dents the wall" in page.text
+    alts = " ".join(image["alt"] for image in page.tags("img"))
+    assert "Bars of safe forces. 2 of 2 grasps" in alts
+    assert "deformed wall and both pads" in alts
+    assert "depth of the dent and largest stress in the wall over station" in alts
+    assert "Normal force over travel and dent" in alts
+    assert "Level of the object by candidate: nonlinear shell: 2" in alts
+
+
+def test_undeformed_and_deformed_outlines_are_cut_alike(can, solved):
+    """The can's radius is 30 mm; its wall comes nearer to the axis by the dent, but for the motion as a whole."""
+    with open_result(can) as result:
+        data = Data(result)
+        place = result.read("wall/place")[0, 0, 1].reshape(48, 40, 3)
+        before, dent = undeformed(solved[0], (0, 0, 1), 0.0), data.at("dent", (0, 0, 1))
+        with pictures.style():
+            shown = shape_picture(data, solved[0], data.best)
+    ring = Cut(False, 0.0, 0.03).outline(before)
+    assert np.hypot(*ring.T) == pytest.approx(30.0, abs=0.05)
+    radius, wall_of = (np.hypot(x[..., 0], x[..., 1]) for x in (before, place))
+    assert (radius - wall_of)[:, 20:].max() == pytest.approx(dent, rel=0.1)
+    pressed = Cut(False, 0.0, 0.03).outline(place)
+    assert 30.0 - pressed[0, 1] > 1.0
+    upright = Cut(True, 0.0, 0.03).outline(before)
+    assert (upright[0, 1], upright[-1, 1]) == (pytest.approx(-30.0, abs=1e-6), pytest.approx(30.0, abs=1e-6))
+    assert "the deepest dent of all solved cases" in shown.caption
+    assert len(shown.svg) < 200_000
+
+
+def test_failed_candidates_are_drawn_as_failed(tmp_path, solved):
+    scene, results = solved
+    path = write(tmp_path / "half.hdf", scene, {row: results[row] for row in (0, 1)})
+    with open_result(path) as result, pictures.style():
+        data = Data(result)
+        bars = window_picture(data, data.best)
+        assert "1 of 2 grasps have one" in bars.alt
+        assert "nonlinear shell: 1)" in level_picture(data, data.best).caption
+        assert bars.svg.count(b"<pattern") == 1  # the hatch of the station that failed
+        assert wall_words.window_text(data, (1, 0, 0)) == "–"
+        assert "the wall gave way" in words.cases(data)
+
+
+def test_forced_levels_are_told_as_the_scene_says(tmp_path, can):
+    with open_result(changed(can, tmp_path, "effects/object_reason", 1)) as result:
+        assert "one level of the object for every candidate: nonlinear shell" in rule(Data(result))
+        assert read_scene(result.scene).object.wall is not None
