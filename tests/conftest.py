@@ -1,4 +1,4 @@
-"""Fixtures that work on one rank and under mpirun: asserting together, sharing a folder, starting programs once."""
+"""What tests need to work on one rank and under mpirun: sharing the tests, asserting together, sharing a folder."""
 
 from __future__ import annotations
 
@@ -19,14 +19,39 @@ def _alone() -> SimpleNamespace:
     )
 
 
-@pytest.fixture(scope="session")
-def comm():
+def _world():
     """All ranks that run the tests; a stand-in of one rank where nobody started MPI."""
     if not any(name in os.environ for name in LAUNCHED):
         return _alone()
     from mpi4py import MPI
 
     return MPI.COMM_WORLD
+
+
+def pytest_addoption(parser):
+    parser.addoption("--every-rank", action="store_true", help="under mpirun every rank runs all tests")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """Under mpirun the ranks share the tests, but run together those that use ``comm``, at the end.
+
+    One rank alone is stricter than all of them at once: a test that needs the others without saying so hangs.
+    """
+    world = _world()
+    if world.size == 1 or config.getoption("--every-rank"):
+        return
+    together = [item for item in items if "comm" in item.fixturenames]
+    single = [item for item in items if "comm" not in item.fixturenames]
+    mine = single[world.rank :: world.size]
+    config.hook.pytest_deselected(items=[item for k, item in enumerate(single) if k % world.size != world.rank])
+    items[:] = mine + together
+
+
+@pytest.fixture(scope="session")
+def comm():
+    """All ranks, for what they do together."""
+    return _world()
 
 
 @pytest.fixture

@@ -91,7 +91,7 @@ def done(path):
         return int((result.status == DONE).sum())
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long), 3])
 def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alone, ranks):
     path = shared_path / "ranks.hdf"
     code, output, errors = once(run, ranks, scene, path)
@@ -131,14 +131,16 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
 
 
 def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path, scene, alone):
-    """Bounds on the pressures instead of the active set: another algorithm, the same answer."""
+    """Bounds on the pressures instead of the active set: another algorithm, the same answer at one of the places."""
     path = shared_path / "bounds.hdf"
-    code, _, errors = once(run, 2, scene, path, "--", "-contact_snes_type", "vinewtonrsls")
+    changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "limit_surface.wrench_samples='none'")
+    place = [word for change in changes for word in ("--set", change)]
+    code, _, errors = once(run, 0, scene, path, *place, "--", "-contact_snes_type", "vinewtonrsls")
     assert code == 0, errors
     with open_result(path) as found, open_result(alone) as expected:
         assert 'contact_snes_type = "vinewtonrsls"' in found.scene
         for name in ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max"):
             for model in ("curved", "flat", "projected"):
-                assert found.map(name, model) == pytest.approx(expected.map(name, model), rel=1e-8), name
-        pressure = expected.read("patch/pressure")
+                assert found.map(name, model)[0, 0] == pytest.approx(expected.map(name, model)[1, 1], rel=1e-8), name
+        pressure = expected.read("patch/pressure")[expected.row(1, 1, 0) : expected.row(1, 1, 1) + 1]
         assert found.read("patch/pressure") == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())

@@ -90,7 +90,9 @@ def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
 
 
 @pytest.mark.launches
-@pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
+@pytest.mark.parametrize(
+    "options", ["-contact_snes_type foo", pytest.param("-contact_snes_rtol abc", marks=pytest.mark.long)]
+)
 def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
     words = ("-o", shared_path / "out.hdf", "--", *options.split())
     code, output, errors = once(lambda: launch(0, "-m", "study", "run", ROOT / "jobs" / "smoke.toml", *words))
@@ -156,17 +158,18 @@ def test_stations_in_metres_get_a_warning():
 
 
 @pytest.mark.launches
-def test_plan_and_run_warn_as_check_does(once, shared_path):
+def test_plan_and_run_warn_as_check_does(once, shared_path, capsys):
     text = f"{BOX}[gripper]\nelements = [4, 4, 2]\n[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}"
+    scene = shared_path / "scene.toml"
+    once(scene.write_text, text)
 
     def told():
-        scene = shared_path / "scene.toml"
-        scene.write_text(text)
-        commands = (("check", scene), ("plan", scene), ("run", scene, "-o", shared_path / "out.hdf"))
-        return [launch(0, "-m", "study", *words) for words in commands]
+        for command in ("check", "plan"):
+            yield main([command, str(scene)]), *capsys.readouterr()
+        yield once(lambda: launch(0, "-m", "study", "run", scene, "-o", shared_path / "out.hdf"))
 
     said = []
-    for code, output, errors in once(told):
+    for code, output, errors in told():
         assert (code, errors) == (0, "")
         said.append([line for line in output.splitlines() if line.startswith("warning: ")])
     assert len(said[0]) == 1

@@ -45,7 +45,7 @@ def uninterrupted(whole):
     return contents(whole)
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long), 3])
 def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, uninterrupted, ranks):
     path = shared_path / "ranks.hdf"
     code, output, errors = once(study, ranks, path)
@@ -100,8 +100,7 @@ def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, unin
     assert "the process was killed 2 times while it solved this case" in output
     # Row 13 and the force above it, for both candidates of the unit; everything else is solved.
     assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [13, 14, 16, 17]
-    assert once(study, 0, path)[0] == 6
-    assert once(study, 2, path, "--retry-failed")[0] == 0
+    assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []
 
 
@@ -118,11 +117,18 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
         assert np.isnan(result.map("e_n", "curved").ravel()[[9, 25, 26]]).all()
         assert result.map("e_n", "curved").ravel()[10] > 0
     assert once(study, 0, path)[0] == 6
-    assert once(study, 2, path, "--retry-failed")[0] == 0
+    assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []
 
 
-@pytest.mark.parametrize(("name", "ranks"), [("SIGUSR1", 2), ("SIGTERM", 0), ("SIGINT", 0)])
+@pytest.mark.parametrize(
+    ("name", "ranks"),
+    [
+        ("SIGUSR1", 2),
+        pytest.param("SIGTERM", 0, marks=pytest.mark.long),
+        pytest.param("SIGINT", 0, marks=pytest.mark.long),
+    ],
+)
 def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path, uninterrupted, name, ranks):
     path = shared_path / f"{name}.hdf"
 
@@ -141,7 +147,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path,
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
-    assert once(study, 1, path)[0] == 0
+    assert once(study, 0, path)[0] == 0
     assert once(differing, path, uninterrupted) == []
 
 
@@ -174,7 +180,7 @@ def test_another_scene_is_refused(once, shared_path, whole, uninterrupted):
     assert once(differing, path, uninterrupted) == []
 
 
-@pytest.mark.parametrize(("what", "ranks"), [("text", 0), ("truncated", 0)])
+@pytest.mark.parametrize(("what", "ranks"), [pytest.param("text", 0, marks=pytest.mark.long), ("truncated", 0)])
 def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ranks):
     path = shared_path / f"{what}.hdf"
 
@@ -216,7 +222,14 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     assert first == 0
 
 
-@pytest.mark.parametrize(("place", "ranks"), [("/proc/softjaw.hdf", 2), ("a_file/x.hdf", 0), ("", 0)])
+@pytest.mark.parametrize(
+    ("place", "ranks"),
+    [
+        ("/proc/softjaw.hdf", 2),
+        pytest.param("a_file/x.hdf", 0, marks=pytest.mark.long),
+        pytest.param("", 0, marks=pytest.mark.long),
+    ],
+)
 def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(once, shared_path, place, ranks):
     (shared_path / "a_file").write_text("")
     code, _, errors = once(study, ranks, shared_path / place)
@@ -271,7 +284,7 @@ def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(once, shared
     code, _, errors = once(study, 2, path, "--bug", 2)
     assert code == 70
     assert "ZeroDivisionError" in errors
-    assert once(study, 2, path)[0] == 0
+    assert once(study, 0, path)[0] == 0
     assert once(differing, path, uninterrupted) == []
 
 
