@@ -32,7 +32,7 @@ SOMETIMES = (  # columns of files that have the map
     ("e_n_error", "", ""),
 )
 WINDOW = ("force_low", "force_high")  # derived bounds; people see them in one column
-WINDOW_MEANS = "normal forces that hold the object's weight and that its wall bears, as far as forces were solved"
+WINDOW_MEANS = "normal forces that hold the object, if its mass is given, and that its wall bears, as far as was solved"
 # names that are too long for a line of text
 HEADS = {"quality_fitted": "fitted", "safety_factor": "safety", "wall_stress": "stress"}
 Columns = tuple[tuple[str, str], ...]  # names and units

@@ -87,7 +87,7 @@ def wall_section(data: Data, scene: Any, best: tuple[int, ...]) -> str:
     windows = window.window_picture(data, best) if several else None
     allowed = getattr(scene.object, "allowed_dent", None) if scene else None
     shown = [windows, wall_shape.shape_picture(data, scene, best), maps]
-    return wall_words.wall(data, scene) + _pictures([*shown, wall_curves.force_curves(data, best, allowed)])
+    return wall_words.wall(data, scene, best) + _pictures([*shown, wall_curves.force_curves(data, best, allowed)])
 
 
 def effects(data: Data, best: tuple[int, ...]) -> str:

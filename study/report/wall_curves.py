@@ -33,7 +33,8 @@ def force_curves(data: Data, index: tuple[int, ...], allowed: float | None) -> P
         axes[0, 1].axvline(1e3 * allowed, color="#c05a00", lw=1, ls="--", zorder=1)
     axes[0, 0].set_ylabel("force per finger [N]")
     rule = f" Dashed, upright: the allowed dent, {1e3 * allowed:g} mm." if allowed is not None else ""
-    others = " Grey: the other stations at this angle." if _others(data, index) else ""
+    which = "candidates" if data.by_poses else "stations at this angle"
+    others = f" Grey: the other {which}." if _others(data, index) else ""
     caption = (
         f"Dark: {data.place(index)}.{others} Points are solved forces. A wall that gives way evenly makes straight"
         " lines; one that softens bends them to the right. Diamonds, after a dotted line: the wall has snapped in on"

@@ -9,6 +9,7 @@ import numpy as np
 from study.overview import wall_text
 from study.quantities import EFFECTS
 from study.report.data import Data, number
+from study.report.outline import swept_object
 from study.report.page import paragraph, table
 
 HEADS = {
@@ -47,11 +48,10 @@ def wall_sentence(data: Data, index: tuple[int, ...]) -> str:
     )
 
 
-def wall(data: Data, scene: Any) -> str:
-    """Definitions that the pictures of a thin wall need, and its limits in this scene."""
-    limits = []
-    if (shape := getattr(scene, "object", None)) is not None:
-        limits = [f"The wall: {wall_text(shape)}."]
+def wall(data: Data, scene: Any, index: tuple[int, ...]) -> str:
+    """Definitions that the pictures of a thin wall need, and its limits in this case."""
+    shape = swept_object(scene, index) if scene else None
+    limits = [f"The wall: {wall_text(shape)}."] if shape is not None else []
     return paragraph(" ".join([*limits, STRESS])) + _table(data)
 
 
@@ -80,4 +80,5 @@ def window_text(data: Data, index: tuple[int, ...]) -> str:
     more = "+" if top >= data.forces[-1] * (1 - 1e-9) else ""
     if not bottom <= top:
         return "none"
-    return f"{f'{number(bottom)}–' if low is not None else '≤ '}{number(top)}{more}"
+    below = "≤ " if low is None and not more else "" if low is None else f"{number(bottom)}–"
+    return f"{below}{number(top)}{more}"
