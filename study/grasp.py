@@ -11,8 +11,9 @@ import numpy as np
 
 from lsfit.quartic import Quartic
 from lsfit.surface import LimitSurface
-from scoring.contact import SoftContact
+from scoring.contact import PolytopeBody, SoftContact
 from scoring.epsilon_search import epsilon
+from scoring.polytope import graspit_vertices, polytope_volume
 from scoring.pose import pose_volume
 from scoring.score import score
 from scoring.volume import volume_linf
@@ -50,6 +51,8 @@ def grasp_values(
     size = lengths(scene, obj, contacts)
     facing = max(angles(*contacts)) <= FACING
     found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
+    if scene.score.graspit:
+        found["quality_graspit"] = [_graspit(contacts, m, size, facing) for m in MODELS]
     tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
     for m in MODELS:
         ellipsoids = [c.ellipsoids[m] for c in contacts]
@@ -73,6 +76,19 @@ def grasp_values(
         found["epsilon"].append(_epsilon(contacts, ellipsoids, size) if search else math.nan)
     flag = score(*(c.ellipsoids[MODELS[0]].semi_axes for c in contacts), size.distance, size.arms, size.torques).flag
     return {f"maps/{name}": values for name, values in found.items()}, int(flag)
+
+
+def _graspit(contacts: Sequence[Contact], model: str, size: Lengths, facing: bool) -> float:
+    """Volume with GraspIt!'s 20 points on each ellipsoid; torques over their length decide where the points lie."""
+    axes = [c.ellipsoids[model].semi_axes / [1.0, 1.0, size.torques] for c in contacts]
+    if any((a == 0).any() for a in axes):
+        return 0.0
+    points = [graspit_vertices(a) for a in axes]
+    if facing:
+        (V, A), (W, B) = (polytope_volume(p) for p in points)
+        return volume_linf(V, A, W, B, size.distance / size.arms)
+    bodies = [PolytopeBody(p * [1.0, 1.0, size.torques]) for p in points]
+    return pose_volume(*_soft(contacts, bodies), size.arms, size.torques, with_l1=False).linf
 
 
 def _bodies(bounds: Sequence[Bound], mu: float) -> list[LimitSurface]:

@@ -76,6 +76,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantity.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
     return tuple(name for name, wanted in asked.items() if wanted)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 MODELS = ("curved", "flat", "projected")
 FINGERS = 2
-NEEDS = ("two meshes", "six components", "mass", "wall")
+NEEDS = ("two meshes", "six components", "mass", "wall", "graspit")
 
 
 @dataclass(frozen=True)

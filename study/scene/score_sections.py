@@ -30,6 +30,9 @@ class Score(Section):
         "facing",
         description="where epsilon is computed: for contacts that face each other, or in any pose (some 0.1 s each)",
     )
+    graspit: bool = Field(
+        False, description="also map the quality that GraspIt!'s 20 vertices per contact give, which is too small"
+    )
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 
