@@ -311,3 +311,13 @@ def test_the_notebook_runs(tmp_path, monkeypatch):
             exec(compile("".join(cell["source"]), f"cell {cell['id']}", "exec"), names)
     assert names["point"].ok
     assert names["surface"].semi_axes.shape == (3,)
+
+
+def test_the_readme_says_how(tmp_path, monkeypatch):
+    (tmp_path / "results").mkdir()
+    make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "README.md").read_text(encoding="utf-8").partition("from study.lookup")[2]
+    names: dict = {"stations": np.zeros(3), "angles": np.linspace(0, 1, 3), "forces": 1.5}
+    exec("from study.lookup" + text.partition("```")[0], names)
+    assert names["e_n"] == pytest.approx(names["grasps"].at(0, [0, 0.5, 1], 1.5).e_n)
