@@ -110,12 +110,32 @@ def check_object(scene: Scene) -> None:
             return
         try:
             build_object(shape)
-            if shape.shape == "mesh" and shape.wall is not None:
+            if shape.wall is not None:
                 outer_surface(shape)
         except ValueError as error:
             raise StudyError(USAGE, f"{key}: {error}") from error
+        if shape.wall is not None:
+            _check_wall(shape)
         if shape.shape == "mesh":
             _check_stations(scene, shape)
+
+
+def _check_wall(shape: Walled) -> None:
+    """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely."""
+    import numpy as np
+
+    from fem.shell_body import body_mesh
+    from fem.shell_grid import MeshSize
+
+    surface, _ = outer_surface(shape)
+    lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
+    size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
+    wall = shape.wall if isinstance(shape.wall, float) else [list(pair) for pair in shape.wall]
+    try:
+        body_mesh(surface, wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
+    except ValueError as error:
+        key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
+        raise StudyError(USAGE, f"object.{key}: {error}") from error
 
 
 def _check_stations(scene: Scene, mesh: Shape) -> None:
