@@ -49,7 +49,8 @@ class GraspMap:
     The error of a value is that of a straight line through a curve with the largest second derivative that the
     neighbouring cases show, added up over the three axes. It says nothing about the error of the cases themselves,
     which ``e_n_error`` and others tell if the scene has ``accuracy.meshes = 2``. Along an axis of two values there is
-    no second derivative, and a quarter of their difference stands in.
+    no second derivative, and up to a quarter of their difference stands in. What is narrower than the spacing of the
+    candidates stays unseen.
     """
 
     def __init__(self, file: str | Path, where: Mapping[str, Any] | None = None) -> None:
