@@ -132,15 +132,7 @@ def turning(source: Source) -> tuple[float, bool]:
         scene = scene.with_values(source.point) if source.point else scene
     except SceneError:
         return 2 * math.pi, False
-    order, swap = _order(scene), abs(math.sin(scene.candidates.roll)) < 1e-9
+    order, swap = scene.axis_symmetry, abs(math.sin(scene.candidates.roll)) < 1e-9
     if order % 2 and swap:
         return math.pi / order, True
     return (2 * math.pi / order if order else 0.0), False
-
-
-def _order(scene: Any) -> int:
-    """Order of the rotational symmetry about the axis of all that a case depends on, its weight included."""
-    if scene.object.mass is None:
-        return int(scene.object.axis_symmetry)
-    sideways = (*scene.task.weight_direction[:2], *(scene.task.centre_of_mass or (0.0, 0.0))[:2])
-    return 1 if any(abs(v) > 1e-9 for v in sideways) else int(scene.object.axis_symmetry)

@@ -70,7 +70,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         scene.limit_surface.samples,
         scene.sampled,
     )
-    return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.object.axis_symmetry)))
+    return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.axis_symmetry)))
 
 
 def has(scene: Any) -> tuple[str, ...]:

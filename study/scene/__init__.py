@@ -72,6 +72,14 @@ class Scene(Section):
         return tuple(sorted({labels.index(w) if isinstance(w, str) else w for w in wanted}))
 
     @property
+    def axis_symmetry(self) -> int:
+        """Order of the symmetry about the axis of all that a case depends on: the object, and its weight if it has one."""
+        if self.object.mass is None:
+            return self.object.axis_symmetry
+        sideways = (*self.task.weight_direction[:2], *(self.task.centre_of_mass or (0.0, 0.0))[:2])
+        return 1 if any(abs(v) > 1e-9 for v in sideways) else self.object.axis_symmetry
+
+    @property
     def cases(self) -> int:
         """Number of cases: candidates x forces x points of the sweep."""
         return self.candidates.count * len(self.load.normal_force_n) * math.prod(map(len, self.sweep.values()))

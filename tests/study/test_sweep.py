@@ -216,3 +216,17 @@ def test_the_bottle_has_70_candidates_and_35_units():
     scene = load_scene(JOBS / "bottle-rigid.toml")
     assert len(sweep.candidates(scene)) == 70
     assert len(sweep.units(scene, lambda s: 0)) == 35
+
+
+@pytest.mark.parametrize(
+    ("overrides", "order"),
+    [
+        ((), 2),
+        (("object.mass_g=300",), 2),
+        (("object.mass_g=300", "task.weight_direction=[0, 1, -1]"), 1),
+        (("object.mass_g=300", "task.centre_of_mass_mm=[3, 0, 0]"), 1),
+    ],
+)
+def test_a_weight_that_does_not_point_along_the_axis_takes_the_symmetry_away(overrides, order):
+    scene = parse_scene(CYLINDER, overrides=list(overrides))
+    assert scene.axis_symmetry == order
