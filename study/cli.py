@@ -14,6 +14,7 @@ from study import commands
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, MEANING, USAGE, StudyError
 from study.patch.command import add_options as add_patch_options
+from study.view.command import add_options as add_view_options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -109,6 +110,8 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
     add_patch_options(add("patch", commands.patch, "friction, limit surface and score of a pressure field from "
                           "elsewhere", "softjaw patch jobs/cylinder-pressure.csv --distance 60"))  # fmt: skip
+    add_view_options(add("view", commands.view, "the map on the object in three dimensions: window, page, picture, or "
+                         "files for ParaView", "softjaw view out.hdf --force 5 --screenshot view.png"))  # fmt: skip
     add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
     add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
     return parser

@@ -162,6 +162,14 @@ def patch(options: Namespace) -> int:
     return DONE
 
 
+def view(options: Namespace) -> int:
+    """Show a result in three dimensions."""
+    from study.view.command import view
+
+    view(options)
+    return DONE
+
+
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
     import json

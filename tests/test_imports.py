@@ -18,10 +18,10 @@ ALLOWED = {
     "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
     "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
-PICTURES = {"fem/mesh_object.py", "study/pictures.py"}
+PICTURES = {"fem/mesh_object.py", "study/view/window.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
-    "h5py": {"study/store.py"},
+    "h5py": {"study/store.py", "study/vtkhdf.py"},
     "pyvista": PICTURES,
     "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
 }
