@@ -22,6 +22,11 @@ class Opening:
     Parameters
     ----------
     mesh : BodyMesh
+
+    Attributes
+    ----------
+    last : (float, float)
+        Opening and force [N] of the last state that was watched.
     """
 
     def __init__(self, mesh: BodyMesh) -> None:
@@ -35,7 +40,7 @@ class Opening:
             self._back = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._front, 1:])[1]]
         self._whole = 1.0
         self._whole = self._distances(np.zeros(mesh.X.size * 2))
-        self._last = 1.0, 0.0
+        self.last = 1.0, 0.0
 
     def __call__(self, q: FloatArray) -> float:
         """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
@@ -56,8 +61,8 @@ class Opening:
         """
         opening = self(q)
         if opening > 0.0:
-            self._last = opening, force
+            self.last = opening, force
             return
-        before, at = self._last
+        before, at = self.last
         meets = at + (force - at) * before / (before - opening)
         raise CheckError(f"the wall collapsed: its opposite sides meet at {meets:.3g} N")

@@ -28,6 +28,8 @@ from fem.stepping import Settings, Stepping, Work
 LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
+MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
+FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
@@ -103,7 +105,8 @@ class Grip:
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
-            ROUNDING * self.problem.model.shell.young_modulus, self._watch,
+            ROUNDING * self.problem.model.shell.young_modulus,
+            None if "contact_snes_max_it" in self.options else MOST_ITERATIONS, self._watch,
         )  # fmt: skip
 
     def _guess(self, travel: float) -> FloatArray:
@@ -126,13 +129,23 @@ class Grip:
             work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
             try:
                 x, slope, fell = self._level(x, reached, force, compliance, work)
-            except ConvergenceError:
+            except ConvergenceError as error:
+                self._refuse_folded(error)
                 if self.fallback is None:
                     raise
                 self._fall_back()
                 x, slope, fell = self._level(x, reached, force, compliance, work)
             reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
+
+    def _refuse_folded(self, error: ConvergenceError) -> None:
+        """Say that a wall collapsed where that is why no further state was found."""
+        left, force = self.opening.last
+        if left < FOLDED:
+            raise CheckError(
+                f"the wall collapsed: beyond {force:.3g} N, where its opposite sides have come {1 - left:.0%} of their "
+                f"distance closer, no equilibrium was found ({error})"
+            ) from error
 
     def _fall_back(self) -> None:
         """Go on with nodal gaps."""
@@ -151,8 +164,10 @@ class Grip:
             x, reached = self._stepping.first(travel, force, work)
             compliance = self.problem.travel(x) / reached  # foam gets stiffer, so this is more than what comes
         ahead, fell = self._climb(x, reached, force, compliance, work)
-        way = self.problem.travel(ahead) - self.problem.travel(x)
-        return ahead, way / (force - reached) if force > reached else np.inf, fell
+        if not force > reached:
+            return ahead, np.inf, fell
+        slope = (self.problem.travel(ahead) - self.problem.travel(x)) / (force - reached)
+        return ahead, slope, fell or GIVES_WAY * slope > self.problem.travel(x) / reached
 
     def _climb(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work

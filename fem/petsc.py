@@ -181,6 +181,11 @@ class NonlinearSolver:
         try:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
+        except PETSc.Error as error:
+            snes.getKSP().getPC().reset()
+            raise ConvergenceError(
+                f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something moves without force"
+            ) from error
         finally:
             snes.setTolerances(max_it=limit)
             self.seconds.total += time.perf_counter() - start

@@ -18,6 +18,7 @@ State = tuple[FloatArray, float]  # unknowns and force [N]
 WALK_STEPS = 60  # of the sheet, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step of a walk, where that is bounded
 FIRST_TRIES = 12
+FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Stepping:
         Travel to the force that a residual there is judged by [N].
     floor : float
         Norm of the residual that rounding leaves [N].
+    most : int, optional
+        Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
     watch : callable
         Told every new state and its force [N]; what it raises ends the way.
     """
@@ -84,15 +87,16 @@ class Stepping:
     guess: Callable[[float], FloatArray]
     force_scale: Callable[[float], float]
     floor: float = 0.0
+    most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
 
-    def solve(self, x: FloatArray, control: Control, work: Work) -> FloatArray:
+    def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
         self.problem.control = control
         scale = control.force if control.force is not None else self.force_scale(control.travel)
         work.steps += 1
         try:
-            x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor))
+            x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor), most)
         except ConvergenceError:
             work.cuts += 1
             raise
@@ -106,7 +110,7 @@ class Stepping:
             goal = min(1.0, done + fraction)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
-                x = self.solve(x, Control(force=target), work)
+                x = self.solve(x, Control(force=target), work, self.most)
             except ConvergenceError:
                 fraction *= 0.5
                 if fraction < self.settings.min_step:
@@ -130,7 +134,7 @@ class Stepping:
         shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
         for _ in range(WALK_STEPS):
             try:
-                ahead = self.solve(low[0], Control(travel=problem.travel(low[0]) + step), work)
+                ahead = self.solve(low[0], Control(travel=problem.travel(low[0]) + step), work, self.most)
                 high = (ahead, problem.sheet_force(ahead))
                 if high[1] >= force:
                     return self._land(low, high, force, work)
@@ -147,7 +151,7 @@ class Stepping:
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
         """State at ``force`` between two on the way; Newton's method may jump to one further on, which is refused."""
         share = (force - low[1]) / (high[1] - low[1])
-        x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work)
+        x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work, self.most)
         ends = self.problem.travel(low[0]), self.problem.travel(high[0])
         margin = 1e-3 * (ends[1] - ends[0])
         if not ends[0] - margin <= self.problem.travel(x) <= ends[1] + margin:
@@ -167,9 +171,9 @@ class Stepping:
                 travel, failure = 0.6 * travel, str(error)
                 continue
             reached = self.problem.sheet_force(x)
-            if reached > 1e-3 * force:
+            if reached > FIRMLY * force:
                 return x, reached
-            best = (x, reached) if reached > 0.0 else best
+            best = (x, reached) if reached > BARELY * force else best
             travel *= 1.5
         if best:
             return best

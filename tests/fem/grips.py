@@ -50,9 +50,10 @@ def grip(
     level: str = "nonlinear",
     mesh: WallMesh = COARSE,
     theta: float = 0.0,
+    radius: float = 0.035,
 ) -> Grip:
     """Both fingers on the can at this height."""
-    poses = pose(theta, z), pose(theta + np.pi, z)
+    poses = pose(theta, z, radius), pose(theta + np.pi, z, radius)
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
     pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)

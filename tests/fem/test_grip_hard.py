@@ -1,0 +1,195 @@
+"""Thin walls where they are hardest: collapse, snap-in, rims, partial meshes, foils and stiff walls."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fem.collapse import Opening
+from fem.errors import CheckError
+from fem.extract import extract, half_turned
+from fem.facing import FAR, Wall, face
+from fem.pose import Pose
+from fem.shell_body import body_mesh
+from fem.shell_grid import MeshSize
+from fem.thin_walled import WallMesh, grasp
+from fem.wall_material import WallMaterial
+from tests.fem.grips import grip, pose, thin
+from tests.fem.test_grip import e_n
+
+ROUGH = WallMesh(0.004, 0.008, 0.016)
+SIZE = MeshSize((0.0, np.pi), (0.05, 0.10), 0.013, 0.006, 0.012, 0.02)
+
+
+@cache
+def mesh(symmetry):
+    return body_mesh(thin().surface, 4e-4, SIZE, symmetry)
+
+
+def squeezed(body, share, shift=0.0):
+    """State in which the whole wall has come closer to x = 0 by a share of its distance, or moved along x."""
+    q = np.zeros((len(body.X), 6))
+    q[:, 0] = -share * (body.X - body.D)[:, 0] + shift
+    return q.ravel()
+
+
+@pytest.mark.parametrize("symmetry", [(True, True), (True, False), (False, True), (False, False)])
+def test_the_opening_is_the_part_of_the_distance_that_is_left(symmetry):
+    body = mesh(symmetry)
+    opening = Opening(body)
+    assert opening(squeezed(body, 0.0)) == pytest.approx(1.0, abs=1e-12)
+    assert opening(squeezed(body, 0.7)) == pytest.approx(0.3, abs=1e-12)
+    if not symmetry[0]:
+        assert opening(squeezed(body, 0.0, 0.05)) == pytest.approx(1.0, abs=1e-12)
+    opening.watch(squeezed(body, 0.5), 2.0)
+    with pytest.raises(CheckError, match=r"the wall collapsed: its opposite sides meet at 3 N"):
+        opening.watch(squeezed(body, 1.5), 4.0)  # half way between 0.5 and -0.5
+
+
+@pytest.mark.long
+def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
+    """It folds between the pads; the figures of the sentence are those of the last state that was found."""
+    soft = grip(thin(2e-4, WallMaterial(1e8, 0.38)), elements=(6, 4, 2), mesh=ROUGH)
+    ladder = soft.ladder([0.02, 1.0, 3.0])
+    assert [next(ladder).wall.opening < 0.75 for _ in range(2)] == [False, True]
+    with pytest.raises(CheckError, match=r"the wall collapsed: (its opposite sides meet at|beyond) 1\.\d+ N"):
+        next(ladder)
+
+
+def test_a_wall_that_gives_way_is_flagged_and_stays_flagged():
+    found = [s.wall.snapped for s in grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([0.3, 1.5, 4.0])]
+    assert found == [False, True, True]
+    stiff = grip(thin(1e-3), elements=(6, 4, 2), mesh=ROUGH).ladder([0.5, 5.0])
+    assert not any(s.wall.snapped for s in stiff)
+
+
+@pytest.mark.long
+def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
+    at_once = next(grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([4.0]))
+    *_, stepwise = grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1.0, 2.5, 3.0, 4.0])
+    assert at_once.wall.snapped
+    assert stepwise.wall.snapped
+    assert at_once.fingers[0].travel == pytest.approx(stepwise.fingers[0].travel, rel=1e-6)
+
+
+@pytest.mark.long
+def test_a_foil_and_tiny_forces_are_solved():
+    *_, foil = grip(thin(5e-5), elements=(6, 4, 2), mesh=ROUGH).ladder([0.005, 0.01])
+    assert foil.fingers[0].checks.force_balance < 1e-8
+    *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1e-3, 1e-2])
+    assert tiny.fingers[0].travel < 1e-4
+
+
+@pytest.mark.long
+def test_many_levels_end_where_few_do():
+    forces = np.linspace(0.05, 1.5, 30)
+    *_, many = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder(forces)
+    *_, few = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder([1.5])
+    assert many.fingers[0].travel == pytest.approx(few.fingers[0].travel, rel=1e-7)
+
+
+def test_pads_and_wall_must_balance():
+    held = grip(thin(), elements=(6, 4, 2), mesh=ROUGH)
+    state = next(held.ladder([1.0]))
+    held._check_balance(state.fingers, state.wall.load, 1.0)
+    with pytest.raises(CheckError, match="out of balance"):
+        held._check_balance(state.fingers, 1.001 * state.wall.load, 1.0)
+
+
+def test_a_long_side_that_points_down_gives_the_same_patch_turned():
+    """On a slope the patch differs between the ends of the pad."""
+    up = pose(0.0, 0.142), pose(np.pi, 0.142)
+    turn = np.diag([-1.0, -1.0, 1.0])
+    down = tuple(Pose(p.rotation @ turn, p.origin) for p in up)
+    assert grasp(thin(), up).flipped == (False,)
+    assert grasp(thin(), down).flipped == (True,)
+    np.testing.assert_allclose(grasp(thin(), down).poses[0].rotation, up[0].rotation, atol=1e-12)
+    finger = next(grip(thin(), z=0.142, elements=(6, 4, 2), mesh=ROUGH).ladder([1.0])).fingers[0]
+    patch = extract(finger.pad, finger)
+    again = half_turned(half_turned(patch))
+    for name in ("centroid", "normal", "corners", "pressure"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(patch, name))
+
+
+@pytest.fixture(scope="module")
+def quarter():
+    """The part of the can's wall between 0 and 90 degrees."""
+    held = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).problem
+    return held.fingers[0].wall
+
+
+def still(wall):
+    none = np.zeros((wall.nodes.max() + 1, 3))
+    return none, none.copy()
+
+
+def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges(quarter):
+    assert not quarter.closed
+    theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
+    points = np.column_stack([0.036 * np.cos(theta), 0.036 * np.sin(theta), np.full(4, 0.075)])
+    found = face(quarter, points, quarter.places(points), *still(quarter))
+    np.testing.assert_array_equal(found.gap == FAR, [True, False, False, True])
+    np.testing.assert_allclose(found.gap[1:3], 1e-3, atol=1e-7)
+
+
+def test_a_search_that_begins_at_the_wrong_end_of_the_wall_finds_the_place(quarter):
+    points = np.array([[0.036, 1e-3, 0.075], [0.036, 5e-3, 0.1]])
+    good, bad = quarter.places(points), np.tile([0.5 * np.pi, quarter.s[-1]], (2, 1))
+    here = face(quarter, points, good, *still(quarter))
+    there = face(quarter, points, bad, *still(quarter))
+    np.testing.assert_allclose(there.gap, here.gap, atol=1e-12)
+    np.testing.assert_allclose(bad, good, atol=1e-9)
+
+
+def test_flat_bottoms_are_not_faced_but_the_rim_above_them_is(quarter):
+    flat = thin().surface.flat[0]
+    assert quarter.ends[0] == pytest.approx(flat, abs=1e-12)
+    s = np.array([flat - 0.01, 0.5 * (flat + thin().surface.wall[0])])
+    X, n = thin().surface.jets(np.full(2, 0.5), s)[:, 0], thin().surface.normals(np.full(2, 0.5), s)
+    gap = face(quarter, X + 1e-3 * n, quarter.places(X), *still(quarter)).gap
+    assert gap[0] == FAR
+    assert gap[1] == pytest.approx(1e-3, abs=2e-6)
+
+
+def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
+    """The can ends open at z = 205 mm; a pad at 198 mm stands over by 8 mm."""
+    finger = next(grip(thin(), z=0.198, elements=(12, 4, 2), mesh=ROUGH, radius=0.013).ladder([0.5])).fingers[0]
+    patch = extract(finger.pad, finger)
+    height = 0.198 + patch.centroid[:, 0]
+    assert patch.pressure[height > 0.2051].max() == 0.0
+    assert patch.pressure[height > 0.2025].max() > 0.3 * patch.pressure.max()
+    assert finger.checks.overlap < 0.15 * finger.travel
+
+
+def test_the_wall_of_a_partly_meshed_body_is_not_closed():
+    whole = grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall
+    assert isinstance(whole, Wall)
+    assert whole.closed
+
+
+CONVERGENCE = ((8, 4, 2), 2.0), ((16, 8, 4), 1.0), ((32, 16, 8), 0.5)
+
+
+@pytest.mark.long
+def test_travel_and_e_n_converge_with_the_meshes():
+    """All sizes are halved twice; changes must fall by more than 2, and the finer ones be small."""
+    found = []
+    for elements, size in CONVERGENCE:
+        sizes = WallMesh(size * 0.002, size * 0.003, size * 0.006)
+        state = next(grip(thin(), elements=elements, mesh=sizes).ladder([3.0])).fingers[0]
+        found.append([state.travel, e_n(state), state.pressure.reshape(*state.pad.front_grid)[elements[0] // 2, 0]])
+    found = np.array(found)
+    one, two = np.abs(np.diff(found, axis=0)) / np.abs(found[-1])
+    print(found, one, two, np.log2(one / two))
+    assert (two[:2] < 0.5 * one[:2]).all()
+    assert two[:2].max() < 0.005
+    assert two[2] < 0.02
+
+
+@pytest.mark.long
+def test_linear_walls_agree_within_one_percent_while_the_dent_is_small():
+    for thickness, force in ((5e-4, 1.0), (8e-4, 3.0), (1.2e-3, 8.0)):
+        sides = [next(grip(thin(thickness), level=level).ladder([force])) for level in ("nonlinear", "linear")]
+        dent = np.linalg.norm(sides[0].wall.q.reshape(-1, 6)[:, :3], axis=1).max()
+        assert dent < 0.3 * thickness
+        assert e_n(sides[1].fingers[0]) == pytest.approx(e_n(sides[0].fingers[0]), rel=0.01)

@@ -1,0 +1,125 @@
+"""The way to a force on an artificial grasp whose force falls while the fingers close: its first crossing is taken."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fem.contact import Control
+from fem.errors import ConvergenceError
+from fem.grip import Grip
+from fem.stepping import Settings, Stepping, Work
+
+MM = 1e-3
+
+
+def force(x):
+    """Force [N] at a travel of x [mm]: 2.5 at most before it falls to 2.0, by way of x = 1 and x = 2."""
+    return x**3 - 4.5 * x**2 + 6 * x
+
+
+def crossings(F):
+    """Travels with this force [mm], ascending."""
+    roots = np.roots([1.0, -4.5, 6.0, -F])
+    return np.sort(roots[np.abs(roots.imag) < 1e-12].real)
+
+
+class Curve:
+    """One unknown, the travel."""
+
+    control = Control(travel=0.0)
+
+    def sheet_force(self, x):
+        return float(force(x[0] / MM))
+
+    def travel(self, x):
+        return float(x[0])
+
+
+class Jumping:
+    """Under force control finds the last crossing, as Newton's method may, unless it starts close to another."""
+
+    def __init__(self, problem, close=0.05):
+        self.problem, self.close = problem, close
+
+    def solve(self, x, tolerance, iterations=None):
+        control = self.problem.control
+        if control.force is None:
+            return np.array([control.travel]), 1
+        found = crossings(control.force)
+        near = found[np.abs(found - x[0] / MM) < self.close]
+        return np.array([(near[0] if len(near) else found[-1]) * MM]), 1
+
+
+def stepping(**choices):
+    problem = Curve()
+    return Stepping(problem, Jumping(problem, **choices), Settings(), 20 * MM, 1.0, lambda t: None, lambda t: 1.0)
+
+
+@pytest.mark.parametrize("wanted", [0.3, 1.9, 2.1, 2.4, 2.45, 3.5])
+def test_a_walk_lands_on_the_first_crossing(wanted):
+    forces = []
+    x = stepping().walk(np.zeros(1), wanted, Work(), 0.5 * MM, forces)
+    assert x[0] / MM == pytest.approx(crossings(wanted)[0], abs=1e-9)
+    assert (np.diff(forces) < 0).any() == (wanted > 2.5)
+
+
+def test_a_landing_far_from_its_bracket_is_refused_and_tried_from_closer():
+    work = Work()
+    x = stepping(close=0.003).walk(np.zeros(1), 2.2, work, 0.5 * MM)
+    assert x[0] / MM == pytest.approx(crossings(2.2)[0], abs=1e-9)
+    assert work.steps > 8  # brackets were halved
+
+
+def test_a_force_that_is_never_reached_ends_with_a_sentence():
+    flat = stepping()
+    flat.problem.sheet_force = lambda x: 1.0 - np.exp(-x[0] / MM)
+    with pytest.raises(ConvergenceError, match=r"stays below 2 N: reached 1 N after 60 steps"):
+        flat.walk(np.zeros(1), 2.0, Work(), 0.5 * MM)
+
+
+def test_what_watches_the_way_can_end_it():
+    steps, seen = stepping(), []
+
+    def watch(x, F):
+        seen.append(F)
+        if x[0] > 1.2 * MM:
+            raise RuntimeError("enough")
+
+    steps.watch = watch
+    with pytest.raises(RuntimeError, match="enough"):
+        steps.walk(np.zeros(1), 4.0, Work(), 0.5 * MM)
+    assert len(seen) >= 3
+
+
+def climbing(**choices):
+    """A grip that has only its way up."""
+    grip = Grip.__new__(Grip)
+    grip._stepping = stepping(**choices)
+    grip.problem = grip._stepping.problem
+    return grip
+
+
+def test_a_jump_under_force_control_is_walked_instead():
+    start = np.array([crossings(1.0)[0] * MM])
+    x, fell = climbing()._climb(start, 1.0, 2.2, 0.2 * MM, Work())
+    assert x[0] / MM == pytest.approx(crossings(2.2)[0], abs=1e-9)
+    assert not fell
+
+
+def test_beyond_the_limit_the_force_is_said_to_have_fallen():
+    start = np.array([crossings(2.0)[0] * MM])
+    x, fell = climbing()._climb(start, 2.0, 3.0, 0.2 * MM, Work())
+    assert x[0] / MM == pytest.approx(crossings(3.0)[0], abs=1e-9)
+    assert fell
+
+
+def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
+    grip = climbing()
+    first = np.array([0.1 * MM])
+    grip._stepping.first = lambda travel, F, work: (first, grip.problem.sheet_force(first))
+    grip._beds = [SimpleNamespace(travel=lambda F: 0.1 * MM)]
+    grip._stepping.problem.travel = lambda x: float(x[0])
+    x, _, fell = grip._level(None, 0.0, 6.0, np.inf, Work())
+    assert x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
+    assert fell

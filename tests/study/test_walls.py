@@ -1,0 +1,181 @@
+"""Thin walls through the whole study on coarse meshes: levels, symmetry, images, order, refusals."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from study import pipeline, wall
+from study.build import build_object
+from study.quantities import REASONS
+from study.result import CaseFailure
+from study.scene import parse_scene
+from study.sweep import units
+from tests.study.test_pipeline import SCALES, differing
+
+CUP = """shape = "revolution"
+profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
+wall_mm = 0.6
+wall_material = "PP"
+"""
+OVAL = """shape = "sections"
+wall_mm = 0.5
+[[object.sections]]
+z_mm = 0
+a_mm = 22
+b_mm = 18
+[[object.sections]]
+z_mm = 20
+a_mm = 24
+b_mm = 20
+[[object.sections]]
+z_mm = 40
+a_mm = 24
+b_mm = 20
+[[object.sections]]
+z_mm = 70
+a_mm = 24
+b_mm = 20
+"""
+COARSE = """[accuracy]
+wall_around_mm = 4
+wall_along_mm = 6
+wall_coarse_mm = 12
+"""
+WHERE = "stations_mm = [40]\nangles_deg = [0]"
+
+
+def scene_of(shape, *overrides, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
+    text = f"[object]\n{shape}\n[gripper]\nelements = {elements}\n[candidates]\n{where}\n{COARSE}"
+    return parse_scene(text + f"[load]\nnormal_force_n = {forces}\n", "scene.toml", overrides)
+
+
+def units_of(*arguments, **choices):
+    return units(scene_of(*arguments, **choices), lambda point: build_object(point.object).axis_symmetry)
+
+
+@lru_cache(maxsize=32)
+def solved(*arguments, **choices):
+    """Results of the first unit, force by force."""
+    return [result for _, result in pipeline.solve_unit(units_of(*arguments, **choices)[0])]
+
+
+def alike(found, expected, tolerance):
+    """Values that differ, but for the work and the sampled wrenches, whose scale is the patch's size."""
+    scales = SCALES | {"maps/support_force": 1e-2, "wall/place": 1e-2}
+    return [n for n in differing(found, expected, tolerance, scales) if n.startswith(("maps/", "wall/", "fingers/"))]
+
+
+def test_the_level_follows_the_dent_and_says_so():
+    levels = []
+    for thickness, modulus, forces in ((1.0, 200.0, "[0.2]"), (0.7, 5.0, "[0.5]"), (0.2, 200.0, "[4]")):
+        wall_ = f"object.wall_mm={thickness}", f"object.young_modulus_gpa={modulus}"
+        result = solved(CUP, *wall_, forces=forces)[0]
+        levels.append(result.effects["object"])
+        assert np.isfinite(result.values.get("maps/dent", 0.0))
+    names, indicators, reasons = zip(*levels, strict=True)
+    assert names == ("rigid", "linear_shell", "nonlinear_shell")
+    assert indicators == tuple(sorted(indicators))
+    assert indicators[1] <= wall.SMALL_DENT < indicators[2]
+    assert "below" in REASONS[reasons[0]]
+    assert "below" in REASONS[reasons[1]]
+    assert "above" in REASONS[reasons[2]]
+
+
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize("angle", [0, pytest.param(90, marks=LONG)])
+def test_quarter_half_and_full_models_of_an_oval_bottle_are_one(angle):
+    where = f"stations_mm = [40]\nangles_deg = [{angle}]"
+    sizes = ("quarter", "half", "full") if angle else ("quarter", "half")
+    wanted = {size: solved(OVAL, f"effects.model_size='{size}'", where=where, forces="[1]")[-1] for size in sizes}
+    for size, result in wanted.items():
+        assert result.effects["model_size"][0] == size
+        found, expected = result.values["maps/e_n"], wanted["quarter"].values["maps/e_n"]
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+        assert result.values["maps/dent"] == pytest.approx(wanted["quarter"].values["maps/dent"], rel=1e-5)
+        np.testing.assert_allclose(result.values["wall/place"], wanted["quarter"].values["wall/place"], atol=1e-8)
+
+
+@LONG
+def test_across_an_oval_there_is_no_symmetry_and_to_force_one_is_refused():
+    where = "stations_mm = [40]\nangles_deg = [45]"
+    result = solved(OVAL, where=where)[-1]
+    assert result.effects["model_size"][0] == "full"
+    one, two = result.values["fingers/tau_z_max"][:, 0]
+    assert one == pytest.approx(two, rel=1e-4)  # half a turn is a symmetry, of which only the meshes know nothing
+    with pytest.raises(ValueError, match=r"'quarter' needs 2 plane\(s\) of symmetry"):
+        solved(OVAL, "effects.model_size='quarter'", where=where)
+
+
+def pose(approach, long_side):
+    return f"[[candidates.poses]]\npoint_mm = [0, 0, 50]\napproach = {approach}\nlong_side = {long_side}\n"
+
+
+@pytest.mark.parametrize("long_side", [[0, 0, -1], *(pytest.param(v, marks=LONG) for v in ([0, 0, 1], [0, 1, 0]))])
+def test_symmetric_and_whole_models_give_both_fingers_the_same_patches(long_side):
+    """On a cone the patch is not its own image turned by half a turn."""
+    where = pose([-1, 0, 0], long_side)
+    small, whole = (solved(CUP, *size, where=where, forces="[1]")[-1] for size in ((), ("effects.model_size='full'",)))
+    assert small.effects["fingers"][0] == "one"
+    assert whole.effects["fingers"][0] == "two"
+    for name, size in (("pressure", None), ("centroid", None), ("normal", 1.0)):
+        a, b = small.patch[name], whole.patch[name]
+        np.testing.assert_allclose(a, b, atol=2e-5 * (size or np.abs(b).max()), err_msg=name)
+
+
+@LONG
+def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
+    tilted = solved(CUP, where=pose([-1, 0, 0.2], [0, 0, 1]))[-1]
+    assert tilted.effects["model_size"][0] == "half"
+    assert np.isfinite(tilted.values["maps/e_n"]).all()
+    with pytest.raises(Exception, match="a finger approaches a thin-walled object at 90 degrees"):
+        solved(CUP, where=pose([0, 0, 1], [1, 0, 0]))
+
+
+def test_images_of_a_grasp_are_what_their_own_solution_would_be():
+    where = "stations_mm = [40]\nangles_deg = [0, 37]"
+    unit = units_of(CUP, where=where)[0]
+    assert len(unit.rows) == 2
+    image = pipeline.image(solved(CUP, where=where)[-1], unit, 1)
+    own = solved(CUP, where="stations_mm = [40]\nangles_deg = [37]")[-1]
+    np.testing.assert_allclose(image.values["wall/place"], own.values["wall/place"], atol=1e-9)
+    np.testing.assert_allclose(image.values["fingers/pose_origin"], own.values["fingers/pose_origin"], atol=1e-9)
+    assert image.values["maps/dent"] == pytest.approx(own.values["maps/dent"], rel=1e-6)
+
+
+def test_results_do_not_depend_on_what_was_solved_before():
+    where = "stations_mm = [25, 40]\nangles_deg = [0]"
+    one, two = units_of(CUP, "effects.object='linear_shell'", where=where)
+
+    def run(order):
+        wall.object_factors.cache_clear()
+        return {id(u): [r.values for _, r in pipeline.solve_unit(u)] for u in order}
+
+    forth, back = run((one, two)), run((two, one))
+    for key, ladder in forth.items():
+        for a, b in zip(ladder, back[key], strict=True):
+            assert not differing(a, b, 0.0)
+
+
+def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
+    result = solved(CUP, "accuracy.meshes=2", forces="[2]", elements="[8, 8, 4]")[0]
+    assert 0 < result.values["maps/e_n_error"] < 0.3
+    sweep = '[sweep]\n"object.wall_mm" = [0.4, 0.8]\n'
+    one, two = units_of(CUP, forces=f"[1]\n{sweep}")
+    dents = [next(iter(pipeline.solve_unit(u)))[1].values["maps/dent"] for u in (one, two)]
+    assert dents[0] > 2 * dents[1]
+
+
+def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
+    from fem.collapse import Opening
+
+    monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
+    ladder = [r for _, r in pipeline.solve_unit(units_of(CUP, forces="[0.2, 3, 4]")[0])]
+    assert not isinstance(ladder[0], CaseFailure)
+    assert "the wall collapsed: its opposite sides meet at" in ladder[1].message
+    assert "the last good force is 0.2 N" in ladder[1].message
+    assert ladder[2].message.startswith("not tried")
