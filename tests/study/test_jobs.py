@@ -19,6 +19,20 @@ ONE = {
     "box-poses": (),
     "flask-mesh": ("candidates.stations_mm=[30]", "candidates.angles_deg=[0]"),
 }
+COARSE_WALL = (
+    "accuracy.wall_around_mm=4",
+    "accuracy.wall_along_mm=6",
+    "accuracy.wall_coarse_mm=12",
+    "accuracy.meshes=1",
+)
+# The same of the scenes with thin walls, and the dents that their largest force may leave [mm].
+WALLED = {
+    "bottle": (("candidates.stations_mm=[112]", "candidates.angles_deg=[0]", "load.normal_force_n=[1, 8]"), (1.2, 1.6)),
+    "cup": (("candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]"), (1.0, 4.0)),
+    "fig5-candidate": ((), (0.2, 0.5)),
+    "fig7-force-study": (("load.normal_force_n=[1, 4]",), (0.2, 0.6)),
+    "snap-in": (("load.normal_force_n=[1, 2]",), (0.7, 1.0)),
+}
 
 
 @pytest.mark.parametrize("name", JOBS)
@@ -65,6 +79,27 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
         assert (result.map("quality", "curved") <= result.map("quality", "flat") * (1 + 1e-9)).all()
         assert result.checks("force_balance").max() < 1e-8
         assert result.checks("min_det_f").min() > 0
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("name", WALLED)
+def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
+    path, (overrides, dents) = shared_path / f"{name}.hdf", WALLED[name]
+    words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]
+    code, output, errors = once(run, name, path, *COARSE, *words)
+    assert (code, errors) == (0, ""), output
+    assert ", 0 failed, 0 missing" in output
+    with open_result(path) as result:
+        assert (result.status == DONE).all()
+        dent = 1e3 * result.map("dent")
+        assert (np.diff(dent, axis=-1) > 0).all()  # every newton more dents the wall deeper
+        assert dents[0] < dent.max() < dents[1]
+        assert (result.map("wall_stress") > 0).all()
+        assert result.checks("force_balance").max() < 1e-8
+        if name == "fig5-candidate":
+            wrenches = result.read("wrenches/wrench")
+            assert wrenches.shape == (1, 1, 2, 3, 500, 3)  # candidate, force, finger, friction model, motion, component
+            assert np.isfinite(wrenches).all()
 
 
 @pytest.mark.launches
