@@ -76,7 +76,7 @@ def test_the_level_follows_the_dent_and_says_so():
         levels.append(result.effects["object"])
         assert np.isfinite(result.values.get("maps/dent", 0.0))
     names, indicators, reasons = zip(*levels, strict=True)
-    assert names == ("rigid", "linear_shell", "nonlinear_shell")
+    assert names == ("rigid", "linear shell", "nonlinear shell")
     assert indicators == tuple(sorted(indicators))
     assert indicators[1] <= wall.SMALL_DENT < indicators[2]
     assert "below" in REASONS[reasons[0]]
