@@ -17,6 +17,7 @@ FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
 WALK_STEPS = 60  # of the sheet, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step of a walk, where that is bounded
+MOST_FAILURES = 20  # of the steps of one walk
 FIRST_TRIES = 12
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
 
@@ -129,7 +130,7 @@ class Stepping:
 
         The forces on the way are appended to ``forces``.
         """
-        problem = self.problem
+        problem, failures = self.problem, 0
         step, low = min(0.02 * self.thickness, longest), (x, problem.sheet_force(x))
         shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
         for _ in range(WALK_STEPS):
@@ -143,8 +144,8 @@ class Stepping:
                     forces.append(high[1])
                 low, step = high, min(1.5 * step, longest)
             except ConvergenceError as error:
-                step *= 0.5
-                if step < shortest:
+                step, failures = 0.5 * step, failures + 1
+                if step < shortest or failures > MOST_FAILURES:
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
         raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
 

@@ -123,3 +123,16 @@ def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
     x, _, fell = grip._level(None, 0.0, 6.0, np.inf, Work())
     assert x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
     assert fell
+
+
+def test_steps_that_keep_failing_end_the_walk():
+    steps = stepping()
+
+    def solve(x, tolerance, iterations=None):
+        raise ConvergenceError("no luck")
+
+    steps.solver.solve = solve
+    work = Work()
+    with pytest.raises(ConvergenceError, match="stuck at 0 N of 1 N: no luck"):
+        steps.walk(np.zeros(1), 1.0, work, 0.5 * MM)
+    assert work.cuts < 12
