@@ -61,8 +61,9 @@ class Cells:
         i = np.searchsorted(edges(self.stations[order], self.along), x[:, 2]) - 1
         inside = (i >= 0) & (i < len(order))
         phi = np.arctan2(x[:, 1], x[:, 0])
-        apart = np.abs((phi[:, None] - self.angles + 0.5 * self.period) % self.period - 0.5 * self.period)
-        j = apart.argmin(axis=1)
+        known, first = self._different()
+        apart = np.abs((phi[:, None] - known + 0.5 * self.period) % self.period - 0.5 * self.period)
+        j = first[apart.argmin(axis=1)]
         if self._narrow:
             beside = np.hypot(x[:, 0], x[:, 1]) * np.sin(np.minimum(apart[:, 0], 0.5 * math.pi))
             inside &= beside <= 0.5 * self.across
@@ -72,9 +73,14 @@ class Cells:
     def _narrow(self) -> bool:
         return self.symmetry != 0 and len(self.angles) == 1
 
+    def _different(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rising angles within one period that are no images of others, and the first candidate angle of each."""
+        share, first = np.unique(np.round(self.angles / self.period % 1.0, 9) % 1.0, return_index=True)
+        return share * self.period, first
+
     def _between(self) -> np.ndarray:
         """Angles halfway between neighbours, round the period."""
-        known = np.unique(np.round(self.angles % self.period, 12))
+        known, _ = self._different()
         if len(known) < 2:
             return np.empty(0)
         return 0.5 * (known + np.append(known[1:], known[0] + self.period))

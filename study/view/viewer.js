@@ -258,6 +258,7 @@ function rebuild() {
 
 function drawBody() {
   const panel = get("body"), pen = panel.getContext("2d"), limit = here().limit, ratio = window.devicePixelRatio || 1;
+  panel.hidden = !limit;
   panel.width = panel.clientWidth * ratio;
   panel.height = panel.clientHeight * ratio;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -365,7 +366,11 @@ function controls() {
   get("quantity").append(...told.quantities.map((q) => option(q.name, q.label)));
   get("pressure").style.background = gradient(told.colours.pressure);
   get("force").addEventListener("input", (e) => set({ force: Number(e.target.value) }));
-  get("candidate").addEventListener("change", (e) => set({ candidate: Number(e.target.value) }));
+  get("candidate").addEventListener("change", (e) => {
+    state.candidate = Number(e.target.value);
+    frontView();
+    rebuild();
+  });
   get("quantity").addEventListener("change", (e) => set({ quantity: e.target.value }));
   get("motion").addEventListener("change", (e) => set({ motion: e.target.value }));
   const grey = told.poses ? "Balls: where the fingers of a pose first touch." : "Light grey: no candidate there.";

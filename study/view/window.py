@@ -206,7 +206,7 @@ def draw_limits(plotter: Any, data: Data, index: tuple[int, ...]) -> None:
     plotter.add_mesh(
         mesh, color="#9cc0e0", show_edges=True, edge_color="#54728c", line_width=0.5, name="limits", **LIGHT
     )
-    axes = 1.3 * np.array([[-np.eye(3)[k], np.eye(3)[k]] for k in range(3)])
+    axes = 1.45 * np.array([[-np.eye(3)[k], np.eye(3)[k]] for k in range(3)])
     plotter.add_mesh(_lines(axes), color=CROSS, line_width=2, name="limit lines")
     names = [f"{n} {r:.3g} {u}" for n, u, r in zip(("f_x", "f_y", "tau_z"), ("N", "N", "N mm"), reach, strict=True)]
     plotter.add_point_labels(axes[:, 1] * 1.05, names, font_size=15, text_color=CROSS, shape=None, show_points=False,

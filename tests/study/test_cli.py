@@ -71,7 +71,7 @@ def test_every_command_has_an_example(capsys):
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
     assert all(meaning in text for meaning in MEANING.values())
-    for command in ("check", "plan", "run", "status", "show", "report", "schema", "doctor"):
+    for command in ("check", "plan", "run", "status", "show", "report", "view", "schema", "doctor"):
         assert command in text
         assert main([command, "--help"]) == 0
         assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in capsys.readouterr().out

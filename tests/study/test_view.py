@@ -1,0 +1,453 @@
+"""The three-dimensional views: which triangle belongs to which candidate, where pads stand, and what a reader sees."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+import shutil
+import subprocess
+import threading
+import urllib.error
+import urllib.request
+from html import unescape
+
+import matplotlib
+import numpy as np
+import pytest
+
+from fem.objects import Box, EllipticCylinder
+from study.cli import main
+from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
+from study.report.data import Data
+from study.store import open_result
+from study.view import colours, command, limits
+from study.view.model import quantity_of, view_of
+from study.view.pads import corners_of, pads
+from study.view.page import page, payload
+from study.view.server import server
+from study.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals
+from study.view.wall import Wall, between
+from study.wall_quantities import ALONG, AROUND
+from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
+
+CHROMIUM = shutil.which("chromium")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory, comm):
+    path = make(tmp_path_factory.mktemp("view") / "thing.hdf") if comm.rank == 0 else None
+    return comm.bcast(path)
+
+
+@pytest.fixture
+def shown(file):
+    """The view of the file and its best case."""
+    with open_result(file) as result:
+        yield view_of(Data(result), None, (None, None), None)
+
+
+# --- the surface -----------------------------------------------------------------------------------------------------
+
+
+def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
+    corners = with_normals(*EllipticCylinder(0.03, 0.02, 0.1).surface())
+    whole = areas(corners).sum()
+    for normal, offset in (((0, 0, 1.0), 0.0123), ((0.6, 0.8, 0), 0.004), ((0, 1.0, 0), 0.0)):
+        corners = cut(corners, np.array(normal), offset)
+        d = corners[..., :3] @ normal - offset
+        assert not ((d.min(axis=1) < -1e-9) & (d.max(axis=1) > 1e-9)).any()
+    assert areas(corners).sum() == pytest.approx(whole, rel=1e-12)
+
+
+def test_a_cut_through_a_corner_makes_two_triangles():
+    corners = np.zeros((1, 3, 6))
+    corners[0, :, :2] = (0, 0), (1, 1), (1, -1)
+    pieces = cut(corners, np.array([0, 1.0, 0]), 0.0)
+    assert len(pieces) == 2
+    assert areas(pieces) == pytest.approx(0.5)
+
+
+def test_normals_follow_a_cylinder_and_stay_sharp_at_a_box():
+    corners = with_normals(*EllipticCylinder(0.02, 0.02, 0.1).surface())
+    x, n = corners[..., :3].reshape(-1, 3), corners[..., 3:].reshape(-1, 3)
+    radial = x[:, :2] / np.linalg.norm(x[:, :2], axis=1, keepdims=True)
+    assert np.einsum("ki,ki->k", n[:, :2], radial).min() > 0.999
+    sharp = with_normals(*Box(np.array([0.02, 0.03, 0.04]), 0.0).surface())[..., 3:]
+    assert np.sort(np.abs(sharp), axis=-1)[..., :2].max() < 1e-12
+
+
+def test_each_candidate_owns_its_band_under_both_fingers():
+    cells = Cells(np.array([0.03, -0.01, 0.01]), np.radians([0, 90]), 2, 0.05, 0.022)
+    corners, cell = coloured(*EllipticCylinder(0.03, 0.03, 0.2).surface(), cells)
+    area = areas(corners)
+    ring = 2 * math.pi * 0.03 * 0.02
+    for candidate in range(6):
+        assert area[cell == candidate].sum() == pytest.approx(ring / 2, rel=2e-3)
+    z = corners[..., 2].mean(axis=1)
+    assert cell[np.argmin(z)] == NOBODY
+    assert set(cell[np.abs(z - 0.03) < 0.009]) == {0, 1}  # station 0 is the highest, in the order of the scene
+    first = corners[cell == 0][..., :2].mean(axis=1)
+    assert (np.abs(first[:, 0]) > np.abs(first[:, 1]) - 1e-9).all()
+    assert first[:, 0].min() < -0.02
+    assert first[:, 0].max() > 0.02
+
+
+@pytest.mark.parametrize(("symmetry", "share"), [(1, 3 / 8), (2, 3 / 8), (4, 1 / 2), (0, 3 / 8)])
+def test_cells_repeat_as_the_object_does(symmetry, share):
+    """Angles 0, 45 and 90 degrees repeat after 180, where 0 has 22.5 + 45 of them, or after 90, where 90 is 0 again."""
+    cells = Cells(np.array([0.0]), np.radians([0, 45, 90]), symmetry, 0.05, 0.022)
+    phi = np.radians(np.linspace(0, 360, 7200, endpoint=False) + 0.0123)
+    at = cells.at(np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1))
+    assert (at == 0).mean() == pytest.approx(share, abs=1e-3)
+    assert (at == 1).mean() == pytest.approx(1 / 2 if symmetry == 4 else 1 / 4, abs=1e-3)
+
+
+def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
+    phi = np.radians(np.arange(0, 360, 0.1))
+    x = 0.03 * np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+    alone = Cells(np.array([0.0]), np.array([0.0]), 2, 0.05, 0.02).at(x)
+    assert (alone == 0).mean() == pytest.approx(2 * math.asin(1 / 3) / math.pi, abs=2e-3)
+    assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
+
+
+def test_crosses_lie_outside_the_surface_before_both_fingers():
+    cells = Cells(np.array([0.0]), np.radians([0, 90]), 2, 0.05, 0.022)
+    corners, cell = coloured(*EllipticCylinder(0.03, 0.03, 0.2).surface(), cells)
+    lines = crosses(corners, cell, [1], cells.angles)
+    assert lines.shape == (4, 2, 3)
+    assert np.sort(np.sign(lines[..., 1].mean(axis=1))).tolist() == [-1, -1, 1, 1]
+    assert np.hypot(lines[..., 0], lines[..., 1]).min() >= 0.03 - 1e-9
+
+
+# --- the wall --------------------------------------------------------------------------------------------------------
+
+
+def test_values_between_the_places_of_a_wall_are_bilinear_and_close_round_the_axis():
+    i, j = np.meshgrid(np.arange(AROUND), np.arange(ALONG), indexing="ij")
+    grid = np.stack([np.cos(2 * np.pi * i / AROUND), 1.0 * j, 0.0 * j], axis=-1)
+    assert between(grid, np.array([3.0, 3.5]), np.array([7.25, ALONG - 1.0]))[:, 1] == pytest.approx([7.25, ALONG - 1])
+    one, other = between(grid, np.array([AROUND - 0.5, -0.5]), np.array([0.0, 0.0]))[:, 0]
+    assert one == other == pytest.approx(0.5 * (1 + math.cos(2 * math.pi / AROUND)))
+
+
+def test_a_wall_moves_with_the_grid_that_begins_at_finger_one():
+    u = np.zeros((AROUND, ALONG, 3))
+    u[0] = (-1e-3, 0, 0)  # under finger 1
+    wall = Wall(np.array([12.0, 0.0, np.nan]), np.array([5.0, 5.0, 5.0]))
+    moved = wall.moved(u, angle=math.pi / 2)
+    assert moved[0] == pytest.approx([-1e-3, 0, 0])  # a quarter of the way round
+    assert not moved[1:].any()
+
+
+# --- pads ------------------------------------------------------------------------------------------------------------
+
+
+def test_corners_of_a_straight_grid_are_those_of_its_faces():
+    x, y = np.meshgrid(np.arange(4) + 0.5, 2 * np.arange(3) + 1.0, indexing="ij")
+    corners = corners_of(np.stack([x, y], axis=-1))
+    assert corners[..., 0] == pytest.approx(np.broadcast_to(np.arange(5.0)[:, None], (5, 4)))
+    assert corners[..., 1] == pytest.approx(np.broadcast_to(2.0 * np.arange(4), (5, 4)))
+
+
+def test_pads_stand_where_the_file_says(shown):
+    view, index = shown
+    assert index == (1, 0, 1)
+    one, two = pads(view.data, view.gripper, index)
+    assert one.front[..., 0] == pytest.approx(np.full((5, 5), 0.025))
+    assert two.front[..., 0] == pytest.approx(np.full((5, 5), -0.025))
+    assert np.ptp(one.front.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
+    assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - TRAVEL))
+    assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, TRAVEL - SIZE[2]))
+    assert one.sides().shape == (17, 4, 3)
+    area = 0.5 * np.linalg.norm(
+        np.cross(*np.diff(one.quads()[:, [0, 2, 1, 3]].reshape(-1, 2, 2, 3), axis=2)[:, :, 0].swapaxes(0, 1)), axis=1
+    )
+    assert area == pytest.approx(one.area.ravel())
+
+
+def test_arrows_add_up_to_the_friction_of_the_whole(shown):
+    """Flat front, slip along x: every force along x, mu left out; a turn about the middle gives no net force."""
+    view, index = shown
+    pad = pads(view.data, view.gripper, index)[0]
+    places, forces = pad.arrows("x")
+    assert len(places) == pad.loaded.sum() == 4
+    load = 5 * PRESSURE * SIZE[0] * SIZE[1] / 16
+    assert forces == pytest.approx(np.broadcast_to(load * pad.frame[0], (4, 3)))
+    assert pad.arrows("y")[1].sum(axis=0) @ pad.frame[1] == pytest.approx(4 * load)
+    places, forces = pad.arrows("turn")
+    assert np.abs(forces.sum(axis=0)).max() < 1e-12
+    arms = np.linalg.norm(places - pad.origin, axis=1)
+    assert (np.cross(places - pad.origin, forces) @ pad.frame[2]) == pytest.approx(arms * load)
+
+
+def test_no_pads_are_invented(file, tmp_path, shown):
+    view, _ = shown
+    assert pads(view.data, view.gripper, FAILED) == []
+    assert pads(view.data, view.gripper, (0, 0, 1)) == []
+    assert pads(view.data, None, (1, 0, 1)) == []
+    with open_result(make(tmp_path / "bare.hdf", patches=False)) as result:
+        bare, index = view_of(Data(result), 2, (None, None), 5)
+        one = pads(bare.data, bare.gripper, index)[0]
+        assert one.pressure is None
+        assert one.front.shape == (2, 2, 3)
+        assert len(one.arrows("x")[0]) == 0
+
+
+# --- choosing a case -------------------------------------------------------------------------------------------------
+
+
+def test_a_case_is_chosen_by_number_place_or_score(shown):
+    data = shown[0].data
+    chosen = {
+        (None, None, None, 1.0): (1, 0, 0),
+        (4, None, None, 4.0): (2, 0, 1),
+        (None, 0.019, None, None): (2, 0, 1),  # the better angle there
+        (None, 0.019, 1.5, None): (2, 1, 1),
+        (None, -0.02, 0.0, None): (0, 0, 1),  # also what is not solved
+    }
+    for (candidate, station, angle, force), index in chosen.items():
+        assert view_of(data, candidate, (station, angle), force)[1] == index
+    with pytest.raises(StudyError, match=r"found 6, expected 0 to 5") as refused:
+        view_of(data, 6, (None, None), None)
+    assert refused.value.code == USAGE
+    with pytest.raises(StudyError, match=r"expected one of quality, e_n"):
+        quantity_of(data, "beauty")
+
+
+def test_the_words_name_the_case_and_say_why_it_failed(shown):
+    view, index = shown
+    words = view.words(index, "quality")
+    assert words[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
+    assert f"grasp quality: {quality(index):.3g}" in words
+    assert view.words(FAILED, "quality")[-1] == "failed: no </script> convergence"
+    assert view.words((0, 0, 1), "quality")[-1] == "not solved yet"
+
+
+def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
+    scene = re.sub(
+        r"shape = .*?length_mm = 100", 'shape = "mesh"\nmesh = "/nowhere/thing.stl"\nunit = "mm"', SCENE, flags=re.S
+    )
+    with open_result(make(tmp_path / "m.hdf", scene=scene)) as result:
+        view, _ = view_of(Data(result), None, (None, None), None)
+        assert not len(view.surface[0])
+        assert "thing.stl" in view.note
+
+
+def test_limit_surface_has_the_reach_of_its_ellipsoid(shown):
+    view, index = shown
+    body = limits.limit_body(view.data, index)
+    reach = np.abs(body.points.reshape(-1, 3)).max(axis=0)
+    assert reach == pytest.approx([0.8 * 5, 0.7 * 5, 0.01 * 5e3], rel=1e-12)
+    assert limits.limit_body(view.data, FAILED) is None
+    assert limits.quads().max() == body.points[..., 0].size - 1
+
+
+@pytest.mark.parametrize("name", ["quality", "e_n", "pressure", "dent", "wall_stress"])
+def test_colours_are_those_of_the_report(name):
+    from study.pictures import COLOURS
+
+    rgb = np.array([[int(h[k : k + 2], 16) for k in (1, 3, 5)] for h in colours.table(name)])
+    assert np.abs(rgb - 255 * matplotlib.colormaps[COLOURS[name]](np.linspace(0, 1, 256))[:, :3]).max() < 12
+
+
+# --- the page --------------------------------------------------------------------------------------------------------
+
+
+def unpacked(told, number, kind):
+    return np.frombuffer(base64.b64decode(told["packs"][number]), kind)
+
+
+def test_the_page_holds_every_solved_case(shown):
+    view, index = shown
+    told = payload(view, index, "quality", "x")
+    assert set(told["cases"]) == {f"{k} {c}" for k in (0, 1) for c in range(6)} - {"1 5", "1 0"}
+    assert told["remarks"] == {"1 5": "failed: no </script> convergence"}
+    assert told["state"] == [[1] * 6, [0, 1, 1, 1, 1, 2]]
+    assert list(told["surface"]["crosses"]) == [5]
+    assert told["quantities"][0]["values"][1][2] == pytest.approx(quality(index))
+    assert told["quantities"][0]["values"][1][5] is None
+    pad = told["cases"]["1 2"]["pads"][0]
+    front = unpacked(told, pad["front"]["pack"], "<i2").reshape(5, 5, 3) * pad["front"]["step"]
+    own = pads(view.data, view.gripper, index)[0]
+    assert front == pytest.approx(1e3 * own.own(own.front), abs=1e-3)
+    pressure = unpacked(told, pad["pressure"]["pack"], "<i2") * pad["pressure"]["step"]
+    assert pressure == pytest.approx(1e-3 * own.pressure.ravel(), rel=1e-4)
+    fronts = {case["pads"][f]["front"]["pack"] for case in told["cases"].values() for f in (0, 1)}
+    assert len(fronts) == 1  # equal fronts are packed once
+    cell = unpacked(told, told["surface"]["cell"], "<i4")
+    assert (cell == view.surface[1]).all()
+
+
+def test_the_page_is_well_formed_and_needs_nothing(shown):
+    html = page(*shown, "quality", "turn")
+    assert "/*DATA*/" not in html
+    assert "/*SCRIPT*/" not in html
+    assert not re.search(r"""(?:src|href)=["'](?!data:)|https?://""", html)
+    text = re.search(r'id="data">(.*?)</script>', html, re.S)[1]
+    assert json.loads(text)["title"] == "<b>thing</b>"
+    assert json.loads(text)["start"] == {"candidate": 2, "force": 1, "quantity": "quality", "motion": "turn"}
+    assert html.count("</script>") == 2
+
+
+def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeypatch):
+    monkeypatch.setattr("study.view.page.MOST", 0)
+    told = payload(*shown, "quality", "x")
+    assert list(told["cases"]) == ["1 2"]
+    assert told["notes"] == ["pads of the 9 worst cases are left out, or the page would be too large"]
+
+
+def test_the_page_is_served_on_loopback_to_its_own_name_only():
+    with server("<p>grün</p>") as running:
+        host, port = running.server_address
+        assert host == "127.0.0.1"
+        threading.Thread(target=running.serve_forever, args=(0.01,), daemon=True).start()
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5) as answer:
+            assert answer.read().decode() == "<p>grün</p>"
+        for path, name in (("/etc/passwd", f"127.0.0.1:{port}"), ("/", "elsewhere.example:80")):
+            asked = urllib.request.Request(f"http://127.0.0.1:{port}{path}", headers={"Host": name})
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(asked, timeout=5)
+        with pytest.raises(StudyError, match=f"--port: {port} cannot be had"):
+            server("", port)
+        running.shutdown()
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
+    for words, code in (
+        (["--screenshot", tmp_path / "a.jpg"], USAGE),
+        (["--vtkhdf", file], USAGE),
+        (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
+        (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
+    ):
+        assert main(["view", str(file), *map(str, words)]) == code
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 4
+    assert all(line.startswith("error: ") for line in errors)
+    assert main(["view", str(tmp_path / "no.hdf"), "--html", str(tmp_path / "a.html")]) == OTHER_FILE
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_the_page(file, tmp_path, capsys):
+    assert main(["view", str(file), "--station", "20", "--force", "1", "--html", str(tmp_path / "a.html")]) == 0
+    assert capsys.readouterr().out == f"written: {tmp_path / 'a.html'}\n"
+    assert '"start":{"candidate":4,"force":0' in (tmp_path / "a.html").read_text()
+    assert [p.name for p in tmp_path.iterdir()] == ["a.html"]
+
+
+@pytest.mark.parametrize(
+    ("display", "port", "shows"), [("", None, "page"), (":0", None, "window"), (":0", "0", "page")]
+)
+def test_without_a_screen_the_page_is_served(file, monkeypatch, display, port, shows):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.setenv(name, display)
+    if not display and command.sys.platform in ("darwin", "win32"):
+        pytest.skip("these always have a screen")
+    used = []
+    monkeypatch.setattr("study.view.server.serve", lambda html, port: used.append("page"))
+    monkeypatch.setattr("study.view.window.show_window", lambda *_: used.append("window"))
+    assert main(["view", str(file), *([] if port is None else ["--port", port])]) == 0
+    assert used == [shows]
+
+
+# --- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def reddest(image):
+    """Share of pixels in strong colours."""
+    low, high = image.min(axis=-1).astype(int), image.max(axis=-1).astype(int)
+    return float(((high - low) > 60).mean())
+
+
+@pytest.mark.long
+def test_a_picture_without_a_screen_shows_object_pads_and_limit_surface(file, tmp_path, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    found = {}
+    for name, words in {"best": [], "failed": ["--candidate", "5"], "turn": ["--motion", "turn"]}.items():
+        path = tmp_path / f"{name}.png"
+        assert main(["view", str(file), "--screenshot", str(path), *words]) == 0
+        found[name] = (matplotlib.image.imread(path)[..., :3] * 255).astype(np.uint8)
+    assert found["best"].shape == (900, 1400, 3)
+    assert 0.05 < reddest(found["best"][:, :930]) < 0.6
+    below = found["best"][450:, 930:], found["failed"][450:, 930:]  # limit surface; a failed case has none
+    assert (below[0].min(axis=-1) < 200).mean() > 4 * (below[1].min(axis=-1) < 200).mean()
+    changed = (found["best"] != found["turn"]).any(axis=-1)
+    assert 1e-4 < changed[:, :930].mean() < 0.05  # the darts, and nothing else on the left
+
+
+@pytest.mark.long
+def test_slider_and_click_of_the_window_change_the_case(shown):
+    from study.view import window
+
+    view, index = shown
+    plotter = window.plot(view, index, "quality", "x", off_screen=True)
+    try:
+        controls = window.add_controls(plotter, view, index, "quality", "x")
+        before = plotter.screenshot(return_img=True)
+        controls["force"](1.2)
+        assert controls["state"]["at"] == (1, 0, 0)
+        assert (before != plotter.screenshot(return_img=True)).any()
+        mesh = plotter.renderers[0].actors["object"].mapper.dataset
+
+        class Picker:
+            def GetDataSet(self):
+                return mesh
+
+            def GetCellId(self):
+                return int(np.flatnonzero(mesh.cell_data["candidate"] == 5)[0])
+
+        controls["pick"](None, Picker())
+        assert controls["state"]["at"] == (2, 1, 0)
+    finally:
+        plotter.close()
+
+
+ACTS = """
+<script>
+const told_ = {errors: window.errors_}, eye = () => document.getElementById("scene").toDataURL();
+const before = eye(), force = document.getElementById("force");
+force.value = 0; force.dispatchEvent(new Event("input"));
+told_.slid = eye() !== before; told_.newton = document.getElementById("newton").textContent;
+const box = document.getElementById("scene").getBoundingClientRect();
+state.yaw = 0; state.pitch = 0; state.candidate = 1;
+const at = {clientX: box.left + box.width / 2, clientY: box.top + box.height / 2};
+pick(at); told_.picked = state.candidate;
+state.force = 1; set({candidate: 5}); told_.remark = document.getElementById("remark").textContent;
+told_.hash = location.hash; told_.title = document.title; told_.gl = !!gl && gl.getError();
+const pixel = new Uint8Array(4); paint(); gl.readPixels(2, 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+told_.corner = [...pixel]; told_.rows = document.querySelectorAll("#values tr").length;
+document.body.replaceChildren(); document.body.textContent = "RESULT" + JSON.stringify(told_) + "END";
+</script>
+"""
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_the_page_works_in_a_browser(file, tmp_path):
+    assert main(["view", str(file), "--html", str(tmp_path / "view.html")]) == 0
+    listen = "<script>window.errors_ = []; addEventListener('error', (e) => errors_.push(e.message));</script>"
+    html = (tmp_path / "view.html").read_text().replace("<body>", f"<body>{listen}")
+    html = html.replace("</body>", f"{ACTS}</body>")
+    (tmp_path / "acts.html").write_text(html)
+    words = "--headless=new --no-sandbox --disable-dev-shm-usage --use-gl=angle --use-angle=swiftshader"
+    words += f" --enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir={tmp_path}/profile --dump-dom"
+    done = subprocess.run([CHROMIUM, *words.split(), f"file://{tmp_path}/acts.html"], capture_output=True, text=True,
+                          timeout=120, check=False)  # fmt: skip
+    answer = re.search("RESULT(.*)END", done.stdout)
+    assert answer, done.stderr[-2000:]
+    told = json.loads(unescape(answer[1]))
+    assert "CONSOLE" not in done.stderr, done.stderr
+    assert told["errors"] == []
+    assert told["gl"] == 0
+    assert told["slid"]
+    assert told["newton"] == "1 N"
+    assert told["picked"] == 2  # seen from +x, the middle of the object belongs to station 1, angle 0
+    assert told["remark"] == "failed: no </script> convergence"
+    assert told["hash"] == "#force=1&candidate=5&quantity=quality&motion=x"
+    assert told["corner"] == [255, 255, 255, 255]
+    assert told["rows"] == 0

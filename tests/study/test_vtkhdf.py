@@ -1,0 +1,109 @@
+"""VTKHDF files: what is written is what VTK reads, cell by cell and step by step."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+import pyvista as pv
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
+from study.cli import main
+from study.exits import CANNOT_WRITE, StudyError
+from study.vtkhdf import write_grid
+from tests.study.view_files import GRID, PRESSURE, SIZE, make, quality
+
+RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]
+
+
+def steps_of(path):
+    """The grid at every step, as VTK reads it."""
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    information = reader.GetOutputInformation(0)
+    for time in information.Get(reader.GetExecutive().TIME_STEPS()):
+        reader.UpdateTimeStep(time)
+        yield time, pv.wrap(reader.GetOutputDataObject(0)).copy()
+
+
+@pytest.fixture
+def squares():
+    """Two quadrilaterals in a row."""
+    x, y = np.meshgrid(np.arange(3.0), np.arange(2.0), indexing="ij")
+    return np.stack([x, y, x * y], axis=-1).reshape(-1, 3), np.array([[0, 2, 3, 1], [2, 4, 5, 3]])
+
+
+def test_a_grid_comes_back_as_it_was(tmp_path, squares):
+    points, cells = squares
+    path = tmp_path / "a.vtkhdf"
+    on_cells = {"e_n, 5 N": np.array([0.25, np.nan]), "candidate": np.array([3, -1]), "normal": np.eye(3)[:2]}
+    write_grid(path, points, cells, on_cells, {"displacement": 2 * points}, about="two squares")
+    grid = pv.read(path)
+    assert isinstance(grid, pv.UnstructuredGrid)
+    assert np.array_equal(grid.points, points)
+    assert np.array_equal(grid.cells.reshape(2, 5), np.column_stack([[4, 4], cells]))
+    assert (grid.celltypes == pv.CellType.QUAD).all()
+    for name, values in on_cells.items():
+        assert np.array_equal(grid.cell_data[name], values, equal_nan=name.startswith("e_n"))
+    assert np.array_equal(grid.point_data["displacement"], 2 * points)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.vtkhdf"]
+
+
+def test_steps_share_their_cells_and_have_their_own_points_and_values(tmp_path, squares):
+    points, cells = squares
+    path, forces = tmp_path / "a.hdf", [0.5, 2.0, 7.0]
+    moved = points + np.array([[[0, 0, f]] for f in forces])
+    values = {"p": np.array([[f, 10 * f] for f in forces]), "n": np.array([[[f, 0, 0]] * 2 for f in forces])}
+    write_grid(path, moved, cells, values, {"q": moved[..., 2]}, steps=forces)
+    found = list(steps_of(path))
+    assert [time for time, _ in found] == forces
+    for k, (force, grid) in enumerate(found):
+        assert np.array_equal(grid.points, moved[k])
+        assert grid.n_cells == 2
+        assert grid["p"].tolist() == [force, 10 * force]
+        assert grid["n"][:, 0].tolist() == [force, force]
+        assert np.array_equal(grid["q"], moved[k][:, 2])
+    assert isinstance(pv.read(path), pv.UnstructuredGrid)
+
+
+def test_old_readers_are_served(tmp_path, squares):
+    """HDF5 1.10 and VTK 9.1 read superblock 0, version 1.0 and a type of fixed length."""
+    write_grid(tmp_path / "a.hdf", *squares, {})
+    with h5py.File(tmp_path / "a.hdf") as file:
+        assert file["VTKHDF"].attrs["Version"].tolist() == [1, 0]
+        assert file["VTKHDF"].attrs.get_id("Type").dtype == np.dtype("S16")
+        assert file.id.get_create_plist().get_version()[0] == 0
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path, squares):
+    with pytest.raises(StudyError, match=r"cannot be written") as refused:
+        write_grid(tmp_path / "no" / "a.hdf", *squares, {})
+    assert refused.value.code == CANNOT_WRITE
+
+
+def test_object_and_pads_of_a_result_file(tmp_path, capsys):
+    result = make(tmp_path / "thing.hdf")
+    path = tmp_path / "seen.vtkhdf"
+    assert main(["view", str(result), "--candidate", "2", "--vtkhdf", str(path)]) == 0
+    written = [line.removeprefix("written: ") for line in capsys.readouterr().out.splitlines()]
+    assert written == [str(path), *(str(tmp_path / f"seen-pads{more}.vtkhdf") for more in ("", "-over-force"))]
+    body = pv.read(path)
+    cell, status = body["candidate"], body["status, 5 N"]
+    for candidate, index in enumerate(np.ndindex(3, 2)):
+        own = body["quality, 5 N"][cell == candidate]
+        expected = quality((*index, 1)) if status[cell == candidate][0] == 1 else np.nan
+        assert own == pytest.approx(np.full(len(own), expected), nan_ok=True)
+    assert np.isnan(body["quality, 1 N"][cell == -1]).all()
+    assert (status[cell == 5] == 2).all()
+    assert body.compute_cell_sizes()["Area"][cell >= 0].sum() == pytest.approx(
+        0.06 * 0.14181, rel=1e-3
+    )  # ring x height
+    pads = pv.read(written[1])
+    assert pads.n_cells == 2 * np.prod(GRID)
+    assert pads["area"].sum() == pytest.approx(2 * SIZE[0] * SIZE[1])
+    assert pads.compute_cell_sizes()["Area"] == pytest.approx(pads["area"], rel=1e-6)
+    assert np.abs(pads.cell_centers().points[pads["finger"] == 1, 0]) == pytest.approx(np.full(16, 0.025))
+    forces, grids = zip(*steps_of(written[2]), strict=True)
+    assert forces == (1.0, 5.0)
+    assert [grid["pressure"].max() for grid in grids] == pytest.approx([PRESSURE, 5 * PRESSURE])

@@ -1,0 +1,104 @@
+"""Result files of known geometry for the tests of the three-dimensional views."""
+
+from __future__ import annotations
+
+import math
+
+import h5py
+import numpy as np
+
+from study.layout import Header, Layout
+from study.reading import StoredAxis
+from study.record import blank, crc32, record
+from study.result import CaseResult
+from study.store import create
+
+GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
+SIZE = (0.05, 0.022, 0.015)
+TRAVEL, PRESSURE = 2e-3, 3e4
+SCENE = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[gripper]
+elements = [2, 2, 2]
+[candidates]
+stations_mm = [-20, 0, 20]
+angles_deg = [0, 90]
+[load]
+normal_force_n = [1, 5]
+"""
+FAILED = (2, 1, 1)
+
+
+def axes():
+    return (
+        StoredAxis("station", np.array([-0.02, 0.0, 0.02]), "m", "station"),
+        StoredAxis("angle", np.array([0, math.pi / 2]), "rad", "angle"),
+        StoredAxis("normal_force", np.array([1.0, 5.0]), "N", "normal force"),
+    )
+
+
+def quality(index):
+    """Largest at station 1, angle 0; grows with the force."""
+    return (1.0 + index[-1]) / (1 + abs(index[0] - 1) + 2 * index[1])
+
+
+def poses(index):
+    """Rotation and origin of both pads at first touch, as for a candidate of roll 0."""
+    station, angle = axes()[0].values[index[0]], axes()[1].values[index[1]]
+    reach = (0.025, 0.02)[index[1]]
+    found = []
+    for sign in (-1.0, 1.0):
+        z = sign * np.array([math.cos(angle), math.sin(angle), 0.0])
+        x = np.array([0.0, 0.0, 1.0])
+        found.append((np.stack([x, np.cross(z, x), z], axis=1), np.array([0, 0, station]) - reach * z))
+    return found
+
+
+def patch(force):
+    """A flat front of equal faces, of which those in the middle carry a pressure."""
+    u, v = ((np.arange(n) + 0.5) / n - 0.5 for n in GRID)
+    x, y = np.meshgrid(u * SIZE[0], v * SIZE[1], indexing="ij")
+    centroid = np.stack([x, y, np.zeros(GRID)], axis=-1).reshape(-1, 3)
+    middle = (np.abs(x) < 0.25 * SIZE[0]) & (np.abs(y) < 0.25 * SIZE[1])
+    one = {
+        "pressure": np.where(middle, PRESSURE * force, 0.0).ravel(),
+        "area": np.full(len(centroid), SIZE[0] * SIZE[1] / len(centroid)),
+        "centroid": centroid,
+        "normal": np.broadcast_to([0.0, 0.0, 1.0], centroid.shape),
+    }
+    return {name: np.stack([values, values]) for name, values in one.items()}
+
+
+def solved(layout, index):
+    force = layout.axes[-1].values[index[-1]]
+    three = np.array([1.0, 1.1, 0.9])
+    values = {"maps/quality": quality(index) * three, "maps/e_n": 0.01 * three, "maps/flags": 0.0}
+    rotation, origin = (np.stack(found) for found in zip(*poses(index), strict=True))
+    values |= {"fingers/pose_rotation": rotation, "fingers/pose_origin": origin, "fingers/travel": np.full(2, TRAVEL)}
+    values |= {"fingers/frame_origin": np.zeros((2, 3)), "fingers/frame_axes": np.stack([np.eye(3)] * 2)}
+    values |= {"fingers/S": np.full(2, force), "fingers/f_x_max": 0.8 * force * np.stack([three] * 2)}
+    values |= {"fingers/tau_z_max": 0.01 * force * np.stack([three] * 2)}
+    values |= {"limit_surface/semi_axes": np.broadcast_to([0.8, 0.7, 0.01], (2, 3, 3)) * three[:, None]}
+    values |= {"limit_surface/rho": np.full(2, 0.05)}
+    return CaseResult(values, patch(force), "")
+
+
+def make(path, scene=SCENE, patches=True, failed=FAILED):
+    """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
+    layout = Layout(axes(), int(np.prod(GRID)), patches=patches)
+    create(path, layout, Header("d" * 64, scene, "<b>thing</b>", "scene.toml"))
+    with h5py.File(path, "r+") as file:
+        for row, index in enumerate(np.ndindex(layout.shape)):
+            if index == (0, 0, 1):
+                continue
+            lost = index == failed
+            values = blank(layout, "no </script> convergence") if lost else record(layout, solved(layout, index))
+            for column, value in zip(layout.columns, values, strict=True):
+                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
+            file["study/status/crc"][index] = crc32(layout, row, values)
+            file["study/status/code"][index] = 2 if lost else 1
+    return path
