@@ -73,7 +73,7 @@ class Scene(Section):
 
     @property
     def axis_symmetry(self) -> int:
-        """Order of the symmetry about the axis of all that a case depends on: the object, and its weight if it has one."""
+        """Order of the symmetry about the axis of all that a case depends on: the object, and its weight if any."""
         if self.object.mass is None:
             return self.object.axis_symmetry
         sideways = (*self.task.weight_direction[:2], *(self.task.centre_of_mass or (0.0, 0.0))[:2])
