@@ -29,7 +29,8 @@ LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
 MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
-FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed
+FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
+DENTED = 0.95  # and after nodal gaps have found none either
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
@@ -130,18 +131,22 @@ class Grip:
             try:
                 x, slope, fell = self._level(x, reached, force, compliance, work)
             except ConvergenceError as error:
-                self._refuse_folded(error)
+                self._refuse_folded(error, DENTED if self.fallback is None else FOLDED)
                 if self.fallback is None:
                     raise
                 self._fall_back()
-                x, slope, fell = self._level(x, reached, force, compliance, work)
+                try:
+                    x, slope, fell = self._level(x, reached, force, compliance, work)
+                except ConvergenceError as again:
+                    self._refuse_folded(again, DENTED)
+                    raise
             reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
 
-    def _refuse_folded(self, error: ConvergenceError) -> None:
+    def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found."""
         left, force = self.opening.last
-        if left < FOLDED:
+        if left < limit:
             raise CheckError(
                 f"the wall collapsed: beyond {force:.3g} N, where its opposite sides have come {1 - left:.0%} of their "
                 f"distance closer, no equilibrium was found ({error})"
@@ -149,11 +154,11 @@ class Grip:
 
     def _fall_back(self) -> None:
         """Go on with nodal gaps."""
-        seconds = self.solver.seconds
+        seconds, last = self.solver.seconds, self.opening.last
         self.solver.destroy()
         self.problem, self.fallback = self.fallback(), None
         self._set_up()
-        self.solver.seconds = seconds
+        self.solver.seconds, self.opening.last = seconds, last
 
     def _level(
         self, x: FloatArray | None, reached: float, force: float, compliance: float, work: Work
