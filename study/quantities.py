@@ -18,9 +18,9 @@ MAPS = (
              " the ellipsoids from three motions, as in the paper.", by_model=True),
     Quantity("quality_fitted", "", "grasp quality, fitted limit surface", "As quality, with the limit surface that the"
              " scene's [limit_surface] asks for, fitted to the wrenches of many motions.", by_model=True),
-    Quantity("quality_graspit", "", "grasp quality, linearised as in GraspIt!", "As quality, with the hull of"
-             " GraspIt!'s 20 points on each ellipsoid instead of the ellipsoid: about half of quality, in nearly the same ratio"
-             " everywhere.", by_model=True, needs="graspit"),
+    Quantity("quality_graspit", "", "grasp quality, linearised as in GraspIt!", "As quality, with the hull of the 20"
+             " points that GraspIt! takes on each ellipsoid instead of the ellipsoid: about half of quality, in nearly"
+             " the same ratio everywhere.", by_model=True, needs="graspit"),
     Quantity("misfit", "", "misfit of the fitted limit surface", "Mean of |P^(-1/degree) - 1|, the relative error of"
              " the radius of the fitted limit surface P = 1, over 377 motions that it was not fitted to; curved model,"
              " of the finger where it is larger."),

@@ -32,7 +32,8 @@ def derived(scene: Scene) -> list[Derived]:
         found.append(Derived(
             HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the dent passes"
             " object.allowed_dent_mm or the stress the yield strength, between the solved forces by straight lines, and"
-            " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that.", over,
+            " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that. NaN where the"
+            " wall was taken as rigid.", over,
         ))  # fmt: skip
     return found
 
@@ -52,16 +53,15 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
 
 
 def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
+    """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
     from study.wall import thin_body
 
-    solved = np.where(done.any(axis=-1), np.where(done, forces, 0.0).max(axis=-1), np.nan)
     limits = {"dent": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
-    bounds = [solved]
-    for name, most in limits.items():
-        if most is not None:
-            values = np.where(done, writer.read(f"{name}/{name}"), np.nan)
-            bounds.append(first_crossing(forces, values, most))
-    return np.fmin.reduce(bounds)
+    values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
+    known = np.isfinite(values["dent"])
+    solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
+    crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
+    return np.fmin.reduce([solved, *crossings])
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:

@@ -179,3 +179,13 @@ def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     assert "the wall collapsed: its opposite sides meet at" in ladder[1].message
     assert "the last good force is 0.2 N" in ladder[1].message
     assert ladder[2].message.startswith("not tried")
+
+
+def test_a_grasp_whose_support_bears_more_than_friction_slides_out():
+    funnel = CUP.replace("[[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]", "[[0, 14], [10, 15], [60, 35], [70, 39]]")
+    for mu, slides in ((0.8, False), (0.1, True)):
+        result = solved(funnel, f"friction.mu={mu}", forces="[1]")[0]
+        # the funnel's slope of 0.4 pushes it along its axis with about that share of both normal forces
+        assert 0.2 < result.values["maps/support_force"] / 2.0 < 0.5
+        assert bool(result.values["maps/flags"] & wall.SLIDES_OUT) == slides
+        assert ("slides out" in result.message) == slides
