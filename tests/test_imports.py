@@ -18,7 +18,7 @@ ALLOWED = {
     "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
     "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
-PICTURES = {"fem/mesh_object.py", "study/view/window.py"}
+PICTURES = {"fem/mesh_object.py", "study/view/window.py", "study/view/drawing.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "h5py": {"study/store.py", "study/vtkhdf.py"},

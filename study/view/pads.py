@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from study.layout import DONE
 from study.report.data import Data
 
+LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]
 LOADED = 1e-9  # share of the largest pressure below which a face counts as free
 MOTIONS = ("x", "y", "turn")
 ARROWS = 14  # along the longer side of a pad, at most
@@ -23,6 +24,7 @@ class Pad:
     order of the front's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
     faces. The latter are None where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
     ``origin (3,)`` is its origin; ``rotation`` and ``position`` place the pad's own frame.
+    Fronts overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
     """
 
     front: np.ndarray
@@ -31,6 +33,7 @@ class Pad:
     origin: np.ndarray
     rotation: np.ndarray
     position: np.ndarray
+    lift: float = LIFT
     centroid: np.ndarray | None = None
     normal: np.ndarray | None = None
     pressure: np.ndarray | None = None
@@ -112,8 +115,11 @@ def pads(data: Data, gripper: Any, index: tuple[int, ...]) -> list[Pad]:
     patch = data.result.patch(data.result.row(*index)) if data.result.layout.patches else {}
     if any(not np.isfinite(values).all() for values in patch.values()):
         patch = {}
+    overlap = data.values("checks/overlap")
+    deepest = np.zeros(2) if overlap is None else np.nan_to_num(overlap[index])
     of_finger = [[s[index][finger] for s in stored if s is not None] for finger in (0, 1)]
-    return [_pad(gripper, {n: v[finger] for n, v in patch.items()}, *of_finger[finger]) for finger in (0, 1)]
+    found = [_pad(gripper, {n: v[finger] for n, v in patch.items()}, *of_finger[finger]) for finger in (0, 1)]
+    return [replace(pad, lift=LIFT + float(depth)) for pad, depth in zip(found, deepest, strict=True)]
 
 
 def faces_of(gripper: Any, count: int) -> tuple[int, int] | None:

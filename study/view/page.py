@@ -50,6 +50,7 @@ def payload(view: View, index: tuple[int, ...], quantity: str, motion: str) -> d
         "start": {"candidate": view.candidate(index), "force": index[-1], "quantity": quantity, "motion": motion},
         "forces": [float(f) for f in data.forces],
         "candidates": [data.place(view.index(c, 0)) for c in range(view.candidates)],
+        "first": int(np.ravel_multi_index(view.index(0, 0)[:-1], data.shape[:-1])),
         "poses": data.by_poses,
         "state": [view.state(k).tolist() for k in range(len(data.forces))],
         "remarks": _remarks(view),
@@ -172,6 +173,7 @@ def _pad(pad: Pad, packs: _Packs) -> dict[str, Any]:
         "frame": pad.frame.round(6).ravel().tolist(),
         "origin": (1e3 * pad.origin).round(6).tolist(),
         "back": (1e3 * pad.own(pad.back)).round(6).ravel().tolist(),
+        "lift": round(1e3 * pad.lift, 6),
         "grid": list(pad.front.shape[:2]),
         "front": packs.scaled((1e3 * pad.own(pad.front)).round(6)),
     }

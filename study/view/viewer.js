@@ -114,7 +114,7 @@ function drawPads(solid, glass, lines) {
 
 function drawFront(solid, pad, pressure, top, at, approach) {
   const [rows, columns] = pad.grid, step = Math.ceil(Math.max(rows - 1, columns - 1) / 14), first = Math.floor(step / 2);
-  const lift = scale(approach, -0.2), axes = [0, 3, 6].map((k) => pad.frame.slice(k, k + 3)), forces = [];
+  const lift = scale(approach, -pad.lift), axes = [0, 3, 6].map((k) => pad.frame.slice(k, k + 3)), forces = [];
   let strongest = 0;
   for (let i = 0; i < rows - 1; i++) for (let j = 0; j < columns - 1; j++) {
     const p = pressure[i * (columns - 1) + j];
@@ -132,7 +132,7 @@ function drawFront(solid, pad, pressure, top, at, approach) {
     strongest = Math.max(strongest, load);
     forces.push([middle, unit(v), load]);
   }
-  for (const [from, e, load] of forces) dart(solid, add(from, lift, 3), e, (6 * load) / strongest);
+  for (const [from, e, load] of forces) dart(solid, add(from, add(lift, approach, -0.4)), e, (6 * load) / strongest);
 }
 
 function dart(solid, from, e, length) {
@@ -362,7 +362,7 @@ function controls() {
   get("title").textContent = document.title = told.title;
   get("force").max = told.forces.length - 1;
   const option = (value, text) => Object.assign(document.createElement("option"), { value, textContent: text });
-  get("candidate").append(...told.candidates.map((name, c) => option(c, `${c}: ${name}`)));
+  get("candidate").append(...told.candidates.map((name, c) => option(c, `${told.first + c}: ${name}`)));
   get("quantity").append(...told.quantities.map((q) => option(q.name, q.label)));
   get("pressure").style.background = gradient(told.colours.pressure);
   get("force").addEventListener("input", (e) => set({ force: Number(e.target.value) }));
