@@ -19,6 +19,7 @@ import pytest
 
 from fem.objects import Box, EllipticCylinder
 from study.cli import main
+from study.commands import RANK
 from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from study.report.data import Data
 from study.store import open_result
@@ -39,6 +40,13 @@ CHROMIUM = shutil.which("chromium")
 def file(tmp_path_factory, comm):
     path = make(tmp_path_factory.mktemp("view") / "thing.hdf") if comm.rank == 0 else None
     return comm.bcast(path)
+
+
+@pytest.fixture(autouse=True)
+def _speak_on_every_rank(monkeypatch):
+    """Each rank that runs these tests looks at its own answers."""
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture
