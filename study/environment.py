@@ -14,7 +14,7 @@ from pathlib import Path
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ROOT = Path(__file__).parent.parent
-COMPILED = ("fem", "friction", "lsfit")  # packages with loops that numba compiles
+COMPILED = ("fem", "friction", "lsfit", "scoring")  # packages with loops that numba compiles
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
 
