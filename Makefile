@@ -25,6 +25,8 @@ endif
 # It also refuses to start more ranks than there are cores; asked for when the recipe runs, after the set-up.
 AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
+# Two tests at a time; without pytest-xdist leave it out.
+TWO = -n 2 --dist worksteal
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
@@ -32,7 +34,7 @@ RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
-	@echo 'make test       the tests, first on one process and then on $(RANKS) ranks'
+	@echo 'make test       the tests, first without MPI and then on $(RANKS) ranks'
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make lint       ruff'
@@ -54,11 +56,12 @@ map: setup
 	@if [ -f $(PICTURE) ]; then echo 'picture  $(PICTURE)'; fi
 
 test: setup
-	$(LIMIT) 12m $(BIN)/python -m pytest -q
+	$(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO)
 	$(LIMIT) 12m ./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no -m "not long and not launches"
 
 test-long: setup
-	$(BIN)/python -m pytest -q -m long --durations 10
+	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10
+	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
 
 bench: setup
 	$(BIN)/python -m tests.benchmark.run $(PARTS)
