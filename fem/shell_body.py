@@ -120,7 +120,7 @@ def body_mesh(
     for plane, wanted, found in zip("xy", symmetry, surface.symmetric, strict=True):
         if wanted and not found:
             raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
-    s = along(surface, size, open_bottom, open_top, hole)
+    s = along(surface, size, open_bottom, open_top, hole, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
     number, first = _numbers(surface, theta, s, whole=not any(symmetry))
     t, p = theta[first[0]], s[first[1]]
@@ -128,6 +128,14 @@ def body_mesh(
     X = surface.jets(t, p)[:, 0] - D
     planes = _planes(symmetry, theta, number, len(X))
     return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, tuple(symmetry), planes)
+
+
+def _steps(surface: OuterSurface, thickness: float | Sequence[tuple[float, float]]) -> list[float]:
+    """Places on the wall where a given thickness changes its slope: the mesh needs a line there."""
+    if np.ndim(thickness) == 0:
+        return []
+    z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
+    return [surface.station(height) for height, _ in thickness if z.min() < height < z.max()]
 
 
 def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:

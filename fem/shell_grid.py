@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -72,8 +73,10 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
     return places
 
 
-def along(surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, hole: float) -> FloatArray:
-    """Grid lines along the outline, with one on the edge of each flat lid."""
+def along(
+    surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, hole: float, marks: Sequence[float] = ()
+) -> FloatArray:
+    """Grid lines along the outline, with one on the edge of each flat lid and at each of the places ``marks``."""
     begin = surface.wall[0] if open_bottom else hole
     end = surface.wall[1] if open_top else surface.end
     if hole > 0 and not (hole < surface.flat[0] and not open_bottom):
@@ -84,7 +87,7 @@ def along(surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bo
     bend = np.abs(surface.curve.curvature(x))
     h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
     h = limited(x, h, size.growth)
-    edges = [edge for edge in surface.flat if begin + 1e-9 < edge < end - 1e-9]
+    edges = sorted({edge for edge in (*surface.flat, *marks) if begin + 1e-9 < edge < end - 1e-9})
     runs = [divided(a, b, x, h) for a, b in pairwise([begin, *edges, end])]
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
