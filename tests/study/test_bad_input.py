@@ -144,7 +144,7 @@ def test_a_mesh_that_is_no_object_is_found_by_check(once, folder, what, capsys):
     refused((code, told.out, told.err), folder, 2, *WRONG_MESHES[what][1])
 
 
-@pytest.mark.parametrize(("what", "ranks"), [("open", 2), pytest.param("a bottle of 200 m", 0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("what", "ranks"), [("open", 0), pytest.param("a bottle of 200 m", 2, marks=pytest.mark.long)])
 def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(once, folder, what, ranks):
     once(spoil_mesh, folder, what)
     refused(once(lambda: run(ranks, folder, scene="mesh.toml")), folder, 2, *WRONG_MESHES[what][1])

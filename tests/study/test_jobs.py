@@ -63,8 +63,13 @@ def test_the_smoke_scene_runs_as_it_is(once, shared_path):
         assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=1e-8)
 
 
+def quick(names, *chosen):
+    """Parameters of which all but the chosen ones are left to the long tests."""
+    return [name if name in chosen else pytest.param(name, marks=pytest.mark.long) for name in names]
+
+
 @pytest.mark.launches
-@pytest.mark.parametrize("name", ONE)
+@pytest.mark.parametrize("name", quick(ONE, "bottle-rigid"))
 def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
     path = shared_path / f"{name}.hdf"
     overrides = [word for value in ONE[name] for word in ("--set", value)]
@@ -82,7 +87,7 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
 
 
 @pytest.mark.launches
-@pytest.mark.parametrize("name", WALLED)
+@pytest.mark.parametrize("name", quick(WALLED, "bottle"))
 def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
     path, (overrides, dents) = shared_path / f"{name}.hdf", WALLED[name]
     words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]

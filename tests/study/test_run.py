@@ -70,6 +70,7 @@ def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on
     assert once(differing, path, uninterrupted) == []
 
 
+@pytest.mark.long
 def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once, shared_path, uninterrupted):
     path = shared_path / "orphans.hdf"
 
@@ -91,6 +92,7 @@ def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once,
     assert once(differing, path, uninterrupted) == []
 
 
+@pytest.mark.long
 def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, uninterrupted):
     path = shared_path / "deadly.hdf"
     assert once(study, 0, path, "--kill", 13)[0] == -signal.SIGKILL
@@ -173,7 +175,7 @@ def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, sha
 def test_another_scene_is_refused(once, shared_path, whole, uninterrupted):
     path = shared_path / "scene.hdf"
     once(shutil.copy, whole, path)
-    code, _, errors = once(study, 2, path, "--digest", "other")
+    code, _, errors = once(study, 0, path, "--digest", "other")
     assert code == 3
     assert errors.count("error: ") == 1
     assert "made from another scene" in errors
@@ -237,7 +239,7 @@ def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(once, shared_p
     assert errors.count("error: ") == 1
 
 
-@pytest.mark.parametrize("how", ["full", "limit"])
+@pytest.mark.parametrize("how", [pytest.param("full", marks=pytest.mark.long), "limit"])
 def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path, how):
     def squeeze():
         if how == "limit":
