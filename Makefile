@@ -25,8 +25,8 @@ endif
 # It also refuses to start more ranks than there are cores; asked for when the recipe runs, after the set-up.
 AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
-# Two tests at a time; without pytest-xdist leave it out.
-TWO = -n 2 --dist worksteal
+# Two files of tests at a time; leave it out where pytest-xdist is missing.
+TWO = -n 2 --dist loadfile
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
