@@ -206,12 +206,13 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     path = shared_path / "busy.hdf"
 
     def second():
-        process = start(2, path, "--delay", 0.2)
+        process = start(2, path, "--delay", 1.0)
         wait_for(lambda: begun(path))
         told = subprocess.run(
             [sys.executable, "-m", "study", "status", str(path)], cwd=ROOT, capture_output=True, text=True
         )
         answer = study(0, path)
+        process.send_signal(signal.SIGUSR1)
         process.communicate(timeout=60)
         return told, answer, process.returncode
 
@@ -221,7 +222,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     assert " missing" in told.stdout
     assert code == 4
     assert "in use by another run (host " in errors
-    assert first == 0
+    assert first == 75
 
 
 @pytest.mark.parametrize(
