@@ -33,10 +33,18 @@ def scene_text(scene: Any, file: str) -> str:
         "effects": ", ".join(levels),
         "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
+        "each case": limits_text(scene.run),
         "results": scene.output.file,
     }
     told = [f"warning: {text}" for text in warnings(scene)]
     return "\n".join([f"{file}: no errors", *aligned(rows), *told])
+
+
+def limits_text(run: Any) -> str:
+    """What a single case may take before it fails."""
+    limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
+    memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
+    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that, and the others go on"
 
 
 def has_wall(shape: Any) -> bool:

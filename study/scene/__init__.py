@@ -20,7 +20,7 @@ from study.scene.gripper_checks import warnings
 from study.scene.limit_surface_checks import LEVELS
 from study.scene.loading import checked_sections, flat, known_keys, with_overrides
 from study.scene.score_sections import LimitSurface, Score, Task
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
 from study.scene.shapes import Mesh, Object, Section
 from study.scene.sweeps import NOT_SWEPT, put, sweep_findings
 from study.scene.text import key_lines, parse_toml, read_text, toml_text
@@ -43,6 +43,7 @@ class Scene(Section):
     effects: Effects = Field(default_factory=Effects)
     accuracy: Accuracy = Field(default_factory=Accuracy)
     output: Output = Field(default_factory=Output)
+    run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
     sweep: dict[str, tuple[Option, ...]] = Field(
         default_factory=dict,
@@ -99,9 +100,9 @@ class Scene(Section):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what changes results, the mesh's bytes included; names, paths and ``[output]`` do not count."""
+        """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[output]``, ``[run]``."""
         data = self.effective()
-        del data["output"], data["object"]["name"]
+        del data["output"], data["run"], data["object"]["name"]
         if isinstance(self.object, Mesh):
             data["object"]["mesh"] = _file_digest(self.object.mesh)
         if self.candidates.poses:

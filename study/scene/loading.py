@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, closest, shown
 from study.scene.score_sections import LimitSurface, Score, Task
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output
+from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
 from study.scene.sentences import model_findings
 from study.scene.shapes import SHAPES, Section
 
@@ -27,6 +27,7 @@ SECTIONS: dict[str, type[Section]] = {
     "effects": Effects,
     "accuracy": Accuracy,
     "output": Output,
+    "run": Run,
 }
 NAMES = ("object", *SECTIONS, "petsc", "sweep")
 REQUIRED = ("object", "candidates", "load")

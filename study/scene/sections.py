@@ -190,3 +190,15 @@ class Output(Section):
         "results/scene.hdf", min_length=1, max_length=1000, description="result file, below the working directory"
     )
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
+
+
+class Run(Section):
+    """How a run guards itself against single cases. Results do not depend on it: it may differ from run to run."""
+
+    time_limit_s: float = Field(
+        600.0, ge=0.1, le=1e6, description="time after which a case is given up as failed, and the others go on"
+    )
+    memory_gb: Annotated[float, Field(ge=0.1, le=1e5)] | Literal["auto", "none"] = Field(
+        "auto",
+        description="memory that the cases of a rank may take; auto is the rank's share of what is free",
+    )

@@ -26,6 +26,7 @@ NOT_SWEPT = {
     "limit_surface.samples": "it changes the size of the results",
     "limit_surface.wrench_samples": "it changes the size of the results",
 }
+NO_RESULT = ("output", "run")  # sections that change no result
 MOST_GRID_POINTS = 10_000
 
 
@@ -92,8 +93,8 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
             yield Finding(path, f.found, f.expected, f.remedy)
         else:
             yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
-    elif key in NOT_SWEPT or section == "output" or _is_list(model, name):
-        remedy = NOT_SWEPT.get(key, "remove it" if section == "output" else "sweep a key that takes one value")
+    elif key in NOT_SWEPT or section in NO_RESULT or _is_list(model, name):
+        remedy = NOT_SWEPT.get(key, "remove it" if section in NO_RESULT else "sweep a key that takes one value")
         yield Finding(path, "a key that cannot be swept", scalar, remedy)
     elif key == "gripper.element" and _table(data, "output").get("patches", "all") == "all":
         expected = "the same number of faces in every case"

@@ -112,6 +112,8 @@ WRONG_LINES = [
     ("[sweep]\n'gripper.elements' = [1]", 12, 'sweep."gripper.elements"', "cannot be swept", "single value",
      "one value"),
     ("[sweep]\n'accuracy.meshes' = [1, 2]", 12, 'sweep."accuracy.meshes"', "cannot be swept", "single", "which maps"),
+    ("[sweep]\n'run.memory_gb' = [1, 2]", 12, 'sweep."run.memory_gb"', "cannot be swept", "single", "remove it"),
+    ("[run]\ntime_limit_s = 0", 12, "run.time_limit_s", "0", ">= 0.1", "default is 600"),
     ("[sweep]\n'friction.my' = [1, 2]", 12, 'sweep."friction.my"', "unknown key", "single value",
      "did you mean `friction.mu`?"),
     ("[sweep]\n'friction.mu' = 1", 12, 'sweep."friction.mu"', "1", "a list", "= [...]"),
@@ -446,7 +448,8 @@ def test_qualities_of_the_curvature_study_are_scaled_by_the_same_lengths_for_eve
 
 def test_the_digest_follows_results_only():
     digest = parse_scene(BALL).digest
-    same = ["object.name=x", "output.file=x.hdf", "output.patches=none", "petsc.contact_snes_monitor=true"]
+    same = ["object.name=x", "output.file=x.hdf", "output.patches=none", "petsc.contact_snes_monitor=true",
+            "run.time_limit_s=5", "run.memory_gb=none"]  # fmt: skip
     assert parse_scene(BALL, "other.toml", same).digest == digest
     spelled = parse_scene(BALL.replace("30", "30.0") + "# comment\n[friction]\nmu = 0.8\n")
     assert spelled.digest == digest
