@@ -9,7 +9,7 @@ bracketed. Every state that is passed on has converged and has been checked.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -96,6 +96,9 @@ class Press:
         PETSc options with the prefix ``contact_``.
     fallback : Pad, optional
         The same pad with nodal gaps, for forces at which ``pad`` has no solution.
+    settings : Settings
+    solver_of : callable
+        Problem and options to its solver.
     """
 
     pad: Pad
@@ -103,6 +106,7 @@ class Press:
     options: dict[str, Any] = field(default_factory=dict)
     fallback: Pad | None = None
     settings: Settings = field(default_factory=Settings)
+    solver_of: Callable[[ContactProblem, dict[str, Any]], Any] = NonlinearSolver
 
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
@@ -111,7 +115,7 @@ class Press:
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
         self.problem = ContactProblem(self.pad, self.gap)
-        self.solver = NonlinearSolver(self.problem, self.options)
+        self.solver = self.solver_of(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
             self._bed.force_scale,
