@@ -27,7 +27,9 @@ OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS = 6  # loaded ones, below which it is coarse too
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as study.quantities says
-REMARKS = {
+UNSTABLE = 131072
+REMARKS = {  # the most important ones first: a stored message has an end
+    UNSTABLE: "foam lost ellipticity, strains may localise",
     SLIPS: "the line between the contacts leaves a friction cone, the grasp slips",
     NOT_ANTIPODAL: "contacts more than 5 deg from antipodal",
     PADS_MEET: "the pads run into each other beside the object, which is not simulated",
@@ -39,7 +41,6 @@ REMARKS = {
     32768: "the wall yields, the dent stays",
     65536: "a limit surface could not be fitted, the ellipsoid from three motions stands in",
 }
-UNSTABLE = "foam lost ellipticity, strains may localise"
 
 
 class Contact:
@@ -125,13 +126,13 @@ def flags(contacts: Sequence[Contact], mu: float, score_flag: int) -> int:
     found |= NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL)
     found |= SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
     found |= PADS_MEET * (one.free_front + two.free_front > between_fronts)
+    found |= UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
     for c in contacts:
         coarse = c.state.checks.overlap > OVERLAP * c.state.travel or c.loaded_elements < FEW_ELEMENTS
         found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * coarse
     return int(found)
 
 
-def remark(flagged: int, contacts: Sequence[Contact]) -> str:
+def remark(flagged: int) -> str:
     """What the reader should know about a valid result, always in the same words, so that remarks can be counted."""
-    unstable = [UNSTABLE] if min(c.state.checks.acoustic for c in contacts) <= 0 else []
-    return "; ".join([text for mask, text in REMARKS.items() if flagged & mask] + unstable)
+    return "; ".join(text for mask, text in REMARKS.items() if flagged & mask)

@@ -179,4 +179,4 @@ def _result(values: dict[str, Any], outcome: Solved, friction: float, effects: d
     values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values | checks, patch, remark(values["maps/flags"], fine), effects)
+    return CaseResult(values | checks, patch, remark(values["maps/flags"]), effects)

@@ -65,7 +65,7 @@ MAPS = (
              " the force fell while the fingers closed, or grew less than half as fast as before on average; 16384 the"
              " pads push the object along its axis with more than friction can hold: it slides out; 32768 the wall's"
              " stress is above its yield strength: the dent stays; 65536 a limit surface could not be fitted, the"
-             " ellipsoid from three motions stands in."),
+             " ellipsoid from three motions stands in; 131072 the foam lost ellipticity: strains may localise."),
     *(Quantity(f"{name}_overestimate{suffix}", "", f"{what}: {model} over curved model",
                f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved"
                f" contact cannot carry ({note}); of the finger where it is largest.")
