@@ -8,11 +8,13 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import IO, Any
+from typing import Any
 
 from study import commands
+from study.completion import add_options as add_completion_options
 from study.environment import keep_compiled_loops, pin_threads
-from study.exits import BUG, DONE, MEANING, USAGE, StudyError
+from study.exits import BUG, DONE, USAGE, StudyError
+from study.help import Parser, Program
 from study.patch.command import add_options as add_patch_options
 from study.view.command import add_options as add_view_options
 
@@ -23,8 +25,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     keep_compiled_loops()
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)
+    parser = program()
+    if not words:
+        parser.print_help()
+        return USAGE
     try:
-        options = _parser().parse_args(words[:cut])
+        options = parser.parse_args(words[:cut])
     except SystemExit as leave:
         return int(leave.code or 0)
     options.petsc = words[cut + 1 :]
@@ -42,23 +48,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BUG
 
 
-class _Parser(argparse.ArgumentParser):
-    """Speaks on the first rank only, whatever started the ranks."""
-
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
-        if commands.first_rank():
-            super()._print_message(message, file)
-
-
-def _parser() -> argparse.ArgumentParser:
-    codes = "\n".join(f"  {code:3d}  {text}" for code, text in MEANING.items())
-    parser = _Parser(
+def program() -> Program:
+    """The parser of the whole command line."""
+    parser = Program(
         prog="softjaw",
-        description="How well a two-finger gripper with soft jaws holds an object, place by place.",
-        epilog=f"exit codes:\n{codes}\n\nexample:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="How well a two-finger gripper with soft jaws holds an object, place by place. "
+        "'softjaw COMMAND --help' explains a command and shows an example.",
+        epilog="example:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
     )
-    listed = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
 
     def add(name: str, command: Any, text: str, example: str) -> argparse.ArgumentParser:
         made = listed.add_parser(
@@ -72,8 +70,8 @@ def _parser() -> argparse.ArgumentParser:
                 "softjaw check jobs/bottle-rigid.toml")  # fmt: skip
     plan = add("plan", commands.plan, "cases, units, disk, memory and time, before anything is spent",
                "softjaw plan jobs/bottle-rigid.toml -n 16")  # fmt: skip
-    run = add("run", commands.run, "solve a scene into a result file; the same command again resumes",
-              "mpirun -n 8 softjaw run jobs/bottle-rigid.toml -o out.hdf -- -contact_snes_monitor")  # fmt: skip
+    run = add("run", commands.run, "solve a scene into a result file; again: go on where it was",
+              "mpirun -n 8 softjaw run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor")  # fmt: skip
     for made in (check, plan, run):
         made.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
         made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
@@ -83,35 +81,39 @@ def _parser() -> argparse.ArgumentParser:
         made.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
     run.add_argument("--retry-failed", action="store_true", help="solve failed cases again")
     status = add("status", commands.status, "what a result file holds so far, also while it grows",
-                 "softjaw status out.hdf")  # fmt: skip
-    show = add("show", commands.show, "the best grasps as a table", "softjaw show out.hdf --force 5 --top 3 --json")
-    report = add("report", commands.report, "one self-contained page with maps, definitions and provenance",
-                 "softjaw report out.hdf -o out.html")  # fmt: skip
+                 "softjaw status results/bottle-rigid.hdf")  # fmt: skip
+    show = add("show", commands.show, "the best grasps as a table",
+               "softjaw show results/bottle-rigid.hdf --force 4 --top 3 --json")  # fmt: skip
+    report = add("report", commands.report, "one self-contained page: maps, definitions, provenance",
+                 "softjaw report results/bottle-rigid.hdf -o results/bottle-rigid.html")  # fmt: skip
     for made in (status, show, report):
         made.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N [N] (default: the highest)")
+    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N [N] (default: the highest, "
+                      "or the highest that some grasp holds and its wall bears)")  # fmt: skip
     show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10)")
-    compare = add("compare", commands.compare, "two maps side by side, with the settings and cases that differ",
-                  "softjaw compare a.hdf b.hdf --quantity e_n")  # fmt: skip
+    compare = add("compare", commands.compare, "two maps side by side: settings and cases that differ",
+                  "softjaw compare results/soft.hdf results/stiff.hdf --quantity e_n")  # fmt: skip
     compare.add_argument("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b")
     compare.add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)")
     compare.add_argument("--top", type=_count, default=10, metavar="K", help="largest differences, 0: all (default 10)")
-    export = add("export", commands.export, "every case for planners: maps, frames, poses, limit surfaces",
-                 "softjaw export out.hdf --csv -o out.csv")  # fmt: skip
+    export = add("export", commands.export, "every case for planners: maps, frames, limit surfaces",
+                 "softjaw export results/smoke.hdf --csv -o results/smoke.csv")  # fmt: skip
     export.add_argument("file", metavar="FILE", help="result file (.hdf)")
     export.add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
     for made in (compare, export):
         made.add_argument("--model", choices=("curved", "flat", "projected"), default="curved",
                           help="friction model (default curved)")  # fmt: skip
-    for made in (show, compare, export):
+    for made in (status, show, compare, export):
         form = made.add_mutually_exclusive_group(required=made is export)
         form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
         form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
     report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
-    add_patch_options(add("patch", commands.patch, "friction, limit surface and score of a pressure field from "
-                          "elsewhere", "softjaw patch jobs/cylinder-pressure.csv --distance 60"))  # fmt: skip
-    add_view_options(add("view", commands.view, "the map on the object in three dimensions: window, page, picture, or "
-                         "files for ParaView", "softjaw view out.hdf --force 5 --screenshot view.png"))  # fmt: skip
+    add_patch_options(add("patch", commands.patch, "judge a pressure field from elsewhere: friction, score",
+                          "softjaw patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60"))  # fmt: skip
+    add_view_options(add("view", commands.view, "the map on the object in 3-D: window, page, picture",
+                         "softjaw view results/bottle-rigid.hdf --force 4 --screenshot view.png"))  # fmt: skip
+    add_completion_options(add("completion", commands.completion, "a script by which the shell completes words",
+                               "softjaw completion bash > softjaw.bash"))  # fmt: skip
     add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
     add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
     return parser

@@ -58,11 +58,22 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
     return [f"petsc.{name}={value}" for name, value in found]
 
 
+def _catalogue(options: Namespace) -> bool:
+    from study.catalogue.model import is_catalogue
+
+    return is_catalogue(Path(options.scene))
+
+
 def check(options: Namespace) -> int:
-    """Find every error of a scene, or say what would be run."""
+    """Find every error of a scene or of a catalogue, or say what would be run."""
     from study.build import check_object
     from study.overview import scene_text
 
+    if _catalogue(options):
+        from study.catalogue.run import check_text
+
+        print(check_text(Path(options.scene), options.overrides))
+        return DONE
     scene = _scene(options)
     check_object(scene)
     print(scene_text(scene, options.scene))
@@ -74,6 +85,8 @@ def plan(options: Namespace) -> int:
     from study.build import warnings
     from study.plan import make_plan, plan_text
 
+    if _catalogue(options):
+        raise StudyError(USAGE, f"{options.scene}: is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not")
     scene = _scene(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
@@ -95,22 +108,26 @@ def target(options: Namespace, scene: Any) -> Path:
 
 def status(options: Namespace) -> int:
     """Say what a result file holds so far."""
-    from study.status import status_text
+    from study.columns import terminal_width
+    from study.status import status_csv, status_json, status_text
     from study.store import open_result
 
+    forms = {"json": status_json, "csv": status_csv, None: lambda result: status_text(result, terminal_width())}
     with open_result(options.file) as result:
-        print(status_text(result))
+        print(forms[options.form](result))
     return DONE
 
 
 def show(options: Namespace) -> int:
     """Print the best grasps."""
+    from study.columns import terminal_width
     from study.show import as_csv, as_json, as_text, best
     from study.store import open_result
 
-    form = {"json": as_json, "csv": as_csv, None: as_text}[options.form]
     with open_result(options.file) as result:
-        print(form(best(result, options.force, options.top, whole_lines=form is as_text)))
+        table = best(result, options.force, options.top, whole_lines=options.form is None)
+    forms = {"json": as_json, "csv": as_csv, None: lambda table: as_text(table, terminal_width())}
+    print(forms[options.form](table))
     return DONE
 
 
@@ -170,6 +187,15 @@ def view(options: Namespace) -> int:
     return DONE
 
 
+def completion(options: Namespace) -> int:
+    """Print a script that lets a shell complete the words of this program."""
+    from study.cli import program
+    from study.completion import script
+
+    print(script(program(), options.shell))
+    return DONE
+
+
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
     import json
@@ -209,27 +235,37 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from study.run import Work, on_rank0, run_study
+    from study.run import on_rank0, run_study
+
+    if on_rank0(comm, _catalogue, options):
+        from study.catalogue.run import run_catalogue
+
+        return run_catalogue(options, comm)
 
     def read() -> tuple[Any, Path]:
         scene = _scene(options)
         return scene, target(options, scene)
 
     scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
+    plan = on_rank0(comm, prepare, scene, options)
+    return run_study(plan, work(scene), path, comm, retry_failed=options.retry_failed)
+
+
+def work(scene: Any) -> Any:
+    """How the cases of a scene are solved."""
     from study import derived, pipeline
+    from study.run import Work
     from study.status import summary
 
-    plan = on_rank0(comm, _prepare, scene, options)
-    work = Work(
+    return Work(
         solve_unit=pipeline.solve_unit,
         image=pipeline.image,
         finalise=lambda writer: derived.finalise(writer, scene),
         summary=summary,
     )
-    return run_study(plan, work, path, comm, retry_failed=options.retry_failed)
 
 
-def _prepare(scene: Any, options: Namespace) -> Any:
+def prepare(scene: Any, options: Namespace) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
     from study.build import warnings
     from study.plan import make_plan

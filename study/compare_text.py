@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from study.columns import DISPLAY
 from study.compare import AxisMatch, Comparison
 from study.scene.difference import value_text
-from study.show import DISPLAY
 
 MOST_SETTINGS = 12
 NO_ERRORS = "unknown: no error map; accuracy.meshes = 2 in both scenes gives those of e_n and the friction limits"

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from study.columns import DISPLAY, csv_text, with_unit
 from study.layout import DONE
-from study.ranking import BORNE, FLAGS, OF_FILE, borne_level, judged, ranking
+from study.ranking import BORNE, OF_FILE, borne_level, judged, ranking
+from study.show_text import WINDOW, Columns, alike
+from study.show_text import as_text as as_text
 
-DISPLAY = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / np.pi), "Pa": ("MPa", 1e-6)}  # people read this; programs get SI
 COLUMNS = (  # map, friction model ("" where it has none), unit
     ("quality", "curved", ""),
     ("quality_fitted", "curved", ""),
@@ -29,18 +29,15 @@ SOMETIMES = (  # columns of files that have the map
     ("safety_factor", "curved", ""),
     ("dent", "", "m"),
     ("wall_stress", "", "Pa"),
-    ("e_n_error", "", ""),
 )
-WINDOW = ("force_low", "force_high")  # derived bounds; people see them in one column
-WINDOW_MEANS = "normal forces that hold the object, if its mass is given, and that its wall bears, as far as was solved"
-# names that are too long for a line of text
-HEADS = {"quality_fitted": "fitted", "safety_factor": "safety", "wall_stress": "stress"}
-Columns = tuple[tuple[str, str], ...]  # names and units
 
 
 @dataclass(frozen=True)
 class Table:
-    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows."""
+    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
+
+    An error stands behind the quantity it belongs to, relative unless the column has a unit.
+    """
 
     title: str
     columns: Columns
@@ -65,13 +62,13 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
     named = [("label", "")] if has_poses(result) else []
     head = [(axis.name, axis.units) for axis in result.axes[:-1]]
     maps |= {(name, "N"): bound.ravel() for name, bound in _window(result).items()}
-    titles = (("rank", ""), *head, *maps, ("flags", ""), *named)
+    titles = (("rank", ""), *head, *named, *maps, ("flags", ""))
 
     def row(rank: int, i: int) -> tuple[Any, ...]:
         index = np.unravel_index(i, result.layout.shape[:-1])
         place = [float(axis.values[j]) for axis, j in zip(result.axes[:-1], index, strict=True)]
         values = [float(column[i]) for column in maps.values()]
-        return (rank, *place, *values, int(flags[i]), *([str(labels[i])] * len(named)))
+        return (rank, *place, *([str(labels[i])] * len(named)), *values, int(flags[i]))
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
@@ -98,10 +95,12 @@ def _window(result: Any) -> dict[str, np.ndarray]:
 
 def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
     """Name, unit and values of the columns between the place and the flags."""
-    there = {q.name for q in result.layout.quantities}
+    there = {q.name: q for q in result.layout.quantities}
     for name, model, units in (*COLUMNS, *(column for column in SOMETIMES if column[0] in there)):
         model = result.layout.planar if model == "planar" else model
         yield f"{name}_{model}" if model not in ("", "curved") else name, units, result.map(name, model or None)
+        if (error := there.get(f"{name}_error")) and model in ("", "curved"):
+            yield error.name, error.units, result.map(error.name)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
@@ -109,90 +108,16 @@ def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[
     taken: list[tuple[Any, ...]] = []
     lines = 0
     for row in rows:
-        lines += not (columns and taken and _alike(row, taken[-1], columns))
+        lines += not (columns and taken and alike(row, taken[-1], columns))
         if top and lines > top:
             break
         taken.append(row)
     return taken
 
 
-def as_text(table: Table) -> str:
-    """Aligned columns, lengths in mm and angles in degrees; images of one grasp share a line, flags are words."""
-    if not table.rows:
-        return table.title
-    table = _for_people(table)
-    shown = [DISPLAY.get(units, (units, 1.0)) for _, units in table.columns]
-    names, flags = [name for name, _ in table.columns], 0
-    short = [HEADS.get(name, name) for name in names]
-    head = [f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(short, shown, strict=True)]
-    body: list[list[str]] = []
-    for before, row in zip((None, *table.rows), table.rows, strict=False):
-        cells = _cells(row, table.columns)
-        flags |= row[names.index("flags")]
-        if before is not None and _alike(row, before, table.columns):
-            for name in ("rank", "angle"):
-                body[-1][names.index(name)] += f", {cells[names.index(name)]}"
-        else:
-            body.append(cells)
-    widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
-    lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [head, *body]]
-    legend = [f"{word}: {meaning}" for mask, word, meaning in FLAGS if flags & mask]
-    legend += [f"window: {WINDOW_MEANS}"] * ("window" in names)
-    return "\n".join([table.title, *lines, *legend])
-
-
-def _for_people(table: Table) -> Table:
-    """Both bounds of the window of forces in one column of text."""
-    at = [i for i, (name, _) in enumerate(table.columns) if name in WINDOW]
-    if not at:
-        return table
-
-    def merged(row: tuple[Any, ...], one: Any) -> tuple[Any, ...]:
-        return (*row[: at[0]], one, *row[at[-1] + 1 :])
-
-    names = [table.columns[i][0] for i in at]
-    rows = tuple(merged(row, _window_text(dict(zip(names, (row[i] for i in at), strict=True)))) for row in table.rows)
-    return replace(table, columns=merged(table.columns, ("window", "N")), rows=rows)
-
-
-def _window_text(bounds: dict[str, float]) -> str:
-    """The window of forces as people read it.
-
-    >>> _window_text({"force_low": 0.8, "force_high": 2.5}), _window_text({"force_high": 2.5})
-    ('0.8..2.5', '..2.5')
-    >>> _window_text({"force_low": 3.0, "force_high": 2.5}), _window_text({"force_low": np.nan})
-    ('none', '-')
-    """
-    low, high = (bounds.get(name, np.nan) for name in WINDOW)
-    if np.isnan([*bounds.values()]).all():
-        return "-"
-    if "force_low" in bounds and "force_high" in bounds and not low <= high:
-        return "none"
-    return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high))
-
-
-def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
-    """A row as people read it."""
-    factors = [DISPLAY.get(units, (units, 1.0))[1] for _, units in columns]
-    pairs = zip(row, factors, columns, strict=True)
-    return [_words(value) if name == "flags" else _cell(value, factor) for value, factor, (name, _) in pairs]
-
-
-def _alike(row: tuple[Any, ...], other: tuple[Any, ...], columns: Columns) -> bool:
-    """Whether two grasps differ in their angle only, as far as a line of text tells."""
-    kept = [i for i, (name, _) in enumerate(columns) if name not in ("rank", "angle")]
-    one, two = _cells(row, columns), _cells(other, columns)
-    return all(one[i] == two[i] for i in kept)
-
-
 def has_poses(result: Any) -> bool:
     """Whether the candidates are explicit poses: those are numbered along the axis of stations, and have labels."""
     return not result.axes[-3].units
-
-
-def _words(flags: int) -> str:
-    """Words for the flags of a case, as `FLAGS` explains them."""
-    return ", ".join(word for mask, word, _ in FLAGS if flags & mask)
 
 
 def as_json(table: Table) -> str:
@@ -205,11 +130,9 @@ def as_json(table: Table) -> str:
 
 def as_csv(table: Table) -> str:
     """One line for each grasp, SI units in the header."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{units}]" if units else name for name, units in table.columns])
-    writer.writerows([["" if _plain(v) is None else v for v in row] for row in table.rows])
-    return text.getvalue().rstrip("\n")
+    head = [with_unit(name, units) for name, units in table.columns]
+    # flags as text, as they are; None is an empty cell
+    return csv_text([head, *([None if _plain(v) is None else v for v in row] for row in table.rows)])
 
 
 def place(result: Any, row: int) -> str:
@@ -231,9 +154,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int):
         return value & OF_FILE
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _cell(value: Any, factor: float) -> str:
-    if isinstance(value, float):
-        return "-" if np.isnan(value) else f"{value * factor:.4g}"
-    return str(value)

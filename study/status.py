@@ -2,33 +2,75 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
+from study.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 from study.layout import DONE, FAILED, MISSING
 from study.lock import holder
 from study.progress import duration
-from study.show import as_text, best, place
+from study.show import as_text, best, has_poses, place
 
 MOST_REASONS, MOST_PLACES = 12, 3
 PARTS = ("assembly", "factorisation", "friction", "rest")
+STATES = {MISSING: "missing", DONE: "done", FAILED: "failed"}
 
 
-def status_text(result: Any) -> str:
+def status_text(result: Any, width: int = PAPER) -> str:
     """Answer of ``softjaw status``; the file may be growing meanwhile."""
     runner = holder(result.path)
     missing = int(np.sum(result.status == MISSING))
     state = f"running now: {runner}" if runner else "the same 'softjaw run' goes on from here" if missing else ""
-    return "\n".join([counts(result), *([state] if state else []), *reasons(result), *sessions(result, bool(runner))])
+    told = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
+    return "\n".join([*told, *sessions(result, bool(runner), width)])
+
+
+def status_json(result: Any) -> str:
+    """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
+    status = result.status
+    total = {name: int(np.sum(status == code)) for code, name in STATES.items()}
+    told = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
+    told |= {"cases": int(status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    told |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
+    return json.dumps(told, indent=2)
+
+
+def status_csv(result: Any) -> str:
+    """One line for each case, in the order of the file: state, message and place, SI units in the header."""
+    head = ["row", "state", "message", *(with_unit(axis.name, axis.units) for axis in result.axes)]
+    status, messages = result.status.ravel(), result.messages.ravel()
+    rows = ([row, STATES[int(status[row])], str(messages[row]), *_place(result, row)] for row in range(status.size))
+    return csv_text([head, *rows])
+
+
+def _cases(result: Any, state: int) -> list[dict[str, Any]]:
+    """Cases in one state that have a message."""
+    messages = result.messages.ravel()
+    names = [axis.name for axis in result.axes]
+    found = []
+    for row in map(int, np.flatnonzero((result.status.ravel() == state) & (messages != ""))):
+        label = str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]]) if has_poses(result) else None
+        where = dict(zip(names, _place(result, row), strict=True)) | ({"label": label} if label else {})
+        found.append({"row": row, **where, "message": str(messages[row])})
+    return found
+
+
+def _place(result: Any, row: int) -> list[float]:
+    index = np.unravel_index(row, result.layout.shape)
+    return [float(axis.values[i]) for axis, i in zip(result.axes, index, strict=True)]
 
 
 def summary(result: Any) -> str:
     """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
-    table = [as_text(best(result, whole_lines=True))] if np.any(result.status == DONE) else []
-    return "\n".join([counts(result), *reasons(result), *time_split(result), *table, f"results are in {result.path}"])
+    width = terminal_width()
+    table = [as_text(best(result, whole_lines=True), width)] if np.any(result.status == DONE) else []
+    return "\n".join(
+        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}"]
+    )
 
 
 def counts(result: Any) -> str:
@@ -37,10 +79,10 @@ def counts(result: Any) -> str:
     done, failed = int(np.sum(status == DONE)), int(np.sum(status == FAILED))
     title = f" ({result.title})" if result.title else ""
     missing = status.size - done - failed
-    return f"{result.path}{title}: {done} of {status.size} cases done, {failed} failed, {missing} missing"
+    return f"{result.path}{title}:\n  {done} of {status.size} cases done, {failed} failed, {missing} missing"
 
 
-def reasons(result: Any) -> list[str]:
+def reasons(result: Any, width: int = PAPER) -> list[str]:
     """Messages of failed cases, then notes on solved ones, the most frequent first and with some of their places."""
     status, messages = result.status.ravel(), result.messages.ravel()
     lines = []
@@ -52,11 +94,12 @@ def reasons(result: Any) -> list[str]:
                 where.setdefault(text, []).append(int(row))
         texts = sorted(where, key=lambda text: -len(where[text]))
         for text in texts[:MOST_REASONS]:
-            places = "; ".join(place(result, row) for row in where[text][:MOST_PLACES])
-            more = "; ..." * (len(where[text]) > MOST_PLACES)
-            lines.append(f"  {title} {len(where[text])} x {text} [{places}{more}]")
+            places = [place(result, row) for row in where[text][:MOST_PLACES]]
+            more = len(where[text]) - len(places)
+            lines.append(wrapped(f"{title} {len(where[text])} x {text}", width, "  ", "  "))
+            lines.append(wrapped(f"at {'; '.join(places)}" + f"; and {more} more" * (more > 0), width, "      "))
         if len(texts) > MOST_REASONS:
-            lines.append(f"  {title}: {len(texts) - MOST_REASONS} more messages, in status/message of the file")
+            lines.append(f"  {title}: {len(texts) - MOST_REASONS} more messages; --csv lists every case")
     return lines
 
 
@@ -70,7 +113,7 @@ def time_split(result: Any) -> list[str]:
     return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
 
 
-def sessions(result: Any, running: bool) -> list[str]:
+def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
     """One line for each time the study was started."""
     found: Sequence[dict[str, Any]] = result.sessions
     lines = []
@@ -78,7 +121,8 @@ def sessions(result: Any, running: bool) -> list[str]:
         last = i == len(found) - 1
         reason = s["reason"] if s["stop"] else "running" if last and running else "ended without a word (killed?)"
         wall = _between(s["start"], s["stop"])
-        lines.append(f"  session {i + 1}: {s['start']}, {s['ranks']} ranks on {s['host']}{wall}, {reason}")
+        ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
+        lines.append(wrapped(f"session {i + 1}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
     return lines
 
 

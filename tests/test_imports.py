@@ -16,11 +16,12 @@ ALLOWED = {
     "lsfit": {"lsfit", "clarabel"} | NUMERICS,
     "scoring": {"scoring"} | NUMERICS,
     "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
-    "study": {*OWN, "pydantic", "matplotlib", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
+    "study": {*OWN, "pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
-PICTURES = {"fem/mesh_object.py", "study/view/window.py", "study/view/drawing.py"}
+PICTURES = {"fem/mesh_object.py", "study/view/window.py", "study/view/drawing.py", "study/view/sides.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
+    "shtab": {"study/completion.py"},
     "h5py": {"study/store.py", "study/vtkhdf.py"},
     "pyvista": PICTURES,
     "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import io
 import json
+import shlex
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
 import study
-from study.cli import main
+from study.cli import main, program
 from study.commands import RANK, petsc_overrides
 from study.environment import launch_environment
 from study.exits import MEANING, StudyError
+from study.help import GROUPS
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
 
+PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
+COMMANDS = tuple(PARSERS)
 HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy")
 SCENE = """
 [object]
@@ -61,7 +67,7 @@ def finished(tmp_path_factory, comm):
     return comm.bcast(path)
 
 
-@pytest.mark.parametrize("words", ["", "chek", "check", "plan x.toml -n 0", "show f --json --csv", "show f --top -1"])
+@pytest.mark.parametrize("words", ["chek", "check", "plan x.toml -n 0", "show f --json --csv", "show f --top -1"])
 def test_bad_usage_is_code_2(words, capsys):
     assert main(words.split()) == 2
     assert "error" in capsys.readouterr().err
@@ -70,11 +76,13 @@ def test_bad_usage_is_code_2(words, capsys):
 def test_every_command_has_an_example(capsys):
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
-    assert all(meaning in text for meaning in MEANING.values())
-    for command in ("check", "plan", "run", "status", "show", "report", "view", "schema", "doctor"):
-        assert command in text
+    assert all(f"{code} {meaning}" in " ".join(text.split()) for code, meaning in MEANING.items())
+    for command in COMMANDS:
+        assert f"\n  {command} " in text
         assert main([command, "--help"]) == 0
-        assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in capsys.readouterr().out
+        told = capsys.readouterr().out
+        assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in told
+        assert max(map(len, told.splitlines())) <= 90
 
 
 def test_check_says_what_would_be_run(scene, capsys):
@@ -116,6 +124,69 @@ def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
             petsc_overrides(words)
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [("shwo f.hdf", "show"), ("show f.hdf --fource=3", "--force"), ("check f.toml --sett a=1", "--set")],
+)
+def test_a_slip_of_the_finger_gets_a_suggestion(words, meant, capsys):
+    assert main(words.split()) == 2
+    told = capsys.readouterr()
+    assert f"; did you mean '{meant}'? 'softjaw " in told.err
+    assert told.out == ""
+
+
+def test_no_command_is_answered_with_the_help(capsys):
+    assert main([]) == 2
+    bare = capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert bare == capsys.readouterr().out
+    assert len(bare.splitlines()) <= 50
+    assert max(map(len, bare.splitlines())) <= 80
+
+
+def test_groups_of_the_help_name_each_command_once():
+    grouped = [name for _, names in GROUPS for name in names]
+    assert len(set(grouped)) == len(grouped)
+    assert set(grouped) >= set(COMMANDS)
+
+
+EXAMPLES = [
+    line.strip()
+    for made in PARSERS.values()
+    for line in str(made.epilog).splitlines()
+    if line.startswith("  ") and "softjaw " in line
+]
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_examples_are_words_that_the_program_takes_and_name_files_that_exist(example):
+    given = shlex.split(example.partition("softjaw ")[2].partition(" > ")[0], comments=True)
+    words, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
+    program().parse_args(words)
+    petsc_overrides(petsc)
+    for word in words:
+        if word.startswith("jobs/"):
+            assert (ROOT / word).exists(), word
+        elif word.startswith("results/") and word.endswith(".hdf") and given[0] != "compare":
+            assert (ROOT / "jobs" / Path(word).with_suffix(".toml").name).exists(), word  # what a shipped scene makes
+
+
+def test_status_tells_programs_the_state_of_every_case(finished, capsys):
+    assert main(["status", str(finished), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["cases"], told["done"], told["failed"], told["missing"], told["running"]) == (36, 35, 1, 0, None)
+    assert told["failures"] == [
+        {"row": 9, "station": 0.02, "angle": np.pi / 2, "normal_force": 1.0, "message": "no contact at this force"}
+    ]
+    assert {note["message"] for note in told["notes"]} == {"a note"}
+    assert [s["reason"] for s in told["sessions"]] == ["complete"]
+    assert main(["status", str(finished), "--csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [row["state"] for row in rows].count("done") == 35
+    failed = {"row": "9", "state": "failed", "message": "no contact at this force", "station [m]": "0.02"}
+    assert rows[9].items() >= failed.items()
+
+
 def fake_pipeline(monkeypatch):
     """What the commands need of ``study.pipeline``."""
     module = ModuleType("study.pipeline")
@@ -140,7 +211,7 @@ def test_status_tells_counts_reasons_and_sessions(finished, capsys):
     assert main(["status", str(finished)]) == 0
     text = capsys.readouterr().out
     assert "35 of 36 cases done, 1 failed, 0 missing" in text
-    assert "failed 1 x no contact at this force [station 20 mm, angle 90 deg, normal_force 1 N]" in text
+    assert "failed 1 x no contact at this force\n      at station 20 mm, angle 90 deg, normal_force 1 N\n" in text
     assert "session 1: 20" in text
     assert text.rstrip().endswith("complete")
 
@@ -176,7 +247,8 @@ def test_show_writes_a_table_that_programs_read(finished, capsys):
     assert main(["show", str(finished), "--force", "1", "--top", "0"]) == 0
     text = capsys.readouterr().out.splitlines()
     assert text[0] == "best 11 of 11 solved candidates at 1 N"
-    assert "station [mm]" in text[1]
+    assert text[1].split()[0] == "station"
+    assert text[2].split()[:2] == ["rank", "[mm]"]
 
 
 def test_schema_is_json(capsys):

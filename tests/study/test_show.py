@@ -13,8 +13,9 @@ from study.cli import main
 from study.commands import RANK
 from study.layout import DONE, FAILED
 from study.quantities import MAPS, quantities
+from study.ranking import FLAGS
 from study.reading import StoredAxis
-from study.show import FLAGS, as_csv, as_text, best, place
+from study.show import as_csv, as_text, best, place
 from study.status import reasons
 
 FORCES = np.array([1.0, 5.0])
@@ -44,10 +45,10 @@ def study(quality, flags=0.0, labels=None, status=DONE):
 @pytest.mark.parametrize("top", [1, 2, 3, 0])
 def test_images_of_a_grasp_are_never_torn_apart_and_count_as_one(top):
     pairs = study([[4, 4], [3, 3], [2, 1]])
-    lines = as_text(best(pairs, top=top, whole_lines=True)).splitlines()
-    assert lines[2].split()[:4] == ["1,", "2", "0", "0,"]
-    assert len(lines) == 2 + (top or 4)
-    assert ("3, 4" in lines[-1]) == (top == 2)
+    lines = as_text(best(pairs, top=top, whole_lines=True), 200).splitlines()
+    assert lines[3].split()[:4] == ["1,", "2", "0", "0,"]
+    assert len(lines) == 4 + (top or 4)  # title, two lines of heads, and that no errors are known
+    assert ("3, 4" in lines[-2]) == (top == 2)
     assert len(as_csv(best(pairs, top=top)).splitlines()) == 1 + (top or 6)
 
 
@@ -72,18 +73,18 @@ def test_every_flag_has_a_word_of_its_own():
     ],
 )
 def test_flags_are_words_with_a_legend(bit, word):
-    text = as_text(best(study([[2.0], [1.0]], flags=[0.0, float(bit)])))
-    assert text.splitlines()[3].endswith(word)
-    assert text.splitlines()[4].startswith(f"{word}: ")
-    assert len(text.splitlines()) == 5
+    text = as_text(best(study([[2.0], [1.0]], flags=[0.0, float(bit)])), 200)
+    assert text.splitlines()[4].endswith(word)
+    assert text.splitlines()[5].startswith(f"{word}: ")
+    assert len(text.splitlines()) == 7
 
 
 def test_explicit_poses_are_listed_by_their_labels():
     poses = study([[2.0], [1.0]], labels=["near", "far"], status=FAILED)
     assert place(poses, 3) == '"far", normal_force 5 N'
     assert reasons(poses) == [
-        '  failed 4 x no contact at this force ["near", normal_force 1 N; "near", normal_force 5 N; "far", '
-        "normal_force 1 N; ...]"
+        "  failed 4 x no contact at this force",
+        '      at "near", normal_force 1 N; "near", normal_force 5 N; "far", normal_force\n      1 N; and 1 more',
     ]
     assert place(study([[2.0], [1.0]]), 3) == "station 1000 mm, angle 0 deg, normal_force 5 N"
 
@@ -105,5 +106,45 @@ def test_the_safety_factor_has_a_column_where_the_mass_is_known():
     heavy = study([[2.0], [1.0]])
     assert "safety" not in as_text(best(heavy))
     heavy.layout.quantities = quantities(["mass"])
-    assert "safety" in as_text(best(heavy)).splitlines()[1]
+    assert "safety" in as_text(best(heavy), 200).splitlines()[2]
     assert "safety_factor" in as_csv(best(heavy)).splitlines()[0]
+
+
+WIDE = quantities(["mass", "wall", "two meshes"])
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 200])
+def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
+    walls = study([[4, 4], [3, 3]], flags=[0.0, float(contact.SLIPS + contact.COARSE + 256)])
+    walls.layout.quantities = WIDE
+    table = best(walls)
+    lines = as_text(table, width).splitlines()
+    assert max(map(len, lines)) <= width
+    heads = f"{lines[1]} {lines[2]}".split()
+    absent = " ".join(" ".join(lines).partition("letters a line: ")[2].partition(";")[0].split()).split(", ")
+    for name in ("quality", "e_n", "flags", "station"):
+        assert name in heads
+    for name in ("misfit", "f_x_max", "tau_z_max", "dent"):
+        assert (name in heads) != (name in absent)
+    assert len(as_csv(table).splitlines()[0].split(",")) == len(table.columns)
+
+
+def test_errors_stand_behind_what_they_belong_to_and_are_percent():
+    known = study([[0.04]])
+    known.layout.quantities = WIDE
+    names = [name for name, _ in best(known).columns]
+    for name in ("e_n", "f_x_max", "f_y_max", "tau_z_max"):
+        assert names[names.index(name) + 1] == f"{name}_error"
+    text = as_text(best(known), 200)
+    assert text.splitlines()[1].split().count("+-") == text.splitlines()[2].split().count("[%]") >= 4
+    assert text.splitlines()[3].split().count("4") >= 4
+    assert "errors of the mesh: not known" in as_text(best(study([[4.0]])))
+    assert "not known" not in text
+
+
+def test_many_flags_go_on_below_and_many_images_are_a_range():
+    text = as_text(best(study([[4, 4, 4]], flags=[float(contact.SLIPS + contact.COARSE + 256)])), 200)
+    lines = text.splitlines()
+    assert lines[3].split()[:3] == ["1..3", "0", "0..180"]
+    assert lines[3].endswith("askew, slips,")
+    assert lines[4].strip() == "coarse"
