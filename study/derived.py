@@ -1,4 +1,4 @@
-"""Datasets that are filled once, after all cases: each kind of study adds its own."""
+"""What is filled once, after all cases: each kind of study adds its own datasets; then come the grid and the report."""
 
 from __future__ import annotations
 
@@ -21,5 +21,10 @@ def derived(scene: Scene) -> list[Derived]:
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
     """Fill all of it, by one rank, after all cases."""
+    from study.grid_values import fill_grid
+    from study.plain_report import plain_report
+
     for kind in KINDS:
         kind.finalise(writer, scene)
+    fill_grid(writer)
+    writer.write_report(plain_report(writer.result(), scene.friction.mu))

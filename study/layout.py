@@ -19,13 +19,15 @@ from study.datasets import MISSING as MISSING
 from study.datasets import ROOT as ROOT
 from study.datasets import Column, Dataset, columns_of, datasets_of
 from study.finger_quantities import PATCH
+from study.grid import grid_datasets
 from study.quantities import definitions, quantities
 from study.quantity import FINGERS, MODELS, NEEDS, Quantity
 from study.wall_quantities import ALONG, AROUND
 
-PROGRAM, VERSION = "softjaw", 2
+PROGRAM, VERSION = "softjaw", 3
+READABLE = (2, 3)  # 2 lacks the grid for ParaView and the report
 DONE, FAILED = 1, 2
-LABEL, SESSIONS = 80, 256
+LABEL, SESSIONS, REPORT = 80, 256, 8192
 SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
      ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
@@ -35,7 +37,10 @@ SESSION = np.dtype(
 
 @dataclass(frozen=True)
 class Header:
-    """What a file says about the scene it was made from; ``labels`` name the candidates in row order."""
+    """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
+
+    ``surface`` is the object as `study.grid.Surface`, None where the file shows none.
+    """
 
     digest: str
     scene: str
@@ -44,6 +49,7 @@ class Header:
     overrides: tuple[str, ...] = ()
     petsc_options: str = ""
     labels: tuple[str, ...] = ()
+    surface: Any = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,8 @@ class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
-    for the candidates ``sampled``, counted over stations and angles.
+    for the candidates ``sampled``, counted over stations and angles. ``surface`` counts the points and triangles of the
+    object, ``front`` the faces along and across a pad, as `study.grid` shows them; zeros where it does not.
     """
 
     axes: tuple[Any, ...]
@@ -76,6 +83,8 @@ class Layout:
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
+    surface: tuple[int, int] = (0, 0)
+    front: tuple[int, int] = (0, 0)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -123,14 +132,20 @@ class Layout:
 
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
-        """All datasets but axes, texts and sessions."""
+        """All datasets of the study but axes, texts and sessions."""
         return tuple(datasets_of(self))
+
+    @cached_property
+    def grid(self) -> tuple[Dataset, ...]:
+        """All datasets of the grid that ParaView opens."""
+        return tuple(grid_datasets(self))
 
     @property
     def nbytes(self) -> int:
         """Size of the file, rounded up generously for what HDF5 adds."""
-        count = len(self.datasets) + len(self.axes) + 16
-        return sum(d.nbytes for d in self.datasets) + SESSIONS * SESSION.itemsize + 4096 * count + 2**16
+        datasets = (*self.datasets, *self.grid)
+        count = len(datasets) + len(self.axes) + 16
+        return sum(d.nbytes for d in datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
 
     @cached_property
     def _slots(self) -> dict[int, int]:
@@ -151,7 +166,7 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled")
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface", "front")
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -172,6 +187,16 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
-        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled)
+        surface, front = (_pair(options.get(name, (0, 0))) for name in ("surface", "front"))
+        return Layout(
+            tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface, front
+        )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
+
+
+def _pair(given: Sequence[int]) -> tuple[int, int]:
+    first, second = map(int, given)
+    if not 0 <= min(first, second) <= max(first, second) < 10**8:
+        raise ValueError(f"a grid of {first}, {second}")
+    return first, second

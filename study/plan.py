@@ -45,10 +45,13 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     from study import sweep
     from study.build import check_object, pad_shape
     from study.derived import derived
+    from study.grid import surface_of
 
     check_object(scene)
     patches = scene.output.patches != "none"
-    faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
+    front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
+    axes = tuple(sweep.axes(scene))
+    surface = surface_of(scene, axes)
     header = Header(
         digest=scene.digest,
         scene=scene.effective_toml(),
@@ -57,10 +60,11 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
+        surface=surface,
     )
     layout = Layout(
-        tuple(sweep.axes(scene)),
-        faces,
+        axes,
+        math.prod(front),
         scene.accuracy.meshes,
         patches,
         tuple(derived(scene)),
@@ -69,6 +73,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         has(scene),
         scene.limit_surface.samples,
         scene.sampled,
+        surface.counts,
+        front,
     )
     return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.axis_symmetry)))
 
@@ -152,7 +158,9 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
-    space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + (f", {shapes:.1f} MB of it deformed walls" if shapes else "")
+    parts = {"deformed walls": shapes, "the view for ParaView": sum(d.nbytes for d in layout.grid) / 1e6}
+    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
+    space += "".join(f", {size:.1f} MB of it {what}" for what, size in parts.items() if size)
     free = _free(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study.layout import LABEL, PROGRAM, ROOT, SESSION, SESSIONS, VERSION, layout_from_options
+from study.layout import LABEL, PROGRAM, READABLE, ROOT, SESSION, SESSIONS, layout_from_options
 
 
 class StoredAxis(NamedTuple):
@@ -31,8 +31,10 @@ class Result:
         root, study = file.attributes(), file.attributes(ROOT)
         if root.get("program") != PROGRAM:
             raise ValueError("it does not name its program")
-        if root.get("layout_version") != str(VERSION):
-            raise ValueError(f"its layout has version {root.get('layout_version')}, this program reads {VERSION}")
+        self.version = root.get("layout_version", "")
+        if self.version not in map(str, READABLE):
+            known = " and ".join(map(str, READABLE))
+            raise ValueError(f"its layout has version {self.version or 'none'}, this program reads {known}")
         self.axes = tuple(self._axis(text_of(name)) for name in study["axes"])
         self.layout = layout_from_options(self.axes, study["options"])
         if len(self.axes) < 3 or min(self.layout.shape) < 1:
@@ -114,6 +116,11 @@ class Result:
     def definitions(self) -> str:
         """What every quantity means."""
         return self._string("definitions")
+
+    @property
+    def report(self) -> str:
+        """Best grasps, failures and how to read the file, as plain text; says so where the study is not finished."""
+        return self._string("report") if self.version != str(READABLE[0]) else ""
 
     @property
     def labels(self) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import h5py
 import numpy as np
 
 from friction.motion import fibonacci_twists
+from study import grid
 from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
 from study.layout import (
     DONE,
@@ -25,6 +27,7 @@ from study.layout import (
     LABEL,
     MISSING,
     PROGRAM,
+    REPORT,
     ROOT,
     SESSION,
     SESSIONS,
@@ -36,10 +39,12 @@ from study.layout import (
 from study.plots import groups
 from study.reading import Result, text_of
 from study.record import blank, crc32, text_bytes
+from study.vtkhdf import head
 
 LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")
 CODES = np.dtype("u1")
+UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF are written at its end."
 
 
 # --- creation: one process, before any solve ---------------------------------------------------------------------
@@ -100,12 +105,26 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
     for dataset in layout.datasets:
         _create_dataset(file, dataset)
     _write_texts(study, layout, header)
+    if layout.grid:
+        _write_grid(file, layout, header)
+
+
+def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
+    root = file.create_group(grid.PATH)
+    root.attrs["about"] = f"{header.title}. {grid.ABOUT}"
+    head(root, layout.shape[-1])
+    for dataset in layout.grid:
+        file.require_group(dataset.path.rpartition("/")[0])
+        _create_dataset(file, dataset)
+    for path, values in grid.skeleton(layout, header.surface).items():
+        file[path][...] = values
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     for name, text in (("scene", header.scene), ("definitions", layout.definitions())):
         data = text.encode() or b" "
         study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
+    study.create_dataset("report", data=_report(UNFINISHED))
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
@@ -117,6 +136,12 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     if layout.sampled:
         study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
         study["wrenches/candidate"][...] = layout.sampled
+
+
+def _report(text: str) -> np.ndarray:
+    """Text of fixed length, filled up with blanks: zeros would be shown by tools that print it."""
+    data = text.encode()[:REPORT].decode(errors="ignore").encode()
+    return np.array(data.ljust(REPORT), h5py.string_dtype("utf-8", REPORT))
 
 
 def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
@@ -168,9 +193,13 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
                 f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
             )
             raise StudyError(OTHER_FILE, text)
-        if result.layout.shape != layout.shape or result.layout.options() != layout.options():
-            raise StudyError(OTHER_FILE, f"{path}: made by a version that stored other values; choose another file")
-        for dataset in layout.datasets:
+        # How the object was cut into triangles may differ in the last bit on another machine; the file's own counts.
+        same = replace(layout, surface=result.layout.surface)
+        old = result.version != str(VERSION)
+        if old or result.layout.shape != layout.shape or result.layout.options() != same.options():
+            text = f"{path}: made by a version that stored other values; it can be read, but not gone on with"
+            raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
+        for dataset in (*result.layout.datasets, *result.layout.grid):
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
                 text = f"{path}: was repacked and cannot be written in parallel any more; choose another file"
                 raise StudyError(OTHER_FILE, text)
@@ -205,12 +234,12 @@ class ResultWriter:
     def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
         if not h5py.get_config().mpi:
             raise StudyError(CANNOT_WRITE, "this h5py was built without MPI; 'softjaw doctor' says how to cure that")
-        self.layout = layout
+        self.path, self.layout = path, layout
         self._file = h5py.File(path, "r+", driver="mpio", comm=comm, libver=LIBVER)
         self._columns = [self._file[c.path] for c in layout.columns]
         self._code, self._crc, self._attempts = (self._file[f"{ROOT}/status/{n}"] for n in ("code", "crc", "attempts"))
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
-        self._session = 0
+        self.session = 0
 
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
@@ -256,9 +285,21 @@ class ResultWriter:
     def _index(self, row: int) -> tuple[int, ...]:
         return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
 
-    def read(self, path: str) -> np.ndarray:
-        """Any dataset below ``/study``, for example ``e_n/curved``."""
-        return self._file[f"{ROOT}/{path}"][()]
+    def read(self, path: str, index: Any = ()) -> np.ndarray:
+        """Any dataset, named below ``/study`` (``e_n/curved``) or from the root, or what it has at an index."""
+        return self._file[path if path.startswith("/") else f"{ROOT}/{path}"][index]
+
+    def result(self) -> Result:
+        """The same file for reading; not to be closed by itself."""
+        return Result(self.path, GuardedFile(self.path, self._file))
+
+    def fill(self, path: str, start: int, values: np.ndarray) -> None:
+        """Write rows of a dataset that is no part of a case's row, from ``start`` on; by one rank, after all rows."""
+        self._file[path][start : start + len(values)] = values
+
+    def write_report(self, text: str) -> None:
+        """Write the report, cut where it is too long; by one rank, after all rows."""
+        self._file[f"{ROOT}/report"][()] = _report(text)
 
     def write_derived(self, name: str, values: Any) -> None:
         """Fill a derived dataset; by one rank, after all rows."""
@@ -268,17 +309,17 @@ class ResultWriter:
     def begin_session(self, **fields: Any) -> None:
         """Add a row to the provenance; by one rank."""
         used = self._sessions[()]["start"] != b""
-        self._session = min(int(used.sum()), len(used) - 1)
-        self._sessions[self._session] = np.zeros((), SESSION)
+        self.session = min(int(used.sum()), len(used) - 1)
+        self._sessions[self.session] = np.zeros((), SESSION)
         self.update_session(**fields)
 
     def update_session(self, **fields: Any) -> None:
         """Change fields of this run's row of the provenance; by one rank."""
-        row = self._sessions[self._session]
+        row = self._sessions[self.session]
         for name, value in fields.items():
             kind = SESSION[name]
             row[name] = text_bytes(value, kind.itemsize) if kind.kind == "S" else value
-        self._sessions[self._session] = row
+        self._sessions[self.session] = row
 
     def close(self) -> None:
         """Close on all ranks."""

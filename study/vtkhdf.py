@@ -1,7 +1,7 @@
-"""Files that ParaView and `pyvista.read` open: an unstructured grid as VTKHDF, at one moment or over several forces.
+"""What ParaView and `pyvista.read` open: an unstructured grid as VTKHDF, at one moment or over several forces.
 
-It is HDF5 like the result file, but a file of its own: readers of VTKHDF look for one grid at the top. Written so that
-also the oldest readers take it (static: version 1.0, VTK 9.1 on; over forces: 2.0 with one topology for all steps).
+Written so that also the oldest readers take it (static: version 1.0, VTK 9.1 on; over forces: 2.0 with one topology
+for all steps). `write_grid` makes a file of its own; a result file has such a grid at its top too (`study.grid`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import h5py
 import numpy as np
 
 from study.exits import CANNOT_WRITE, StudyError
+from study.grid_arrays import shared_steps, topology
 
 LIBVER = ("earliest", "v110")
-KINDS = {3: 5, 4: 9}  # VTK's numbers for triangles and quadrilaterals, by their corners
 Arrays = Mapping[str, np.ndarray]
 
 
@@ -61,37 +61,24 @@ def write_grid(
 def _write(
     root: h5py.Group, points: np.ndarray, cells: np.ndarray, on_cells: Arrays, on_points: Arrays, steps: Sequence[float]
 ) -> None:
-    count, corners = cells.shape
-    root.attrs.create("Version", np.array([2, 0] if len(steps) else [1, 0], "<i8"))
-    root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
-    for name, number in (("Points", points.shape[-2]), ("Cells", count), ("ConnectivityIds", cells.size)):
-        root[f"NumberOf{name}"] = np.array([number], "<i8")
+    head(root, len(steps))
+    for name, values in topology(points.shape[-2], [cells]).items():
+        root[name] = values
     root["Points"] = np.asarray(points, "<f8").reshape(-1, 3)
-    root["Connectivity"] = cells.astype("<i8").ravel()
-    root["Offsets"] = corners * np.arange(count + 1, dtype="<i8")
-    root["Types"] = np.full(count, KINDS[corners], "u1")
     for group, arrays in (("CellData", on_cells), ("PointData", on_points)):
         made = root.create_group(group)
         for name, values in arrays.items():
             flat = np.asarray(values).reshape(-1, *np.shape(values)[2 if len(steps) else 1 :])
             made[name] = flat.astype("<i8" if flat.dtype.kind in "iub" else "<f8")
     if len(steps):
-        _write_steps(root, points.shape[-2], count, on_cells, on_points, steps)
+        sizes = dict.fromkeys(on_cells, len(cells)), dict.fromkeys(on_points, points.shape[-2])
+        for name, values in shared_steps(steps, points.shape[-2], *sizes).items():
+            root[f"Steps/{name}"] = values
 
 
-def _write_steps(
-    root: h5py.Group, points: int, cells: int, on_cells: Arrays, on_points: Arrays, steps: Sequence[float]
-) -> None:
-    """Where the values of each step begin; the cells are those of the first step throughout."""
-    group, number = root.create_group("Steps"), np.arange(len(steps), dtype="<i8")
-    group.attrs.create("NSteps", len(steps), dtype="<i8")
-    group["Values"] = np.asarray(steps, "<f8")
-    group["NumberOfParts"] = np.ones(len(steps), "<i8")
-    group["PartOffsets"] = np.zeros(len(steps), "<i8")
-    group["PointOffsets"] = points * number
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        group[name] = np.zeros((len(steps), 1), "<i8")
-    for kind, arrays, size in (("Cell", on_cells, cells), ("Point", on_points, points)):
-        offsets = group.create_group(f"{kind}DataOffsets")
-        for name in arrays:
-            offsets[name] = size * number
+def head(root: h5py.Group, steps: int) -> None:
+    """Attributes of a grid, over so many steps or over none."""
+    root.attrs.create("Version", np.array([2, 0] if steps else [1, 0], "<i8"))
+    root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+    if steps:
+        root.require_group("Steps").attrs.create("NSteps", steps, dtype="<i8")
