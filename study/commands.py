@@ -112,9 +112,9 @@ def status(options: Namespace) -> int:
     from study.status import status_csv, status_json, status_text
     from study.store import open_result
 
-    forms = {"json": status_json, "csv": status_csv, None: lambda result: status_text(result, terminal_width())}
+    forms = {"json": status_json, "csv": status_csv}
     with open_result(options.file) as result:
-        print(forms[options.form](result))
+        print(forms[options.form](result) if options.form else status_text(result, terminal_width()))
     return DONE
 
 
@@ -126,20 +126,23 @@ def show(options: Namespace) -> int:
 
     with open_result(options.file) as result:
         table = best(result, options.force, options.top, whole_lines=options.form is None)
-    forms = {"json": as_json, "csv": as_csv, None: lambda table: as_text(table, terminal_width())}
-    print(forms[options.form](table))
+    forms = {"json": as_json, "csv": as_csv}
+    print(forms[options.form](table) if options.form else as_text(table, terminal_width()))
     return DONE
 
 
 def compare(options: Namespace) -> int:
     """Print two maps side by side."""
+    from study.columns import terminal_width
     from study.compare import compare
     from study.compare_text import comparison_csv, comparison_json, comparison_text
     from study.store import open_result
 
-    form = {"json": comparison_json, "csv": comparison_csv, None: comparison_text}[options.form]
     with open_result(options.files[0]) as one, open_result(options.files[1]) as other:
-        print(form(compare(one, other, options.quantity, options.model), options.top))
+        found = compare(one, other, options.quantity, options.model)
+    forms = {"json": comparison_json, "csv": comparison_csv}
+    text = forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
+    print(text)
     return DONE
 
 

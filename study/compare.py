@@ -33,13 +33,15 @@ class AxisMatch:
 class Difference:
     """One quantity of both files over the common axes; NaN where a file has no result.
 
-    ``error`` is the sum of both discretisation errors; NaN where a file does not state them.
+    ``error`` is the sum of both discretisation errors; NaN where a file does not state them. ``stated`` tells of each
+    file whether it has a map of them.
     """
 
     name: str
     units: str
     values: tuple[FloatArray, FloatArray]
     error: FloatArray
+    stated: tuple[bool, bool]
 
     @property
     def change(self) -> FloatArray:
@@ -57,6 +59,12 @@ class Difference:
         """Whether a difference exceeds the errors of both; None where one of them is unknown."""
         known = np.isfinite(self.change) & np.isfinite(self.error)
         return np.where(known, np.abs(self.change) > self.error, None)
+
+    @property
+    def exceed(self) -> tuple[int, int]:
+        """How many differences exceed the errors, of how many that could be judged."""
+        judged = [value for value in self.beyond.ravel() if value is not None]
+        return sum(map(bool, judged)), len(judged)
 
 
 @dataclass(frozen=True)
@@ -154,18 +162,20 @@ def _difference(
     one: Any, other: Any, axes: tuple[AxisMatch, ...], done: tuple[Any, ...], name: str, model: str
 ) -> Difference:
     q = next(q for q in one.layout.quantities if q.group == "maps" and q.name == name)
-    values, errors = [], []
+    values, errors, stated = [], [], []
     for i, result in enumerate((one, other)):
         solved = np.where(done[i], result.map(name, model if q.by_model else None)[_block(axes, i)], np.nan)
         values.append(solved)
-        errors.append(_error(result, name, model, solved, _block(axes, i)))
-    return Difference(name, q.units, (values[0], values[1]), errors[0] + errors[1])
+        found = _error(result, name, model, solved, _block(axes, i))
+        errors.append(np.full(solved.shape, np.nan) if found is None else found)
+        stated.append(found is not None)
+    return Difference(name, q.units, (values[0], values[1]), errors[0] + errors[1], (stated[0], stated[1]))
 
 
-def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[Any, ...]) -> FloatArray:
-    """Discretisation error of a quantity in its unit, as far as the file has it; of the curved model only."""
+def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[Any, ...]) -> FloatArray | None:
+    """Discretisation error of a quantity in its unit; None where the file has none, as for models but the curved."""
     there = {q.name: q for q in result.layout.quantities if q.group == "maps"}
     if f"{name}_error" not in there or (there[name].by_model and model != "curved"):
-        return np.full(values.shape, np.nan)
+        return None
     found = result.map(f"{name}_error")[block]
     return np.abs(found * values) if there[f"{name}_error"].long_name.startswith("relative") else np.abs(found)

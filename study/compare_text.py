@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 from typing import Any
 
 import numpy as np
 
-from study.columns import DISPLAY
-from study.compare import AxisMatch, Comparison
+from study.columns import DISPLAY, PAPER, aligned, csv_text, two_lines, with_unit, wrapped
+from study.compare import AxisMatch, Comparison, Difference
 from study.scene.difference import value_text
 
-MOST_SETTINGS = 12
-NO_ERRORS = "unknown: no error map; accuracy.meshes = 2 in both scenes gives those of e_n and the friction limits"
-BEYOND = {True: "yes", False: "no", None: "unknown"}
+MOST_SETTINGS, WIDEST_SETTING = 12, 24
+BEYOND = {True: "yes", False: "no", None: "-"}
 
 
-def comparison_text(found: Comparison, top: int = 10) -> str:
-    """What differs, in lines of at most some 100 letters; the ``top`` largest differences (0: all) case by case."""
+def comparison_text(found: Comparison, top: int = 10, width: int = PAPER) -> str:
+    """What differs, in lines of at most ``width`` letters; the ``top`` largest differences (0: all) case by case."""
     a, b = found.done
     states = [(a & b, "solved in both"), (a & ~b, "only in a"), (~a & b, "only in b"), (~a & ~b, "in neither")]
     counts = ", ".join(f"{int(which.sum())} {words}" for which, words in states if which.any())
     lines = [*(f"{letter}: {file}" for letter, file in zip("ab", found.files, strict=True)), *_settings(found)]
-    lines += [f"common cases: {counts}", *(line for axis in found.axes for line in _only(axis))]
-    return "\n".join([*lines, "", *_summary(found), "", *_cases(found, top)])
+    lines += [f"common cases: {counts}"]
+    lines += [wrapped(line, width, more="  ") for axis in found.axes for line in _only(axis)]
+    tables = [*_summary(found), "", *_cases(found, top)]
+    return "\n".join([*lines, "", *tables, wrapped(_verdict(found), width, more="  ")]).rstrip()
 
 
 def _settings(found: Comparison) -> list[str]:
@@ -34,9 +33,13 @@ def _settings(found: Comparison) -> list[str]:
         return ["settings: the scene of a file cannot be read"]
     if not found.settings:
         return ["settings: no difference"]
-    rows = [(key, value_text(one), value_text(other)) for key, one, other in found.settings[:MOST_SETTINGS]]
+    rows = [(key, *map(_short, map(value_text, pair))) for key, *pair in found.settings[:MOST_SETTINGS]]
     more = len(found.settings) - len(rows)
-    return _table([("setting", "a", "b"), *rows], left=3) + [f"and {more} more settings"] * (more > 0)
+    return aligned([("setting", "a", "b"), *rows], left=range(3)) + [f"and {more} more settings"] * (more > 0)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= WIDEST_SETTING else f"{text[: WIDEST_SETTING - 3]}..."
 
 
 def _only(axis: AxisMatch) -> list[str]:
@@ -52,26 +55,37 @@ def _only(axis: AxisMatch) -> list[str]:
 
 def _summary(found: Comparison) -> list[str]:
     """One line for each quantity: means, mean and largest difference, how many exceed the errors."""
-    rows: list[tuple[str, ...]] = [("quantity", "mean a", "mean b", "mean b-a", "largest b-a", "beyond errors")]
+    rows: list[tuple[str, ...]] = [
+        ("", "mean", "mean", "mean b-a", "largest", "exceed"),
+        ("quantity", "a", "b", "[%]", "[%]", "errors"),
+    ]
     for d in found.quantities:
         both = np.isfinite(d.change)
         if not both.any():
             continue
         unit, factor = DISPLAY.get(d.units, (d.units, 1.0))
-        means = [f"{float(v[both].mean()) * factor:.4g}" for v in d.values]
-        judged = [v for v in d.beyond.ravel() if v is not None]
-        beyond = f"{sum(judged)} of {len(judged)}" if judged else "unknown"
+        means = [f"{float(v[both].mean()) * factor:#.4g}".rstrip(".") for v in d.values]
         largest = np.nanmax(np.abs(d.relative)) if np.isfinite(d.relative).any() else np.nan
         mean = d.change[both].mean() / max(np.abs(d.values[0][both]).mean(), 1e-300)
-        rows.append((f"{d.name} [{unit}]" if unit else d.name, *means, _percent(mean), _percent(largest)[1:], beyond))
-    if len(rows) == 1:
-        return ["no case is solved in both"]
-    lines = _table(rows, left=1)
-    if any(row[-1] == "unknown" for row in rows):
-        lines.append(
-            "unknown: no error map; accuracy.meshes = 2 in both scenes gives those of e_n and the friction limits"
-        )
-    return lines
+        exceed, judged = d.exceed
+        beyond = f"{exceed} of {judged}" if judged else "-"
+        rows.append((with_unit(d.name, unit), *means, _percent(mean), _percent(largest).lstrip("+"), beyond))
+    return aligned(rows, left=[0]) if len(rows) > 2 else ["no case is solved in both"]
+
+
+def _verdict(found: Comparison) -> str:
+    """How many differences of the quantity that was asked for exceed the errors; or which file states none."""
+    d = found.asked
+    solved, (exceed, judged) = int(np.isfinite(d.change).sum()), d.exceed
+    silent = " and ".join(letter for letter, states in zip("ab", d.stated, strict=True) if not states)
+    if not solved:
+        return ""
+    if silent:
+        states = "states" if len(silent) == 1 else "state"
+        text = f"whether the differences exceed the errors is not known: {silent} {states} no error of {d.name}"
+        return f"{text}; accuracy.meshes = 2 in a scene gives the errors of e_n and of the friction limits"
+    more = f", {solved - judged} could not be judged" * (solved > judged)
+    return f"{exceed} of {judged} differences of {d.name} exceed the errors of both files together{more}"
 
 
 def _cases(found: Comparison, top: int) -> list[str]:
@@ -83,17 +97,19 @@ def _cases(found: Comparison, top: int) -> list[str]:
         return []
     unit, factor = DISPLAY.get(d.units, (d.units, 1.0))
     axes = [axis for axis in found.axes if len(axis.common) > 1 or axis is found.axes[-1]]
-    head = [f"{axis.name} [{DISPLAY.get(axis.units, (axis.units, 1.0))[0]}]".replace(" []", "") for axis in axes]
-    rows = [(*head, "a", "b", "b-a", "b-a [%]", "error", "beyond")]
+    heads = [two_lines(axis.name, DISPLAY.get(axis.units, (axis.units, 1.0))[0]) for axis in axes]
+    heads += [two_lines(name, unit) for name in ("a", "b", "b-a")] + [("b-a", "[%]")]
+    judged = any(d.exceed)
+    heads += [two_lines("errors", unit), ("exceeds", "errors")] * judged
+    rows = []
     for i in shown:
         index = np.unravel_index(i, d.change.shape)
-        place = [_place(found, axis, index) for axis in axes]
-        numbers = [f"{v[index] * factor:.4g}" for v in (*d.values, d.change)]
+        numbers = [f"{v[index] * factor:#.4g}".rstrip(".") for v in (*d.values, d.change)]
         error = d.error[index] * factor
-        tail = ["-" if np.isnan(error) else f"{error:.2g}", BEYOND[d.beyond[index]]]
-        rows.append((*place, *numbers, _percent(d.relative[index]).rstrip(" %"), *tail))
-    title = f"{d.name}{f' [{unit}]' if unit else ''}, largest {len(shown)} of {len(order)} differences"
-    return [title, *_table(rows)]
+        tail = ["-" if np.isnan(error) else f"{error:.2g}", BEYOND[d.beyond[index]]] * judged
+        rows.append((*(_place(found, axis, index) for axis in axes), *numbers, _percent(d.relative[index]), *tail))
+    title = f"{with_unit(d.name, unit)}: {len(shown)} of {len(order)} differences, the largest first"
+    return [title, *aligned([*zip(*heads, strict=True), *rows]), ""]
 
 
 def _place(found: Comparison, axis: AxisMatch, index: tuple[Any, ...]) -> str:
@@ -103,18 +119,10 @@ def _place(found: Comparison, axis: AxisMatch, index: tuple[Any, ...]) -> str:
     return f"{axis.common[i] * DISPLAY.get(axis.units, ('', 1.0))[1]:.5g}"
 
 
-def _table(rows: list[Any], left: int = 0) -> list[str]:
-    """Aligned columns, the first ``left`` of them at the left."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padded = [
-        [c.ljust(w) if n < left else c.rjust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
-        for row in rows
-    ]
-    return ["  ".join(row).rstrip() for row in padded]
-
-
 def _percent(share: float) -> str:
-    return "-" if np.isnan(share) else f"{100 * share:+.2f} %"
+    if np.isnan(share):
+        return "-"
+    return text if float(text := f"{100 * share:+.2f}") else "0.00"
 
 
 def comparison_rows(found: Comparison) -> list[dict[str, Any]]:
@@ -129,36 +137,33 @@ def comparison_rows(found: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def comparison_json(found: Comparison, _top: int = 0) -> str:
-    """One object: files, settings, axes, and every common case of the quantity, in SI units."""
+def comparison_json(found: Comparison) -> str:
+    """One object: files, settings, axes, counts for every quantity, and every common case of one, in SI units."""
     axes = {
-        x.name: {"units": x.units, "common": _list(x.common), "only_a": _list(x.only[0]), "only_b": _list(x.only[1])}
+        x.name: {"units": x.units, "common": x.common.tolist(), "only_a": x.only[0].tolist(),
+                 "only_b": x.only[1].tolist()}
         for x in found.axes
-    }
+    }  # fmt: skip
     changed = found.settings
     settings = None if changed is None else [{"key": key, "a": one, "b": other} for key, one, other in changed]
     names = {letter: os.fspath(file) for letter, file in zip("ab", found.files, strict=True)}
     asked = {"quantity": found.asked.name, "units": found.asked.units, "cases": comparison_rows(found)}
-    return json.dumps({"files": names, "settings": settings, "axes": axes, **asked}, indent=2)
+    counts = {"summary": {d.name: _counts(d) for d in found.quantities}}
+    return json.dumps({"files": names, "settings": settings, "axes": axes} | counts | asked, indent=2)
 
 
-def comparison_csv(found: Comparison, _top: int = 0) -> str:
+def _counts(d: Difference) -> dict[str, int]:
+    exceed, judged = d.exceed
+    return {"compared": int(np.isfinite(d.change).sum()), "judged": judged, "beyond_error": exceed}
+
+
+def comparison_csv(found: Comparison) -> str:
     """One line for each common case of the quantity, SI units in the header."""
-    rows, text = comparison_rows(found), io.StringIO()
+    rows = comparison_rows(found)
     units = {x.name: x.units for x in found.axes} | dict.fromkeys(("a", "b", "difference", "error"), found.asked.units)
-    writer = csv.writer(text, lineterminator="\n")
     renamed = {"a": f"{found.asked.name} a", "b": f"{found.asked.name} b"}
-    writer.writerow([_with_unit(renamed.get(name, name), units.get(name, "")) for name in rows[0]])
-    writer.writerows([["" if v is None else v for v in row.values()] for row in rows])
-    return text.getvalue().rstrip("\n")
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
-
-
-def _list(values: np.ndarray) -> list[float]:
-    return values.tolist()
+    head = [with_unit(renamed.get(name, name), units.get(name, "")) for name in rows[0]]
+    return csv_text([head, *(list(row.values()) for row in rows)])
 
 
 def _plain(value: float) -> float | None:

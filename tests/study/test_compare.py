@@ -79,15 +79,19 @@ def test_differences_are_judged_by_the_errors_of_both_files(pair):
     assert d.relative[:, 1:][~failed[:, 1:]] == pytest.approx(np.full(29, 0.1))
     assert d.beyond[:, 0].ravel().tolist() == [False] * 6
     assert [v for v in d.beyond[:, 1:].ravel() if v is not None] == [True] * 29
-    summary = comparison_text(compared(*pair))
-    assert "29 of 35" in summary
-    assert [line.split()[-1] for line in summary.splitlines() if line.startswith("quality ")] == ["unknown"]
+    assert d.exceed == (29, 35)
+    summary = comparison_text(compared(*pair)).splitlines()
+    assert summary[-1] == "29 of 35 differences of e_n exceed the errors of both files together"
+    assert [line.split()[-1] for line in summary if line.startswith("quality ")] == ["-"]
 
 
 def test_errors_of_one_file_alone_are_unknown(pair, tmp_path):
     d = compared(pair[0], make(tmp_path / "c.hdf"))
     assert set(d.asked.beyond.ravel()) == {None}
-    assert "unknown: no error map" in comparison_text(d)
+    assert d.asked.stated == (True, False)
+    lines = comparison_text(d).splitlines()
+    assert "not known: b states no error of e_n;" in " ".join(line.strip() for line in lines)
+    assert not any("exceeds" in line for line in lines)  # no column where nothing could be said
     assert not d.settings
     assert "settings: no difference" in comparison_text(d)
 
@@ -101,11 +105,13 @@ def test_settings_that_differ_are_listed(pair):
 
 def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
     lines = comparison_text(compared(*pair), top=3).splitlines()
-    assert max(map(len, lines[2:])) <= 110
-    assert "largest 3 of 35 differences" in lines[-5]
-    changes = [float(line.split()[5]) for line in lines[-3:]]
+    assert max(map(len, lines[2:])) <= 80
+    title = lines.index("e_n [mm]: 3 of 35 differences, the largest first")
+    assert lines[title + 1].split() == ["station", "angle", "normal_force", "a", "b", "b-a", "b-a", "errors", "exceeds"]
+    rows = lines[title + 3 : title + 6]
+    changes = [float(line.split()[5]) for line in rows]
     assert changes == sorted(changes, reverse=True)
-    assert all(line.split()[-1] == "yes" for line in lines[-3:])
+    assert all(line.split()[-1] == "yes" for line in rows)
     assert len(comparison_text(compared(*pair), top=0).splitlines()) == len(lines) + 32
 
 
@@ -114,6 +120,8 @@ def test_programs_get_every_common_case_in_si(pair):
     data = json.loads(comparison_json(found))
     assert data["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
     assert data["axes"]["station"]["only_b"] == [0.1]
+    assert data["summary"]["e_n"] == {"compared": 35, "judged": 0, "beyond_error": 0}  # errors are of the curved model
+    assert json.loads(comparison_json(compared(*pair)))["summary"]["e_n"]["beyond_error"] == 29
     rows = list(csv.reader(io.StringIO(comparison_csv(found))))
     assert rows[0][:5] == ["station [m]", "angle [rad]", "normal_force [N]", "quality a", "quality b"]
     assert len(rows) - 1 == len(data["cases"]) == 36
@@ -161,7 +169,7 @@ def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
 def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch):
     a, b = pair
     assert told(["compare", a, b, "--top", 2], monkeypatch) == 0
-    assert "largest 2 of 35" in capsys.readouterr().out
+    assert "2 of 35 differences, the largest first" in capsys.readouterr().out
     assert told(["compare", a, b, "--json", "--model", "flat"], monkeypatch) == 0
     assert json.loads(capsys.readouterr().out)["quantity"] == "e_n"
     assert told(["compare", a, b, "--quantity", "beauty"], monkeypatch) == USAGE
