@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class Surface(NamedTuple):
 
 def surface_of(scene: Any, axes: Any) -> Surface:
     """The object of a scene, at the first point of its sweep, cut along the cells of its candidates."""
+    from study.report.data import Data
     from study.view.model import View
 
     asked = SimpleNamespace(
@@ -50,7 +51,7 @@ def surface_of(scene: Any, axes: Any) -> Surface:
         by_poses=not axes[-3].units, walled=has_wall(scene.object),
         values=lambda _: None,  # nothing is solved yet: no marks where the fingers touch
     )  # fmt: skip
-    corners, cell = View(asked, (0,) * (len(axes) - 3)).surface
+    corners, cell = View(cast(Data, asked), (0,) * (len(axes) - 3)).surface
     points, inverse = np.unique(np.round(corners[..., :3].reshape(-1, 3), 9), axis=0, return_inverse=True)
     return Surface(points, inverse.reshape(-1, 3), cell)
 
