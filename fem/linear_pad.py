@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.foam import Foam
-from fem.materials import material
+from fem.materials import Material, material, stress
 from fem.pad import Pad
 from fem.pattern import Pattern, add_up
 from fem.petsc import Factors
@@ -24,6 +24,26 @@ def linearised(pad: Pad) -> Pad:
     """The same pad of linear elastic material, with the constants that its foam has at rest."""
     law = pad.material
     return Pad(pad.shape, material("linear", law.shear_modulus, law.poisson_ratio), pad.symmetry, pad.contact)
+
+
+def departure(law: Material, strain: float) -> float:
+    """How far a law is from a straight line at a strain: the strain itself, or the error of the linear stress [-].
+
+    The latter in confined tension and compression, ``|P / (M e) - 1|`` with ``M = lambda + 2 G``. Blatz-Ko foam has
+    about twice the strain, foams that harden or soften more have more.
+    """
+    nu = law.poisson_ratio
+    modulus = 2.0 * law.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu)
+    if law.law == "linear":
+        return 0.0
+    if strain >= 1.0:
+        return float("inf")
+    found, P = [strain], np.empty((3, 3))
+    for e in (strain, -strain) if strain > 0 else ():
+        F = np.diag([1.0, 1.0, 1.0 + e])
+        stress(law.number, F, np.linalg.inv(F), 1.0 + e, law.parameters, P, np.empty((0, 0, 0, 0)))
+        found.append(abs(P[2, 2] / (modulus * e) - 1.0))
+    return float(max(found))
 
 
 class CondensedPad:

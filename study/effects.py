@@ -37,7 +37,7 @@ def effects_of(
     def only(name: str) -> int:
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
-    strain = max(c.state.checks.max_strain for c in contacts)
+    pad, strain = solving.pad_level, max(c.state.checks.max_strain for c in contacts)
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["curved"] for own in bounds]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
@@ -46,7 +46,7 @@ def effects_of(
     size = MODEL_SIZES[solving.planes]
     return {
         "object": _object(solving.level),
-        "pad": ("hyperelastic", strain, only("pad")),
+        "pad": (EFFECTS["pad"][not pad.linear], strain, REASONS.index(pad.reason)),
         "sheet": ("rigid", nan, only("sheet")),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),

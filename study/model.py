@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.contact import Gap
+from fem.linear_pad import CondensedPad, linearised
 from fem.pad import Pad
 from fem.pose import Pose
 from fem.shape import GapFunction, GapObject
@@ -25,6 +26,12 @@ DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the obj
 def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool) -> Pad:
     """Discrete pad; the same for all candidates, so it is made once."""
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact)
+
+
+@lru_cache(maxsize=8)
+def condensed_pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool) -> CondensedPad:
+    """Discrete pad for small strains, reduced to its front; one factorisation for all candidates."""
+    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ from fem.errors import CheckError
 from fem.extract import half_turned, mirrored
 from fem.grip import Grip, Gripped
 from fem.grip_problem import GripProblem
+from fem.linear_pad import linearised
+from fem.linear_press import linear_press
 from fem.press import Press, Pressed, Settings
 from fem.spring_bed import SpringBed
 from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
@@ -24,6 +26,7 @@ from study.build import pad_shape
 from study.candidates import turn_of_pose
 from study.contact import Contact
 from study.model import Finger
+from study.pad_level import PadLevel, choose_pad_level, level_on_wall
 from study.scene import Scene
 from study.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
 
@@ -49,6 +52,7 @@ class Solver(Protocol):
     """
 
     level: Level | None
+    pad_level: PadLevel
     fingers_solved: int
     planes: int
 
@@ -81,7 +85,9 @@ class OnRigid:
         self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
-        self.presses = [[_press(scene, f, coarser) for coarser in meshes] for f in solved]
+        self.pad_level = choose_pad_level(scene, solved)
+        press = _linear_press if self.pad_level.linear else _press
+        self.presses = [[press(scene, f, coarser) for coarser in meshes] for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
@@ -104,7 +110,7 @@ class OnWall:
     """Fingers on a thin wall press against each other through it."""
 
     def __init__(self, scene: Scene, fingers: list[Finger], level: Level) -> None:
-        self.scene, self.fingers, self.level = scene, fingers, level
+        self.scene, self.fingers, self.level, self.pad_level = scene, fingers, level, level_on_wall(scene)
         meshes = (False, True)[: scene.accuracy.meshes]
         self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
         self.grips = [
@@ -166,6 +172,14 @@ def _press(scene: Scene, finger: Finger, coarser: bool) -> Press:
     return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, _settings(scene))
 
 
+def _linear_press(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    elements = pad_shape(scene.gripper, coarser).elements
+    symmetry, rule = model.usable_symmetry(scene, finger, elements), scene.accuracy.contact
+    fallback = None if rule == "nodal" else linearised(model.pad(scene.gripper, symmetry, "nodal", coarser))
+    pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser)
+    return linear_press(pad, finger.gap, fallback, _settings(scene))
+
+
 def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     """Grasp frame and the planes of symmetry that meshes and scene allow."""
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
@@ -193,6 +207,8 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarse
 
     def problem(rule: str) -> GripProblem:
         pad = model.pad(scene.gripper, held.pad_symmetry, rule, coarser)
+        if scene.effects.pad == "linear":
+            pad = linearised(pad)
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]

@@ -155,7 +155,9 @@ class Effects(Section):
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
         "auto", description="the object's compliance; the shells need object.wall_mm"
     )
-    pad: Literal["auto", "hyperelastic"] = Field("auto", description="the pad's deformation")
+    pad: Literal["auto", "linear", "hyperelastic"] = Field(
+        "auto", description="the deformation of the pads: small strains (condensed once for all cases), or finite"
+    )
     sheet: Literal["auto", "rigid"] = Field("auto", description="compliance of the sheet behind the pad")
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
@@ -180,6 +182,12 @@ class Accuracy(Section):
     wall_around_mm: WallSize = Field(1.5, description="size of a thin wall's elements round the object, under the pads")
     wall_along_mm: WallSize = Field(2.5, description="size of a thin wall's elements along the axis, under the pads")
     wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
+    e_n: float | None = Field(
+        None, gt=1e-4, le=0.5, description="largest relative error of e_n; mesh, steps and effects are chosen by it"
+    )
+    cost_file: str | None = Field(
+        None, min_length=1, max_length=1000, description="result of 'softjaw cost' that they are chosen from"
+    )
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
 

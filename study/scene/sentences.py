@@ -20,7 +20,7 @@ EXAMPLES = {
     "poses": "[{ point_mm = [0, 0, 20], approach = [1, 0, 0], long_side = [0, 0, 1] }]",
 }  # fmt: skip
 LATER_LEVELS = {
-    "pad": ("linear",), "sheet": ("elastic", "elastic_plate"),
+    "sheet": ("elastic", "elastic_plate"),
     "fingers": ("one",), "friction": ("coupled",),
 }  # fmt: skip
 

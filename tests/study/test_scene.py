@@ -76,7 +76,7 @@ WRONG_LINES = [
      "same length"),
     ("[friction]\nmu = -0.1", 12, "friction.mu", "-0.1", ">= 0", "default is 0.8"),
     ("[effects]\nobject = 'soft'", 12, "effects.object", '"soft"', '"auto", "rigid"', "choose one of"),
-    ("[effects]\npad = 'linear'", 12, "effects.pad", '"linear"', '"hyperelastic"', "does not simulate it"),
+    ("[effects]\nfriction = 'coupled'", 12, "effects.friction", '"coupled"', '"curved"', "does not simulate it"),
     ("[effects]\nlimit_surface = 'cubic'", 12, "effects.limit_surface", '"cubic"', '"three_motions"', "choose one of"),
     ("[effects]\nwrench = '6D'", 12, "effects.wrench", '"6D"', '"3-D", "6-D"', 'did you mean "6-D"?'),
     ("[effects]\nlimit_surface = 'quartic'\n[limit_surface]\nmodel = 'full'", 12, "effects.limit_surface", '"quartic"',
