@@ -22,7 +22,7 @@ PICTURES = {"fem/mesh_object.py", "study/view/window.py", "study/view/drawing.py
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "shtab": {"study/completion.py"},
-    "h5py": {"study/store.py", "study/vtkhdf.py"},
+    "h5py": {"study/store.py", "study/vtkhdf.py", "study/cost/file.py"},
     "pyvista": PICTURES,
     "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
 }

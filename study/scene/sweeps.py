@@ -21,6 +21,8 @@ NOT_SWEPT = {
     "candidates.stations": "stations are an axis of the maps already",
     "friction.cor_grid": "it changes the size of the results",
     "accuracy.meshes": "it changes which maps there are",
+    "accuracy.e_n": "mesh, steps and effects are chosen once, for all cases",
+    "accuracy.cost_file": "mesh, steps and effects are chosen once, for all cases",
     "effects.wrench": "it changes what is stored",
     "object.mass_g": "it changes which maps there are; the safety factor is in proportion to 1 / mass",
     "limit_surface.samples": "it changes the size of the results",

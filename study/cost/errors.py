@@ -1,0 +1,135 @@
+"""From measurements to errors: the limit that every knob's ladder leads to, and how far each level is from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.cost.extrapolate import Limit, limit
+from study.cost.file import CostStudy
+from study.cost.knobs import Knob, Level
+from study.cost.measure import QUANTITIES, Measured
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LevelErrors:
+    """Time and errors of one level.
+
+    Attributes
+    ----------
+    seconds, own : float
+        CPU time of one case, the mean over the probes, and the part that is the knob's own [s].
+    worst, middle : (4,) arrays
+        Largest and median relative error over all cases, for `QUANTITIES`; NaN where a case has no value.
+    by_case : (4, cases) array
+    message : str
+        What failed.
+    """
+
+    name: str
+    seconds: float
+    own: float
+    worst: FloatArray
+    middle: FloatArray
+    by_case: FloatArray
+    message: str
+
+
+@dataclass(frozen=True)
+class KnobErrors:
+    """Errors of the measured levels of one knob, the cheapest setting first; ``own`` is the scene's own level or -1."""
+
+    name: str
+    long_name: str
+    levels: tuple[LevelErrors, ...]
+    settings: tuple[Level, ...]
+    own: int
+    limits: tuple[Limit, ...]
+    family: str = ""
+
+    @property
+    def judging(self) -> bool:
+        """Whether the knob leaves the contact as it is."""
+        return not self.settings
+
+
+def knob_errors(knob: Knob, found: Sequence[Sequence[Measured]], levels: Sequence[Level]) -> KnobErrors:
+    """Errors of the levels of a contact knob that were measured, ``found[level][probe]``, the finest last."""
+    return _errors(knob.name, knob.long_name, found, [v.name for v in levels], [v.size for v in levels], knob.formal,
+                   tuple(levels), knob.family)  # fmt: skip
+
+
+def judging_errors(name: str, found: Sequence[Sequence[Measured]], levels: Sequence[str]) -> KnobErrors:
+    """Errors of the levels of a knob that leaves the contact as it is."""
+    return _errors(name, "", found, levels, [np.nan] * len(levels), np.nan, (), "")
+
+
+def _errors(name, long_name, found, names, sizes, formal, settings, family) -> KnobErrors:
+    values = np.array([np.concatenate([m.values for m in own]) for own in found])  # level, case, quantity
+    limits = tuple(limit(sizes, values[:, :, q], formal) for q in range(len(QUANTITIES)))
+    levels = tuple(_level(text, own) for text, own in zip(names, found, strict=True))
+    return _with_limits(KnobErrors(name, long_name, levels, settings, -1, limits, family), values, limits)
+
+
+def _level(name: str, own: Sequence[Measured]) -> LevelErrors:
+    nothing = np.full(len(QUANTITIES), np.nan)
+    seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
+    told = "; ".join(dict.fromkeys(m.message for m in own if m.message))
+    return LevelErrors(name, seconds, part, nothing, nothing, nothing[:, None], told)
+
+
+def _with_limits(table: KnobErrors, values: FloatArray, limits: Sequence[Limit]) -> KnobErrors:
+    """Errors against given limits; the finest level is at least as uncertain as its own limit says."""
+    last = len(table.levels) - 1
+    made = []
+    for i, level in enumerate(table.levels):
+        errors = np.array([
+            np.abs(values[i, :, q] - found.value) / np.abs(found.value) for q, found in enumerate(limits)
+        ])  # fmt: skip
+        if i == last and last > 0:
+            floor = [f.uncertainty / np.abs(f.value) for f in table.limits]
+            seen = [not np.isnan(s.size) for s in table.settings] or [False]
+            if all(seen):  # a ladder without an end; the last of discrete levels is exact by definition
+                errors = np.fmax(errors, np.array(floor))
+        made.append(replace(level, worst=errors.max(axis=1), middle=np.median(errors, axis=1), by_case=errors))
+    return replace(table, levels=tuple(made))
+
+
+def share_limits(tables: list[KnobErrors], values: dict[str, FloatArray]) -> list[KnobErrors]:
+    """Give knobs of one family the limit of the one that is known best; ``values[name]`` are ``(level, case, 4)``."""
+    made = list(tables)
+    for family in {t.family for t in tables if t.family}:
+        own = [t for t in tables if t.family == family]
+        best = min(own, key=lambda t: float(np.nan_to_num(t.limits[0].uncertainty / t.limits[0].value, nan=9.0).max()))
+        for i, table in enumerate(made):
+            if table.family == family and table is not best:
+                made[i] = replace(_with_limits(table, values[table.name], best.limits), limits=table.limits)
+    return made
+
+
+def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],
+           judging: dict[str, list[str]]) -> list[KnobErrors]:  # fmt: skip
+    """Errors of every knob with at least two measured levels; ``settings`` by knob and level."""
+    made, values = [], {}
+    for knob in knobs:
+        levels = [v for v in knob.levels if study.has(settings[knob.name, v.name])]
+        found = [study.of(settings[knob.name, v.name]) for v in levels]
+        pairs = [(v, f) for v, f in zip(levels, found, strict=True) if np.isfinite([m.values for m in f]).any()]
+        if len(pairs) < 2:
+            continue
+        levels, found = [v for v, _ in pairs], [f for _, f in pairs]
+        table = knob_errors(knob, found, levels)
+        own = next((i for i, v in enumerate(levels) if settings[knob.name, v.name] == study.base), -1)
+        made.append(replace(table, own=own))
+        values[knob.name] = np.array([np.concatenate([m.values for m in f]) for f in found])
+    made = share_limits(made, values)
+    for name, levels in judging.items():
+        known = [v for v in levels if study.has(f"{name}: {v}")]
+        if len(known) > 1:
+            made.append(judging_errors(name, [study.of(f"{name}: {v}") for v in known], known))
+    return made

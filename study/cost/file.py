@@ -1,0 +1,166 @@
+"""The file of a cost study: measurements as columns, one row per case, written anew after each and renamed into place.
+
+A study has some hundred rows, so the whole file is written each time: a killed study keeps all that it measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from study.cost.knobs import Skipped
+from study.cost.measure import QUANTITIES, UNITS, Measured
+from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+
+PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
+TEXT = h5py.string_dtype("utf-8")
+MEANING = {
+    "setting": ("", "what tells settings apart: digest of the scene, or knob and level"),
+    "level": ("", "the setting in words"),
+    "candidate": ("", "label of the grasp candidate"),
+    "normal_force": ("N", "normal force per finger"),
+    "e_n": (UNITS["e_n"], "eccentricity parameter max tau_z / (mu S) of the weaker finger, curved model"),
+    "max_force": (UNITS["max_force"], "larger of max f_x and max f_y of the weaker finger, curved model"),
+    "max_torque": (UNITS["max_torque"], "max tau_z of the weaker finger, curved model"),
+    "quality": (UNITS["quality"], "volume of the grasp wrench space"),
+    "cpu_seconds": ("s", "CPU time of one case, the least of the repeats"),
+    "own_seconds": ("s", "part of it that the knob itself takes, where that is not the contact solve"),
+    "repeats": ("", "how often it was measured"),
+    "message": ("", "why there are no values"),
+}
+
+
+@dataclass
+class CostStudy:
+    """What was measured for one scene, on one machine.
+
+    Attributes
+    ----------
+    scene, digest, title, scene_file : str
+        The effective scene, and where it came from.
+    base : str
+        Setting of the scene as it is.
+    candidates : list of str
+        Labels of the probes.
+    calibration : float
+        CPU seconds of one factorisation of fixed size.
+    machine : str
+    measured : dict
+        By setting and candidate.
+    skipped : list of Skipped
+        Levels that were not measured.
+    """
+
+    scene: str
+    digest: str
+    title: str = ""
+    scene_file: str = ""
+    base: str = ""
+    candidates: list[str] = field(default_factory=list)
+    calibration: float = np.nan
+    machine: str = ""
+    measured: dict[tuple[str, str], Measured] = field(default_factory=dict)
+    skipped: list[Skipped] = field(default_factory=list)
+
+    def add(self, found: Measured) -> None:
+        """Keep a measurement."""
+        self.measured[found.setting, found.candidate] = found
+
+    def has(self, setting: str) -> bool:
+        """Whether a setting was measured on every probe."""
+        return all((setting, label) in self.measured for label in self.candidates)
+
+    def of(self, setting: str) -> list[Measured]:
+        """Measurements of a setting, one for each probe."""
+        return [self.measured[setting, label] for label in self.candidates]
+
+    @property
+    def spent(self) -> float:
+        """CPU time of all measurements [s]."""
+        return sum(m.spent for m in self.measured.values())
+
+
+HEADER = ("scene", "digest", "title", "scene_file", "base", "calibration", "machine")
+
+
+def save(path: Path, study: CostStudy) -> None:
+    """Write the study; raise `StudyError` where that cannot be done."""
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with h5py.File(part, "w") as file:
+            file.attrs.update(program=PROGRAM, kind=KIND, version=VERSION)
+            for name in HEADER:
+                file.attrs[name] = getattr(study, name)
+            file.attrs["calibration_meaning"] = "CPU seconds of one sparse factorisation of fixed size on this machine"
+            file.create_dataset("candidates", data=np.array(study.candidates, object), dtype=TEXT)
+            for name, values in _columns(study).items():
+                units, meaning = MEANING[name]
+                text = isinstance(values[0], str) if values else name in ("setting", "level", "candidate", "message")
+                made = file.create_dataset(
+                    f"measurements/{name}",
+                    data=np.array(values, object if text else float),
+                    dtype=TEXT if text else "<f8",
+                )
+                made.attrs.update(units=units, long_name=meaning)
+            for name in ("knob", "level", "reason"):
+                values = [getattr(s, name) for s in study.skipped]
+                file.create_dataset(f"skipped/{name}", data=np.array(values, object), dtype=TEXT)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _columns(study: CostStudy) -> dict[str, list]:
+    columns: dict[str, list] = {name: [] for name in MEANING}
+    for m in study.measured.values():
+        for force, values in zip(m.forces, m.values, strict=True):
+            row = [m.setting, m.what, m.candidate, float(force), *map(float, values), m.seconds, m.own,
+                   float(m.repeats), m.message]  # fmt: skip
+            for name, value in zip(MEANING, row, strict=True):
+                columns[name].append(value)
+    return columns
+
+
+def load(path: Path) -> CostStudy:
+    """Read a study; raise `StudyError` if the file is none."""
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("kind") != KIND or file.attrs.get("version") != VERSION:
+                raise StudyError(OTHER_FILE, f"{path}: not a cost study of this version; choose another file with -o")
+            header = {name: file.attrs[name] for name in HEADER}
+            header["calibration"] = float(header["calibration"])
+            study = CostStudy(**header, candidates=_texts(file["candidates"]))
+            columns = {name: file[f"measurements/{name}"] for name in MEANING}
+            read = {k: _texts(d) if h5py.check_string_dtype(d.dtype) else d[()] for k, d in columns.items()}
+            skipped = zip(*(_texts(file[f"skipped/{name}"]) for name in ("knob", "level", "reason")), strict=True)
+            study.skipped = [Skipped(*texts) for texts in skipped]
+    except FileNotFoundError as error:
+        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        text = f"{path}: not a readable cost study ({error}); move it away or name another with -o"
+        raise StudyError(OTHER_FILE, text) from error
+    _fill(study, read)
+    return study
+
+
+def _texts(dataset: h5py.Dataset) -> list[str]:
+    return [str(text) for text in dataset.asstr()[()]]
+
+
+def _fill(study: CostStudy, read: dict) -> None:
+    rows: dict[tuple[str, str], list[int]] = {}
+    for i, key in enumerate(zip(read["setting"], read["candidate"], strict=True)):
+        rows.setdefault(key, []).append(i)
+    for (setting, candidate), own in rows.items():
+        first = own[0]
+        values = np.column_stack([read[name][own] for name in QUANTITIES])
+        study.add(
+            Measured(setting, read["level"][first], candidate, read["normal_force"][own], values,
+                     float(read["cpu_seconds"][first]), float(read["own_seconds"][first]),
+                     int(read["repeats"][first]), read["message"][first])
+        )  # fmt: skip
