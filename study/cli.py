@@ -14,9 +14,12 @@ from study import commands
 from study.completion import add_options as add_completion_options
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, USAGE, StudyError
+from study.figures.command import add_options as add_figure_options
 from study.help import Parser, Program
 from study.patch.command import add_options as add_patch_options
+from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
+from study.watch import add_options as add_watch_options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -82,6 +85,8 @@ def program() -> Program:
     run.add_argument("--retry-failed", action="store_true", help="solve failed cases again")
     status = add("status", commands.status, "what a result file holds so far, also while it grows",
                  "softjaw status results/bottle-rigid.hdf")  # fmt: skip
+    add_watch_options(add("watch", commands.watch, "live view of a run, in another terminal",
+                          "softjaw watch results/bottle-rigid.hdf --every 5"))  # fmt: skip
     show = add("show", commands.show, "the best grasps as a table",
                "softjaw show results/bottle-rigid.hdf --force 4 --top 3 --json")  # fmt: skip
     report = add("report", commands.report, "one self-contained page: maps, definitions, provenance",
@@ -107,11 +112,14 @@ def program() -> Program:
         form = made.add_mutually_exclusive_group(required=made is export)
         form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
         form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
+    add_choice(report)
     report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
     add_patch_options(add("patch", commands.patch, "judge a pressure field from elsewhere: friction, score",
                           "softjaw patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60"))  # fmt: skip
     add_view_options(add("view", commands.view, "the map on the object in 3-D: window, page, picture",
                          "softjaw view results/bottle-rigid.hdf --force 4 --screenshot view.png"))  # fmt: skip
+    add_figure_options(add("figure", commands.figure, "a figure of the paper, from its scene to the picture",
+                           "softjaw figure 4c"))  # fmt: skip
     add_completion_options(add("completion", commands.completion, "a script by which the shell completes words",
                                "softjaw completion bash > softjaw.bash"))  # fmt: skip
     add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")

@@ -118,6 +118,13 @@ def status(options: Namespace) -> int:
     return DONE
 
 
+def watch(options: Namespace) -> int:
+    """Show how a run goes on until it ends."""
+    from study.watch import watch
+
+    return watch(Path(options.file), options.every)
+
+
 def show(options: Namespace) -> int:
     """Print the best grasps."""
     from study.columns import terminal_width
@@ -167,9 +174,10 @@ def export(options: Namespace) -> int:
 def report(options: Namespace) -> int:
     """Write one page with everything."""
     from study.report import write_report
+    from study.view.command import choice
 
     page = Path(options.output or Path(options.file).with_suffix(".html"))
-    for made in write_report(Path(options.file), page):
+    for made in write_report(Path(options.file), page, *choice(options)):
         print(f"written: {made}")
     return DONE
 
@@ -188,6 +196,13 @@ def view(options: Namespace) -> int:
 
     view(options)
     return DONE
+
+
+def figure(options: Namespace) -> int:
+    """Redraw figures of the paper."""
+    from study.figures.command import figure
+
+    return figure(options)
 
 
 def completion(options: Namespace) -> int:
@@ -250,8 +265,9 @@ def _run_on(comm: Any, options: Namespace) -> int:
         return scene, target(options, scene)
 
     scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
+    how = work(scene)  # loads PETSc, which all ranks have to do together
     plan = on_rank0(comm, prepare, scene, options)
-    return run_study(plan, work(scene), path, comm, retry_failed=options.retry_failed)
+    return run_study(plan, how, path, comm, retry_failed=options.retry_failed)
 
 
 def work(scene: Any) -> Any:
@@ -265,6 +281,8 @@ def work(scene: Any) -> Any:
         image=pipeline.image,
         finalise=lambda writer: derived.finalise(writer, scene),
         summary=summary,
+        time_limit=scene.run.time_limit_s,
+        memory=scene.run.memory_gb,
     )
 
 

@@ -1,0 +1,100 @@
+"""The live view: what it shows of a file that grows between its looks, when it ends, and with which exit code."""
+
+from __future__ import annotations
+
+import io
+
+import h5py
+import numpy as np
+import pytest
+
+from study import watch_view
+from study.cli import main
+from study.layout import DONE, FAILED, MISSING
+from study.watch import INTERRUPTED, watch
+from tests.study.formula_results import grid_axes, make
+
+SIZE = 4 * 6 * 4  # cases of the file
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+class Run:
+    """A run that solves some more cases whenever the watcher sleeps, and ends after the last of its steps."""
+
+    def __init__(self, path, steps, monkeypatch):
+        self.path, self.steps, self.slept = path, list(steps), []
+        make(path, axes=grid_axes(np.arange(4) * 0.01), status__code=MISSING)
+        monkeypatch.setattr(watch_view, "holder", lambda _: "host node7, 8 ranks" if self.steps else "")
+
+    def sleep(self, seconds):
+        self.slept.append(seconds)
+        count, state = self.steps.pop(0)
+        with h5py.File(self.path, "r+") as file:
+            codes = file["study/status/code"][()].ravel()
+            first = int(np.flatnonzero(codes == MISSING)[0])
+            codes[first : first + count] = state
+            file["study/status/code"][...] = codes.reshape(4, 6, 4)
+            if state == FAILED:
+                file["study/status/message"][np.unravel_index(first, (4, 6, 4))] = b"no contact at this force"
+
+
+def watched(run, stream):
+    return watch(run.path, 3.0, stream, run.sleep), stream.getvalue()
+
+
+def test_a_finished_run_ends_the_view_with_its_exit_code(tmp_path, monkeypatch):
+    run = Run(tmp_path / "a.hdf", [(40, DONE), (0, DONE), (SIZE - 40, DONE)], monkeypatch)
+    code, text = watched(run, io.StringIO())
+    assert code == 0
+    assert run.slept == [3.0] * 3
+    lines = [line.partition("] ")[2] for line in text.splitlines() if line.startswith("[")]
+    assert lines == ["0/96 done", "40/96 done", "96/96 done"]  # what has not changed is not told again
+    assert "complete" in text
+    assert "\x1b" not in text
+
+
+@pytest.mark.parametrize(("last", "code"), [((8, FAILED), 6), ((4, DONE), 75)])
+def test_failed_and_missing_cases_are_told_by_the_exit_code(tmp_path, monkeypatch, last, code):
+    run = Run(tmp_path / "a.hdf", [(SIZE - 8, DONE), last], monkeypatch)
+    found, text = watched(run, io.StringIO())
+    assert found == code
+    assert ("failed 1 x no contact at this force" in text) == (code == 6)
+    assert ("4 cases are missing; the same 'softjaw run' goes on from here" in text) == (code == 75)
+
+
+def test_a_terminal_is_drawn_over_itself(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    run = Run(tmp_path / "a.hdf", [(48, DONE), (2, FAILED), (SIZE - 50, DONE)], monkeypatch)
+    code, text = watched(run, Terminal())
+    assert code == 6
+    first, begun, failing, ended = text.split("\x1b[J")
+    assert "best so far: none is solved yet" in first
+    assert f"[{'#' * 20}{'.' * 20}] 50 %, 48 missing" in begun
+    assert "best so far at 8 N: quality 0.23, e_n 23 mm, at station 10 mm, angle 0 deg" in begun
+    assert "host node7, 8 ranks" in begun
+    assert "failed" not in begun
+    assert "failed last: no contact at this force, at station 20 mm" in failing
+    for before, drawn in ((first, begun), (begun, failing), (failing, ended)):
+        height = before.partition("\x1b[")[0].count("\n")
+        assert before.endswith(f"\x1b[{height}F"), "what was drawn is what is drawn over"
+        assert max(map(len, drawn.partition("\x1b[")[0].splitlines())) <= 80
+
+
+def test_ctrl_c_ends_the_view_and_not_the_run(tmp_path, monkeypatch):
+    run = Run(tmp_path / "a.hdf", [(8, DONE)], monkeypatch)
+
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    stream = io.StringIO()
+    assert watch(run.path, 1.0, stream, interrupted) == INTERRUPTED
+    assert stream.getvalue().endswith("no longer watching; the run goes on\n")
+
+
+@pytest.mark.parametrize("words", [["watch", "no.hdf"], ["watch", "a.hdf", "--every", "0"]])
+def test_what_cannot_be_watched_is_refused(words, capsys):
+    assert main(words) == (2 if "--every" in words else 3)
