@@ -79,6 +79,11 @@ def as_png(drawn: Any) -> bytes:
     return _saved(drawn, "png", dpi=160, facecolor="white", metadata={"Software": None})
 
 
+def as_webp(drawn: Any) -> bytes:
+    """The figure as WebP, for what is shaded: a tenth of the size of PNG."""
+    return _saved(drawn, "webp", dpi=190, facecolor="white", pil_kwargs={"quality": 82, "method": 6})
+
+
 def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:
     """Borders of the cells round rising values, halfway between neighbours; one value gets a cell ``alone`` wide.
 

@@ -1,6 +1,8 @@
 """One self-contained page about a result file, and a picture of its maps or curves: for mails, slides, printing.
 
-The page answers first: where to grasp, how sure that is, what failed. It needs no network and runs no script.
+The page answers in the order of a reader's questions: where to grasp and how sure that is, the object and its maps,
+what failed and why, the best case in detail, then how it was computed. It needs no network, and its one script only
+tells the values of the maps' cells.
 """
 
 from __future__ import annotations
@@ -12,7 +14,20 @@ from typing import Any
 
 from study import pictures
 from study.exits import CANNOT_WRITE, StudyError
-from study.report import background, curvature, curves, levels, wall_curves, wall_shape, wall_words, window, words
+from study.report import (
+    background,
+    cases,
+    cost,
+    curvature,
+    curves,
+    levels,
+    object_view,
+    wall_curves,
+    wall_shape,
+    wall_words,
+    window,
+    words,
+)
 from study.report import maps as report_maps
 from study.report import patch as report_patch
 from study.report import side as report_side
@@ -23,36 +38,43 @@ from study.report.page import Picture, heading, page, paragraph, picture
 from study.store import open_result
 
 Sections = list[tuple[str, str, str]]
+Place = tuple[float | None, float | None]
 
 
-def write_report(file: Path, out: Path) -> list[Path]:
+def write_report(file: Path, out: Path, candidate: int | None = None, place: Place = (None, None)) -> list[Path]:
     """Write the page ``out`` and, beside it, the maps (or difference curves) as a PNG; the paths that were written.
+
+    A candidate, counted over stations and angles, or the one nearest to a ``place`` (station [m], angle [rad]) is shown
+    beside the best one.
 
     Raises
     ------
     StudyError
-        If ``file`` is no result file, or ``out`` cannot be written.
+        If ``file`` is no result file or has no such candidate, or ``out`` cannot be written.
     """
     file, out = Path(file), Path(out)
     picture_path = out.with_suffix(".png")
     if file.resolve() in (out.resolve(), picture_path.resolve()) or out == picture_path:
         raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
     with open_result(file) as result, pictures.style():
-        html, png = build(result)
+        html, png = build(result, candidate, place)
     return [_write(out, html.encode()), _write(picture_path, png)]
 
 
-def build(result: Any) -> tuple[str, bytes]:
+def build(result: Any, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
     """The page and the picture of an open result file."""
     data, scene = Data(result), read_scene(result.scene)
+    if candidate is not None or place != (None, None):
+        from study.view.model import view_of  # the view shares the report's words
+
+        data.chosen = view_of(data, candidate, place, None)[1]
     mu = scene.friction.mu if scene else None
     best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
     maps, png = report_maps.force_maps(data, best)
-    several = maps if data.status.size > 1 else None
-    shapes = [report_side.side_view(data, scene, best), several, report_maps.angle_maps(data, best)]
     sections: Sections = [
-        ("verdict", "", words.verdict(data, mu) + words.best_tables(data)),
-        ("maps", "Maps", _pictures(shapes) + paragraph(words.CAVEAT, "note")),
+        ("verdict", "", words.verdict(data, mu) + words.chosen(data) + words.best_tables(data)),
+        ("object", "The object", object_view.object_section(data, best) + _side(data, scene, best)),
+        ("maps", "Maps", maps_section(data, best, maps)),
     ]
     if data.best is not None and data.map("dent") is not None:
         sections.append(("wall", "What the wall bears", wall_section(data, scene, data.best)))
@@ -60,20 +82,51 @@ def build(result: Any) -> tuple[str, bytes]:
         sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in differences)))
         png = differences[0][1]  # what a sweep of the shape was made for
     if data.best is not None:
-        sections.append(("models", "Friction models compared", _models(data, data.best, mu)))
-        if patch := report_patch.patch_picture(data, data.best):
-            sections.append(("patch", "Contact patch of the best case", _pictures([patch])))
-        if drawn := _surfaces(data, data.best):
-            sections.append(("surface", "Limit surface of the best case", _pictures(drawn)))
+        sections += case_sections(data, data.best, mu)
     sections += [
-        ("cases", "Cases and checks", words.cases(data) + words.checks(data)),
         ("effects", "What was simulated", effects(data, best)),
+        ("cost", "Convergence and cost", cost_section(data, best)),
         ("definitions", "Definitions", background.definitions(data)),
-        ("provenance", "Provenance and time", background.provenance(data) + background.time_split(data)),
+        ("provenance", "Provenance", background.provenance(data)),
         ("scene", "Scene in effect", background.scene_text(data)),
     ]
     title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
     return page(title, words.subtitle(data), sections), png
+
+
+def _side(data: Data, scene: Any, best: tuple[int, ...]) -> str:
+    return _pictures([report_side.side_view(data, scene, best)])
+
+
+def maps_section(data: Data, best: tuple[int, ...], maps: Picture) -> str:
+    """Maps over force and angle, why cases failed, and every case."""
+    shown = [maps if data.status.size > 1 else None, report_maps.angle_maps(data, best)]
+    how = paragraph(report_maps.POINT, "note") if any(p and p.spots for p in shown) and cases.listed(data) else ""
+    html = how + _pictures(shown) + cases.failures(data) + cases.every_case(data)
+    return html + paragraph(words.CAVEAT, "note")
+
+
+def case_sections(data: Data, best: tuple[int, ...], mu: float | None) -> Sections:
+    """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
+    found: Sections = [("models", "Friction models compared", _models(data, best, mu))]
+    roles = [("Best case", best)]
+    if data.chosen is not None and data.other[0] == data.chosen:
+        roles.append(("Chosen candidate", data.chosen))
+    which = "of the best case" if len(roles) == 1 else "of both cases"
+    patches = [(role, report_patch.patch_picture(data, index)) for role, index in roles]
+    surfaces = [(role, report_surface.surface_pictures(data, index)) for role, index in roles]
+    head = heading if len(roles) > 1 else lambda _: ""
+    if any(shown for _, shown in patches):
+        html = "".join(head(role) + _pictures([shown]) for role, shown in patches if shown)
+        found.append(("patch", f"Contact patch {which}", html))
+    html = "".join(head(role) + _pictures(shown) for role, shown in surfaces if shown) + _misfit(data, best)
+    return [*found, ("surface", f"Limit surface {which}", html)] if html else found
+
+
+def cost_section(data: Data, best: tuple[int, ...]) -> str:
+    """States, checks, effort and time."""
+    shown = _pictures([cost.cost_picture(data, best)])
+    return cases.states(data) + cases.checks(data) + shown + background.time_split(data)
 
 
 def _pictures(shown: Iterable[Picture | None]) -> str:
@@ -112,11 +165,10 @@ def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:
     return html
 
 
-def _surfaces(data: Data, best: tuple[int, ...]) -> list[Picture]:
-    """Limit surfaces of the best case, and how well they fit along an axis of several values."""
+def _misfit(data: Data, best: tuple[int, ...]) -> str:
+    """How well limit surfaces fit along an axis of several values."""
     over = next((p for p in [*reversed(_worth_a_curve(data)), len(best) - 1] if data.shape[p] > 1), None)
-    curve = None if over is None else report_surface.misfit_curves(data, over, best)
-    return [*report_surface.surface_pictures(data, best), *([curve] if curve else [])]
+    return "" if over is None else _pictures([report_surface.misfit_curves(data, over, best)])
 
 
 def _worth_a_curve(data: Data) -> list[int]:

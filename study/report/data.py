@@ -55,12 +55,14 @@ def number(value: float, digits: int = 3) -> str:
 class Data:
     """A result file as a report sees it; ``None`` stands for what the file does not have.
 
-    The states are read first: a case that is done then has its values, even while a run goes on writing.
+    The states are read first: a case that is done then has its values, even while a run goes on writing. ``chosen`` is
+    the index of a case that the reader asked for beside the best one.
     """
 
-    def __init__(self, result: Any) -> None:
+    def __init__(self, result: Any, chosen: tuple[int, ...] | None = None) -> None:
         self.result, self.axes, self.shape = result, result.axes, result.layout.shape
         self.status = result.status
+        self.chosen = chosen
         self.forces: np.ndarray = self.axes[-1].values
         self.by_poses = not self.axes[-3].units
         self._paths = {d.path.removeprefix(f"{ROOT}/"): d for d in result.layout.datasets}
@@ -89,6 +91,11 @@ class Data:
     def count(self, state: int) -> int:
         """Number of cases in this state."""
         return int(np.sum(self.status == state))
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Row in the file of every case, over all axes."""
+        return np.arange(self.status.size).reshape(self.shape)
 
     def values(self, path: str) -> np.ndarray | None:
         """A dataset below ``/study`` over all cases, NaN where the case is not done; None if there is no value."""
@@ -179,7 +186,9 @@ class Data:
 
     @cached_property
     def other(self) -> tuple[tuple[int, ...] | None, str]:
-        """A case to compare the best with, and why it was chosen: the widest place, or else the worst one."""
+        """A case to compare the best with, and why: the one asked for, the widest place, or else the worst one."""
+        if self.chosen is not None and self.chosen != self.best and self.status[self.chosen] == DONE:
+            return self.chosen, "the chosen candidate"
         order = self.order(self.k)
         width = self.map("contact_distance")
         if self.best is None or len(order) < 2:
@@ -190,7 +199,7 @@ class Data:
             widest = next(i for i in here if width[i] >= (1 - WIDE) * max(width[j] for j in here))
             if widest not in same and width[widest] > (1 + WIDE) * width[self.best]:
                 return widest, "the widest place"
-        return (order[-1], "the lowest score") if order[-1] not in same else (None, "")
+        return (order[-1], "the last in the ranking") if order[-1] not in same else (None, "")
 
     def name(self, axis: Any) -> str:
         """An axis in words."""

@@ -12,11 +12,13 @@ from study import pictures
 from study.layout import FAILED
 from study.report.data import Data, number, shown
 from study.report.page import Picture
+from study.report.spots import Spot, spot
 
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
 SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]", "dent": "dent [mm]", "wall_stress": "wall stress [MPa]"}
 MAPS = ("quality", "e_n")
 OF_WALL = ("dent", "wall_stress")
+POINT = "Point at a cell, tap it, or reach a map with the tab key and go on with the arrow keys: its values are told."
 HOW_TO_READ = "Crossed out: failed. Dotted: no value yet."
 
 
@@ -108,6 +110,13 @@ def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int]
     return drawn
 
 
+def _spot(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], where: str = "") -> Spot:
+    """Where the cells of a panel are on a drawn picture, and their cases."""
+    cases = plane(data, data.rows, x, y, index)
+    label = f"{data.units(name)[0]}{f' at {where}' if where else ''}"
+    return spot(axes, label, ticks(data, x)[0], ticks(data, y)[0], cases)
+
+
 def _cross(axes: Any, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> None:
     """Small crosses in the middle of cells between borders ``x`` and ``y``, one marker for all of them."""
     i, j = np.nonzero(chosen)
@@ -167,7 +176,12 @@ def force_maps(data: Data, index: tuple[int, ...], names: tuple[str, str] = MAPS
         caption += f" {hidden} more angle{'s' * (hidden > 1)} not drawn here: {why}."
     over = f"{data.name(data.axes[x])} and normal force"
     alt = f"Heat maps of {' and '.join(labels)} over {over}. {extremes(data, index, names)}"
-    shown_ = Picture(pictures.as_svg(drawn), alt, caption)
+    svg = pictures.as_svg(drawn)
+    spots = [
+        _spot(data, axes[row, column], name, x, y, (*index[:angle], j, index[-1]), axes[row, column].get_title("left"))
+        for row, j in enumerate(rows) for column, name in enumerate(names)
+    ]  # fmt: skip
+    shown_ = Picture(svg, alt, caption, spots=tuple(spots))
     drawn.suptitle(f"{data.title}: {' and '.join(labels)}", fontsize=10, x=0.01, ha="left")
     return shown_, pictures.as_png(drawn)
 
@@ -202,4 +216,6 @@ def angle_maps(data: Data, index: tuple[int, ...]) -> Picture | None:
     axes[0, 0].set_ylabel("angle [°]")
     caption = f"At {elsewhere(data, index, x, y) or number(data.forces[index[-1]]) + ' N'}. {HOW_TO_READ}"
     alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and angle. {extremes(data, index)}"
-    return Picture(pictures.as_svg(drawn), alt, caption)
+    svg = pictures.as_svg(drawn)
+    spots = [_spot(data, axes[0, column], name, x, y, index) for column, name in enumerate(MAPS)]
+    return Picture(svg, alt, caption, spots=tuple(spots))

@@ -13,6 +13,8 @@ from study.report.data import Data, number
 from study.report.page import Picture
 
 ALIKE = 1e-3  # difference of the fingers' pressures over the largest one that is not drawn twice
+MOTIONS = ("x", "turn")
+ARROWS = 18  # along the pad's longer side, at most
 LOADED = 1e-9  # share of the largest pressure below which a face counts as free
 
 
@@ -43,7 +45,7 @@ def cells(points: np.ndarray) -> list[np.ndarray]:
 
 
 def patch_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
-    """Pressure on the pads of one case, from the front and along the pad's long side; None if it is not stored."""
+    """Pressure and friction on the pads of one case, and the front along its long side; None if it is not stored."""
     if not data.result.layout.patches or data.status[index] != DONE:
         return None
     patch = data.result.patch(data.result.row(*index))
@@ -51,27 +53,38 @@ def patch_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
         return None
     pressure = np.nan_to_num(patch["pressure"]) * 1e-3
     fingers = [0] if _alike(pressure) else [0, 1]
-    heights = 3.1 * len(fingers) + 0.2
-    drawn, axes = pictures.figure(10, heights, len(fingers), 2, width_ratios=[1.9, 1])
-    top = pressure.max()
+    drawn, axes = pictures.figure(10, 2.3 * len(fingers) + 0.2, len(fingers), 3, width_ratios=[1, 1, 0.5])
+    top, directed = pressure.max(), False
     try:
         for row, finger in enumerate(fingers):
             place = 1e3 * patch["centroid"][finger]
-            mapped = _front(data, axes[row, 0], index, finger, place, pressure[finger], top)
-            _profile(axes[row, 1], place, pressure[finger], top)
-            name = f"finger {finger + 1}" if len(fingers) > 1 else "both fingers carry the same"
-            axes[row, 0].set_title(f"pad front, {name}")
-            axes[row, 1].set_title("seen along x, the object above")
-            pictures.colour_bar(drawn, mapped, axes[row, 0], "pressure [kPa]", beside=True)
+            frame = _contact_frame(data, index, finger)
+            for panel, motion in zip(axes[row], MOTIONS, strict=False):
+                mapped = _front(panel, place, pressure[finger], top)
+                if frame is not None:
+                    directed |= _friction(panel, patch, finger, frame, motion)
+                    _frame(panel, *frame, 0.28 * np.ptp(place[:, :2], axis=0).min())
+            name = f"finger {finger + 1}" if len(fingers) > 1 else "both fingers alike"
+            axes[row, 0].set_title(f"{name}: slip along x")
+            axes[row, 1].set_title(f"{name}: turn about z")
+            axes[row, 1].set_ylabel("")
+            _profile(axes[row, 2], place, pressure[finger], top)
+            pictures.colour_bar(drawn, mapped, axes[row, 1], "pressure [kPa]", beside=True)
     except ValueError:
         return None
     area, peak = data.at("contact_area", index) * 1e6, float(top)
     said = f"largest pressure {number(peak)} kPa, contact area {number(area)} mm²"
+    darts = (
+        "Small arrows: friction of the faces, each in its own plane, against a slip of the object along x and a turn"
+        " about z; their length is its size. " if directed else ""
+    )  # fmt: skip
     caption = (
-        f"{data.place(index, force=True)}: {said}. Faces that touch nothing are pale. The arrows are the axes x and y "
-        "of the contact frame at its origin; friction is given along them, and about their normal z."
+        f"{data.place(index, force=True)}: {said}. Faces that touch nothing are pale. {darts}x and y are the axes of "
+        "the contact frame at its origin (ring); friction is given along them, and about their normal z. Right: the "
+        "front across the pad, the object above."
     )
-    return Picture(pictures.as_svg(drawn), f"Contact pressure on the pad, {said}", caption)
+    alt = f"Contact pressure{' and directions of friction' * directed} on the pad, {said}"
+    return Picture(pictures.as_svg(drawn), alt, caption)
 
 
 def _alike(pressure: np.ndarray) -> bool:
@@ -79,7 +92,7 @@ def _alike(pressure: np.ndarray) -> bool:
     return bool(np.abs(one - two).max() <= ALIKE * max(pressure.max(), 1e-300))
 
 
-def _front(data: Data, axes: Any, index: Any, finger: int, place: np.ndarray, pressure: np.ndarray, top: float) -> Any:
+def _front(axes: Any, place: np.ndarray, pressure: np.ndarray, top: float) -> Any:
     corners = cells(place[:, :2])
     loaded = pressure > LOADED * top
     free = [corners[i] for i in np.flatnonzero(~loaded)]
@@ -93,10 +106,54 @@ def _front(data: Data, axes: Any, index: Any, finger: int, place: np.ndarray, pr
     room = 0.02 * (high - low).max()
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
     axes.set(xlabel="x, along the pad [mm]", ylabel="y, across [mm]")
-    origin, frame = data.values("fingers/frame_origin"), data.values("fingers/frame_axes")
-    if origin is not None and frame is not None:
-        _frame(axes, 1e3 * origin[index][finger], frame[index][finger], 0.28 * min(high - low))
     return mapped
+
+
+def _contact_frame(data: Data, index: tuple[int, ...], finger: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Origin ``(3,)`` [mm] and axes as rows ``(3, 3)`` of the contact frame in the pad's frame; None if not stored."""
+    origin, frame = data.values("fingers/frame_origin"), data.values("fingers/frame_axes")
+    if origin is None or frame is None:
+        return None
+    return 1e3 * origin[index][finger], frame[index][finger]
+
+
+def friction_directions(
+    place: np.ndarray, normal: np.ndarray, origin: np.ndarray, frame: np.ndarray, motion: str
+) -> np.ndarray:
+    """Unit directions ``(n, 3)`` of the friction that faces feel while the object slips along x or turns about z.
+
+    Every face resists in its own plane (curved contact model); zero where the object only lifts off or presses.
+    """
+    v = np.broadcast_to(frame[0], place.shape) if motion == "x" else np.cross(frame[2], place - origin)
+    v = v - np.einsum("ki,ki->k", v, normal)[:, None] * normal
+    size = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.divide(v, size, out=np.zeros_like(v), where=size > 1e-12)
+
+
+def _friction(axes: Any, patch: dict[str, np.ndarray], finger: int, frame: Any, motion: str) -> bool:
+    """Arrows of some loaded faces; whether there are any."""
+    if "normal" not in patch:
+        return False
+    place, load = 1e3 * patch["centroid"][finger], np.nan_to_num(patch["pressure"][finger] * patch["area"][finger])
+    e = friction_directions(place, patch["normal"][finger], *frame, motion)
+    some = _spread(place, np.flatnonzero(load > LOADED * load.max(initial=0.0)))
+    if not some.size:
+        return False
+    arrows = (load[some] / load.max())[:, None] * e[some, :2]
+    step = np.ptp(place[:, :2], axis=0).max() / ARROWS
+    look = {"angles": "xy", "scale_units": "xy", "scale": 0.9 / step, "width": 0.0045, "pivot": "mid", "zorder": 4}
+    axes.quiver(*place[some, :2].T, *arrows.T, color="white", edgecolor=pictures.INK, linewidth=0.5, **look)
+    return True
+
+
+def _spread(place: np.ndarray, loaded: np.ndarray) -> np.ndarray:
+    """Of the loaded faces one in each square of a coarse grid over the pad, the one nearest to its middle."""
+    low, step = place[:, :2].min(axis=0), np.ptp(place[:, :2], axis=0).max() / ARROWS
+    share = (place[loaded, :2] - low) / step
+    square = np.floor(share - 1e-9).astype(int)
+    order = np.lexsort((np.linalg.norm(share - square - 0.5, axis=1), square[:, 1], square[:, 0]))
+    first = np.unique(square[order], axis=0, return_index=True)[1]
+    return loaded[order[first]]
 
 
 def _frame(axes: Any, origin: np.ndarray, frame: np.ndarray, length: float) -> None:
@@ -115,4 +172,6 @@ def _profile(axes: Any, place: np.ndarray, pressure: np.ndarray, top: float) -> 
     order = np.flatnonzero(loaded)[np.argsort(pressure[loaded])]
     axes.scatter(place[order, 1], place[order, 2], c=pressure[order], s=9, cmap=pictures.COLOURS["pressure"], vmin=0,
                  vmax=top or 1.0)  # fmt: skip
-    axes.set(xlabel="y, across [mm]", ylabel="z [mm]", aspect="equal")
+    true = np.ptp(place[:, 2]) > 0.25 * np.ptp(place[:, 1])  # else it would be a line
+    axes.set(xlabel="y, across [mm]", ylabel="z [mm]", aspect="equal" if true else "auto")
+    axes.set_title("seen along x" if true else "seen along x, z stretched")

@@ -14,6 +14,7 @@ from study.report.data import Data
 from study.report.maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
 from study.report.outline import outline, pad_extent, slice_polygon
 from study.report.page import Picture
+from study.report.spots import spot
 
 MOST_STATIONS = 80  # more ticks than that would be a bar
 
@@ -54,7 +55,11 @@ def side_view(data: Data, scene: Any, index: tuple[int, ...]) -> Picture | None:
     caption = f"Seen across the approach{f', at {where}' if where else ''}. {ticks}{pads}{read}{how}"
     coloured = " in the colours of grasp quality and e_n" if names else ""
     alt = f"Side view of {data.title}{coloured}. {extremes(data, index)}"
-    return Picture(pictures.as_svg(drawn), alt, caption, narrow=len(names) < 2)
+    svg = pictures.as_svg(drawn)
+    cases = data.rows[(*index[:-3], slice(None), *index[-2:])][None, :]
+    reach = 1e3 * radius.max() * np.array([-1.0, 1.0])
+    spots = [spot(a, data.units(name)[0], 1e3 * borders, reach, cases) for a, name in zip(axes[0], names, strict=False)]
+    return Picture(svg, alt, caption, narrow=len(names) < 2, spots=tuple(spots))
 
 
 def _slices(data: Data, drawn: Any, axis: Any, name: str, index: Sequence[int], line: Any, borders: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Words and tables of a report: the verdict and the best grasps, what failed and why, and the checks."""
+"""Words and tables of a report's verdict: the best grasps, how sure they are, and what stands against them."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import numpy as np
 
 from study.layout import DONE, FAILED, MISSING
 from study.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
-from study.report.data import ABOVE, LIMITS, Data, number, passes, shown
+from study.report.data import LIMITS, Data, number, shown
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 
-BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
+BEST = 6
 HARM = SLIDES_OUT | YIELDS | TOO_WEAK | TOO_STRONG
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
     "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
     "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
 )
-COLUMNS = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
+ESTIMATED = "± is the difference to a mesh half as fine, in per cent of the value; the error is usually smaller."
+NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
+VALUES = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 HEADS = {
     "quality": "quality", "quality_fitted": "quality, fitted", "e_n": "e_n [mm]", "f_x_max": "max f_x [N]",
     "f_y_max": "max f_y [N]", "tau_z_max": "max tau_z [N mm]",
@@ -57,8 +59,11 @@ def verdict(data: Data, mu: float | None) -> str:
 
 
 def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list[str]:
-    value = {name: number(data.at(name, best) * data.units(name)[2]) for name in COLUMNS}
-    what = f"quality {value['quality']}" if data.score == "quality" else "ranked by e_n, for no quality is stored"
+    said = {name: number(data.at(name, best) * data.units(name)[2]) for name in VALUES}
+    sure = {name: uncertainty(data, name, best) for name in VALUES}
+    what = f"quality {said['quality']}{sure['quality']}"
+    if data.score != "quality":
+        what = "ranked by e_n, for no quality is stored"
     if not np.isfinite(data.at(data.score, best)):
         what = "which has no score"
     alike = data.images(best)
@@ -66,12 +71,13 @@ def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list
     best_of = "Best grasp" if data.grasps > 1 else "Best point of the sweep" if data.sweeps else "The grasp"
     first = (
         f"{best_of} at {number(data.forces[best[-1]])} N per finger: {data.place(best)}, {what}, "
-        f"e_n {value['e_n']} mm{_error(data, best)}.{same}"
+        f"e_n {said['e_n']} mm{sure['e_n']}.{same}"
     )
     friction = f", mu = {mu:g}" if mu is not None else ""
     second = (
-        f"There a contact holds up to {value['f_x_max']} N along the pad, {value['f_y_max']} N across it and "
-        f"{value['tau_z_max']} N mm of torque about its normal (curved model{friction}; weaker finger)."
+        f"There a contact holds up to {said['f_x_max']} N{sure['f_x_max']} along the pad, "
+        f"{said['f_y_max']} N{sure['f_y_max']} across it and {said['tau_z_max']} N mm{sure['tau_z_max']} of torque "
+        f"about its normal (curved model{friction}; weaker finger)."
     )
     wall = [text for text in (wall_sentence(data, best),) if text]
     return [first, second, *_weight(data, best), *wall, *_planar(data, best), *_other_force(data, best)]
@@ -86,9 +92,21 @@ def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
     return [f"{what}." if factor >= 1 else f"{what}: it would lose the object."]
 
 
-def _error(data: Data, index: tuple[int, ...]) -> str:
-    error = data.at("e_n_error", index)
-    return f" ± {number(100 * error, 2)} % (difference to a mesh half as fine)" if np.isfinite(error) else ""
+def uncertainty(data: Data, name: str, index: tuple[int, ...]) -> str:
+    """How far off a value may be, where the file knows: the one place that says so in verdict, tables and maps."""
+    error = data.at(f"{name}_error", index)
+    return f" ± {number(100 * error, 2)} %" if np.isfinite(error) else ""
+
+
+def value(data: Data, name: str, index: tuple[int, ...], digits: int = 4) -> str:
+    """A map's value in the unit people read, with its uncertainty where that is known."""
+    found = data.at(name, index)
+    return number(found * data.units(name)[2], digits) + uncertainty(data, name, index)
+
+
+def head(data: Data, name: str) -> str:
+    """A map in the head of a column."""
+    return HEADS.get(name) or data.label(name)
 
 
 def _planar(data: Data, index: tuple[int, ...]) -> list[str]:
@@ -109,10 +127,27 @@ def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
     top = max(tops, key=lambda i: np.nan_to_num(data.at(data.score, i), nan=-np.inf))
     if top[-1] == best[-1] or not data.at(data.score, top) > data.at(data.score, best) * (1 + 1e-3):
         return []
-    value = number(data.at(data.score, top) * data.units(data.score)[2])
+    most = number(data.at(data.score, top) * data.units(data.score)[2])
     unit = data.units(data.score)[1]
     what = "quality, a score per unit of normal force," if data.score == "quality" else data.score
-    return [f"Over all forces {what} is largest at {data.place(top, force=True)}: {value} {unit}".rstrip() + "."]
+    return [f"Over all forces {what} is largest at {data.place(top, force=True)}: {most} {unit}".rstrip() + "."]
+
+
+def chosen(data: Data) -> str:
+    """What is to be said of the candidate that was asked for; empty where none was."""
+    index = data.chosen
+    if index is None:
+        return ""
+    which = f"Chosen candidate {np.ravel_multi_index(index[:-1], data.shape[:-1])}: {data.place(index, force=True)}"
+    if data.status[index] == FAILED:
+        return box([f"{which}, failed: {data.result.messages[index] or 'no reason was given'}"], "warn")
+    if data.status[index] != DONE:
+        return box([f"{which}, is not solved yet."], "warn")
+    order = data.order(index[-1])
+    said = ", ".join(f"{head(data, name)} {value(data, name, index, 3)}" for name in ("quality", "e_n"))
+    flags = "".join(f" {word}: {meaning}." for _, word, meaning in _flags(data, index))
+    text = f"{which}: {said}, place {order.index(index) + 1} of {len(order)} at this force.{flags}"
+    return box([text + (" It is the best one." if index == data.best else "")], "verdict")
 
 
 def _warnings(data: Data, best: tuple[int, ...]) -> str:
@@ -133,10 +168,8 @@ def _warnings(data: Data, best: tuple[int, ...]) -> str:
     if len(stations) > 2 and not data.by_poses and best[-3] in (int(stations.argmin()), int(stations.argmax())):
         found.append("The best station is the first or last one that was tried; a better one may lie beyond.")
     html = box(found, "warn") if found else ""
-    if not np.isfinite(data.at("e_n_error", best)):
-        text = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
-        html += paragraph(text, "note")
-    return html
+    known = any(uncertainty(data, name, best) for name in VALUES)
+    return html + paragraph(ESTIMATED if known else NOT_ESTIMATED, "note")
 
 
 def _listed(words: list[str], most: int = 4) -> str:
@@ -149,7 +182,7 @@ def best_tables(data: Data) -> str:
     if not order:
         return ""
     last = f"e_n {data.planar} [mm]" if data.bound("force_high") is None else "safe forces [N]"
-    head = ["grasp", *(HEADS[name] for name in COLUMNS), last, "checks and remarks"]
+    heads = ["grasp", *(HEADS[name] for name in VALUES), last, "checks and remarks"]
     chosen: list[tuple[int, ...]] = []
     merged: set[tuple[int, ...]] = set()
     for index in order:
@@ -159,15 +192,15 @@ def best_tables(data: Data) -> str:
     rows = [[_with_angles(data, index), *_row(data, index)] for index in chosen]
     force = number(data.forces[data.k])
     caption = f"Best grasps at {force} N per finger, candidates solved: {len(order)} (curved model)"
-    html = table(caption, head, rows, texts=(0,), wide=(len(head) - 1,), first=True)
+    html = table(caption, heads, rows, texts=(0,), wide=(len(heads) - 1,), first=True)
     if len(data.forces) > 1:
         rows = []
         for k, force in enumerate(data.forces):
             found = data.order(k)[:1]
-            values = _row(data, found[0]) if found else ["–"] * (len(head) - 2) + ["not solved"]
+            values = _row(data, found[0]) if found else ["–"] * (len(heads) - 2) + ["not solved"]
             rows.append([number(force), data.place(found[0]) if found else "–", *values])
-        head = ["force [N]", *head]
-        html += table("Best grasp at each force", head, rows, wide=(1, len(head) - 1))
+        heads = ["force [N]", *heads]
+        html += table("Best grasp at each force", heads, rows, wide=(1, len(heads) - 1))
     tops = [index for k in range(len(data.forces)) for index in data.order(k)[:1]]
     html += paragraph(SAFE, "note") if data.bound("force_high") is not None else ""
     words = {word: meaning for index in (*chosen, *tops) for _, word, meaning in _flags(data, index)}
@@ -190,57 +223,9 @@ def _flags(data: Data, index: tuple[int, ...]) -> list[tuple[int, str, str]]:
 
 
 def _row(data: Data, index: tuple[int, ...]) -> list[str]:
-    values = [number(data.at(name, index) * data.units(name)[2], 4) for name in COLUMNS]
+    values = [value(data, name, index) for name in VALUES]
     known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
     checks = data.flagged(index) or ["passed" if known else "not stored"]
     remarks = ", ".join([*checks, *(word for _, word, _ in _flags(data, index))])
     planar = number(data.at("e_n", index, data.planar) * 1e3, 4)
     return [*values, planar if data.bound("force_high") is None else window_text(data, index), remarks]
-
-
-# --- cases -----------------------------------------------------------------------------------------------------------
-
-
-def cases(data: Data) -> str:
-    """Counts, reasons of failures and notes on solved cases, alike messages together."""
-    states = (("solved", DONE), ("failed", FAILED), ("missing", MISSING))
-    counts = [[name, str(data.count(state))] for name, state in states]
-    html = table("State of the cases", ["state", "cases"], counts, texts=(0,))
-    for state, caption in ((FAILED, "Why cases failed"), (DONE, "Notes on solved cases")):
-        groups = data.grouped(state)
-        rows = [[str(count), text, _places(data, where)] for count, text, where in groups[:MOST_REASONS]]
-        if rows:
-            html += table(caption, ["cases", "message (one example)", "where"], rows, wide=(1, 2))
-        if len(groups) > MOST_REASONS:
-            more = len(groups) - MOST_REASONS
-            html += paragraph(f"{more} more kinds of messages are in status/message of the file.", "note")
-    return html
-
-
-def _places(data: Data, where: list[tuple[int, ...]]) -> str:
-    words = [data.place(index, force=True) for index in where[:MOST_PLACES]]
-    return "; ".join([*words, *["…"] * (len(where) > MOST_PLACES)])
-
-
-def checks(data: Data) -> str:
-    """The worst value of each check over all solved cases, and where it was found."""
-    rows = []
-    for name in (*LIMITS, "max_strain"):
-        found = data.values(f"checks/{name}")
-        if found is None:
-            continue
-        pick = np.nanargmin if name in ABOVE else np.nanargmax
-        index = np.unravel_index(pick(found), found.shape)
-        value = float(found[index])
-        limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
-        state = "–" if name not in LIMITS else "passed" if passes(name, value) else "not passed"
-        rows.append([_path(data, f"checks/{name}"), number(value), limit, state, data.place(index[:-1], force=True)])
-    if not rows:
-        return paragraph("No checks are stored.", "note")
-    head = ["check", "worst value", "should be", "", "worst case"]
-    return table("Checks of the contact solutions, worst of all solved cases and fingers", head, rows, texts=(0, 3, 4))
-
-
-def _path(data: Data, path: str) -> str:
-    found = next((d for d in data.result.layout.datasets if d.path.endswith(f"/{path}")), None)
-    return str(found.attributes.get("long_name", path)) if found else path

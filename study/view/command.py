@@ -20,9 +20,7 @@ ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm"), "vtkhdf": (".vtkh
 def add_options(parser: ArgumentParser) -> None:
     """The options of the command."""
     parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    parser.add_argument("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
-    parser.add_argument("--station", type=_number, metavar="MM", help="candidate nearest to this station [mm]")
-    parser.add_argument("--angle", type=_number, metavar="DEG", help="candidate nearest to this angle [deg]")
+    add_choice(parser)
     parser.add_argument("--force", type=_number, metavar="N", help="force level nearest to N [N]")
     parser.add_argument("--quantity", metavar="NAME", help="map on the object (default: quality)")
     parser.add_argument("--motion", choices=("x", "y", "turn"), default="x",
@@ -31,6 +29,19 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("--html", metavar="HTML", help="write the view as one page that needs nothing else")
     parser.add_argument("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
     parser.add_argument("--port", type=int, metavar="PORT", help="show the page at this port of 127.0.0.1, no window")
+
+
+def add_choice(parser: ArgumentParser) -> None:
+    """Options that choose a candidate; `choice` reads them."""
+    parser.add_argument("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
+    parser.add_argument("--station", type=_number, metavar="MM", help="candidate nearest to this station [mm]")
+    parser.add_argument("--angle", type=_number, metavar="DEG", help="candidate nearest to this angle [deg]")
+
+
+def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
+    """Candidate, and station [m] and angle [rad], as far as they were given."""
+    angle = None if options.angle is None else math.radians(options.angle)
+    return options.candidate, (None if options.station is None else 1e-3 * options.station, angle)
 
 
 def _number(text: str) -> float:
@@ -48,9 +59,7 @@ def view(options: Namespace) -> None:
 
     with open_result(options.file) as result:
         data = Data(result)
-        angle = None if options.angle is None else math.radians(options.angle)
-        station = None if options.station is None else 1e-3 * options.station
-        found, index = view_of(data, options.candidate, (station, angle), options.force)
+        found, index = view_of(data, *choice(options), options.force)
         quantity = quantity_of(data, options.quantity)
         for name, path in paths.items():
             for made in _write(name, path, found, index, quantity, options.motion):

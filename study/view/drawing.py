@@ -23,8 +23,13 @@ BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, 
        "color": CROSS, "fmt": "%.4g"}  # fmt: skip
 
 
-def draw_object(plotter: Any, view: View, index: tuple[int, ...], quantity: str) -> None:
-    """The object in the colours of the map, deformed where the file has its wall; failed cells are crossed out."""
+def draw_object(
+    plotter: Any, view: View, index: tuple[int, ...], quantity: str, limits_: tuple[float, float] | None = None
+) -> None:
+    """The object in the colours of the map, deformed where the file has its wall; failed cells are crossed out.
+
+    The colours span ``limits_``, or else the map at all forces, so that pictures of two forces can be compared.
+    """
     corners, cell = view.surface
     bar = {**BAR, "position_x": 0.07, "position_y": 0.55}
     for name in ("object", "open", "failed", "none", "crosses"):
@@ -34,7 +39,7 @@ def draw_object(plotter: Any, view: View, index: tuple[int, ...], quantity: str)
     label, unit, factor = view.data.units(quantity)
     found = view.data.map(quantity)
     values = np.full(view.candidates, np.nan) if found is None else factor * view.over_candidates(found, index[-1])
-    limits_ = span(np.full(1, np.nan) if found is None else factor * found[view.point])
+    limits_ = limits_ or span(np.full(1, np.nan) if found is None else factor * found[view.point])
     x, state = 1e3 * view.moved(index), view.state(index[-1])
     of = np.where(cell == NOBODY, NOBODY, state[cell])
     shown = (of == DONE) & np.isfinite(values[cell])

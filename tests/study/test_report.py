@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import itertools
+import json
 import re
 import subprocess
 import sys
@@ -19,7 +22,7 @@ from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
-from study.report import build, words, write_report
+from study.report import build, cases, object_view, words, write_report
 from study.report.curvature import difference_pictures
 from study.report.data import Data, number
 from study.report.outline import read_scene, shape_outline, slice_polygon
@@ -115,11 +118,19 @@ class Page(HTMLParser):
         self.balanced &= bool(self.open) and self.open.pop() == tag
 
     def handle_data(self, data):
-        if "style" not in self.open:
+        if not {"style", "script"} & set(self.open):
             self.text += data.replace("\u00a0", " ")
 
     def tags(self, name):
         return [attributes for tag, attributes in self.found if tag == name]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_renderer():
+    """Pictures in three dimensions are slow; tests/study/test_report_page.py looks at them."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(object_view, "in_a_child", lambda *_: None)
+        yield
 
 
 def page_of(path):
@@ -151,16 +162,22 @@ def test_a_page_and_a_picture_are_written(ordinary):
     assert {p.suffix for p in written[0].parent.iterdir()} == {".hdf", ".html", ".png"}
 
 
-def test_the_page_needs_nothing_from_outside_and_runs_nothing(ordinary):
+def test_the_page_needs_nothing_from_outside_and_runs_one_script_alone(ordinary):
     _, written, page = ordinary
-    assert not page.tags("script")
+    html = written[0].read_text()
+    assert page.tags("script") == [{}]
+    script = re.search(r"<script>(.*)</script>", html, re.DOTALL)[1]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    (policy,) = (m["content"] for m in page.tags("meta") if "http-equiv" in m)
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert "default-src 'none'" in policy
+    assert not re.search(r"innerHTML|insertAdjacent|document.write|eval|fetch|XMLHttp", script)
     assert not page.tags("link")
     assert not page.tags("iframe")
     assert all(image["src"].startswith("data:image/svg+xml;base64,") for image in page.tags("img"))
     assert all(link["href"].startswith("#") for link in page.tags("a"))
     assert not any(key.startswith("on") for _, attributes in page.found for key in attributes)
-    assert not re.search(r"https?://", written[0].read_text())
-    assert any("default-src 'none'" in m.get("content", "") for m in page.tags("meta"))
+    assert not re.search(r"https?://", html)
 
 
 def test_the_page_is_well_formed_and_accessible(ordinary):
@@ -200,13 +217,70 @@ def test_the_verdict_names_the_best_grasp_and_what_is_missing(ordinary):
         assert (first[1], first[2]) == (data.axes[0].values[data.best[0]], data.axes[1].values[data.best[1]])
 
 
+def test_every_cell_of_a_map_leads_to_its_case_in_the_table(ordinary):
+    path, _, page = ordinary
+    rows = [row["id"] for row in page.tags("tr") if row.get("id")]
+    assert rows == [f"case-{k}" for k in range(24)]
+    assert page.tags("table")[-1] is not None
+    (best_row,) = (int(t["data-best"]) for t in page.tags("table") if t.get("id") == "all-cases")
+    assert best_row == np.ravel_multi_index((2, 1, 1), (4, 3, 2))
+    spots = [spot for frame in page.tags("div") if "data-spots" in frame for spot in json.loads(frame["data-spots"])]
+    for spot in spots:
+        shape = np.shape(spot["cases"])
+        assert shape == (len(spot["y"]) - 1, len(spot["x"]) - 1)
+        assert np.all(np.diff(spot["x"]) > 0)
+        assert np.all(np.diff(spot["y"]) > 0)
+        assert 0 < min(spot["x"][0], spot["y"][0])
+        assert max(spot["x"][-1], spot["y"][-1]) < 1
+    over_force = next(s for s in spots if np.shape(s["cases"]) == (2, 4))
+    assert over_force["cases"][0] == [1, 7, 13, 19]  # the upper row has the higher force, at the first angle
+    over_angle = next(s for s in spots if np.shape(s["cases"]) == (3, 4))
+    assert over_angle["cases"][-1] == [1, 7, 13, 19]  # the first angle is the lowest row
+    assert "failed" in page.text
+    with open_result(path) as result:
+        assert "residual 2.5e-03" in cases.remark(Data(result), (3, 2, 0))
+
+
+def test_values_are_told_with_their_error_where_the_file_has_it(tmp_path):
+    layout = Layout(axes(), 0, meshes=2, patches=False)
+    path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
+    with open_result(path) as result:
+        data = Data(result)
+        told = Page(words.verdict(data, 0.8) + words.best_tables(data) + cases.every_case(data)).text
+    assert "e_n 10 mm ± 0.42 %" in told
+    assert "50 N mm ± 1.1 %" in told
+    assert words.ESTIMATED in told
+    assert told.count("± 0.42 %") >= 24
+
+
+def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
+    """Case (3, 0, 1) has quality 5 / 4, as two cases before it in the file; six are better."""
+
+    def state(index):
+        return "it slipped away" if index[:2] == (3, 2) else "done"
+
+    path = make(tmp_path / "f.hdf", Layout(axes(), 24), state)
+    with open_result(path) as result:
+        chosen, failed = Data(result, (3, 0, 1)), Data(result, (3, 2, 1))
+        text = Page(words.chosen(chosen)).text
+        said = "Chosen candidate 9: station 30 mm, angle 0°, 5 N: quality 1.25, e_n [mm] 2.5, place 9 of 11"
+        assert text == f"{said} at this force."
+        assert chosen.other == ((3, 0, 1), "the chosen candidate")
+        said = "candidate 11: station 30 mm, angle 57.3°, 5 N, failed: it slipped away"
+        assert said in Page(words.chosen(failed)).text
+        assert failed.other[0] != (3, 2, 1)
+        assert words.chosen(Data(result)) == ""
+        with pytest.raises(StudyError, match="--candidate: found 12, expected 0 to 11"):
+            build(result, 12)
+
+
 def test_failures_that_differ_in_numbers_alone_are_one_kind(ordinary):
     path, _, page = ordinary
     with open_result(path) as result:
         ((count, text, where),) = Data(result).grouped(2)
     assert count == 6 == len(where)
     assert "ConvergenceError" in text
-    assert page.text.count("ConvergenceError: residual") == 1
+    assert page.text.count("ConvergenceError: residual") == 1 + 6  # once as a kind, and in the table of all cases
 
 
 def test_definitions_scene_checks_and_time_are_told(ordinary):
@@ -276,7 +350,7 @@ def test_images_of_a_grasp_are_not_listed_twice(tmp_path):
     with open_result(path) as result:
         data = Data(result)
         assert data.images((2, 0, 1)) == [(0, 1, 1), (2, 2, 1)]  # 1 / (1 + 2) in all of them
-        assert data.other == ((0, 2, 1), "the lowest score")
+        assert data.other == ((0, 2, 1), "the last in the ranking")
 
 
 def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):

@@ -96,7 +96,7 @@ def test_pictures_tell_what_they_show_and_stay_small(file):
     assert "exact wrenches" in shadows.caption
     assert "300 slip motions" in space.caption
     assert "misfit of the limit surfaces over station" in curve.alt.lower()
-    assert len(shadows.svg) + len(space.svg) + len(curve.svg) < 600_000
+    assert len(shadows.content) + len(space.content) + len(curve.content) < 600_000
 
 
 def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_picture(tmp_path, file):

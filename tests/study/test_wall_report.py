@@ -17,7 +17,7 @@ from study.overview import RULE, scene_text
 from study.plan import make_plan, memory, plan_text
 from study.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
 from study.record import blank, crc32, record
-from study.report import wall_words, words
+from study.report import cases, wall_words, words
 from study.report.data import Data
 from study.report.levels import level_picture, rule
 from study.report.outline import read_scene
@@ -248,7 +248,7 @@ def test_undeformed_and_deformed_outlines_are_cut_alike(can, solved):
     upright = Cut(True, 0.0, 0.03).outline(before)
     assert (upright[0, 1], upright[-1, 1]) == (pytest.approx(-30.0, abs=1e-6), pytest.approx(30.0, abs=1e-6))
     assert "the deepest dent of all solved cases" in shown.caption
-    assert len(shown.svg) < 200_000
+    assert len(shown.content) < 200_000
 
 
 def test_failed_candidates_are_drawn_as_failed(tmp_path, solved):
@@ -259,9 +259,9 @@ def test_failed_candidates_are_drawn_as_failed(tmp_path, solved):
         bars = window_picture(data, data.best)
         assert "1 of 2 grasps have one" in bars.alt
         assert "nonlinear shell: 1)" in level_picture(data, data.best).caption
-        assert bars.svg.count(b"<pattern") == 1  # the hatch of the station that failed
+        assert bars.content.count(b"<pattern") == 1  # the hatch of the station that failed
         assert wall_words.window_text(data, (1, 0, 0)) == "–"
-        assert "the wall gave way" in words.cases(data)
+        assert "the wall gave way" in cases.failures(data)
 
 
 def test_forced_levels_are_told_as_the_scene_says(tmp_path, can):
