@@ -15,7 +15,7 @@ from study.completion import add_options as add_completion_options
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
-from study.help import Parser, Program
+from study.help import Formatter, Parser, Program
 from study.patch.command import add_options as add_patch_options
 from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
@@ -64,7 +64,7 @@ def program() -> Program:
     def add(name: str, command: Any, text: str, example: str) -> argparse.ArgumentParser:
         made = listed.add_parser(
             name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=f"example:\n  {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=Formatter,
         )  # fmt: skip
         made.set_defaults(command=command)
         return made

@@ -15,7 +15,7 @@ from study.exits import MEANING
 GROUPS = (  # in the order of use; a command that stands nowhere is listed under the last title
     ("prepare", ("init", "check", "plan", "cost")),
     ("solve", ("run", "watch", "status")),
-    ("look at results", ("show", "report", "view", "compare")),
+    ("look at results", ("show", "report", "view", "figure", "compare")),
     ("use the numbers", ("export", "patch")),
     ("this program", ("schema", "doctor", "completion")),
 )
@@ -43,6 +43,13 @@ class Parser(argparse.ArgumentParser):
             known = list(self._option_string_actions) if kind == "option" else []
             self.error(f"unknown {kind} '{name}'{_meant(name, known)} '{self.prog} --help' lists all")
         return found, rest
+
+
+class Formatter(argparse.HelpFormatter):
+    """Breaks descriptions between words, and leaves examples as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if "\n" in text else super()._fill_text(text, width, indent)
 
 
 class Program(Parser):

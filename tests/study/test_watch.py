@@ -39,7 +39,7 @@ class Run:
             codes[first : first + count] = state
             file["study/status/code"][...] = codes.reshape(4, 6, 4)
             if state == FAILED:
-                file["study/status/message"][np.unravel_index(first, (4, 6, 4))] = b"no contact at this force"
+                file["study/status/message"][...] = b"no contact at this force"
 
 
 def watched(run, stream):
