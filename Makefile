@@ -8,6 +8,7 @@ SCENE   = jobs/bottle-rigid.toml
 RESULT  = results/$(basename $(notdir $(SCENE))).hdf
 PAGE    = $(RESULT:.hdf=.html)
 PICTURE = $(RESULT:.hdf=.png)
+FIGURES = results/figures
 BIN     = .venv/bin
 LIMIT   = timeout -k 30
 # Of the benchmark: any of kernels linearised element contact map; all if empty.
@@ -30,10 +31,11 @@ TWO = -n 2 --dist loadfile
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map test test-long bench lint doctor
+.PHONY: help setup map figures test test-long bench lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
+	@echo 'make figures    the figures of the paper, into $(FIGURES)'
 	@echo 'make test       the tests, first without MPI and then on $(RANKS) ranks'
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
@@ -54,6 +56,9 @@ map: setup
 	@echo 'result   $(RESULT)   every number, with units and definitions'
 	@echo 'report   $(PAGE)  one page with the picture, maps and definitions; open it in a browser'
 	@if [ -f $(PICTURE) ]; then echo 'picture  $(PICTURE)'; fi
+
+figures: setup
+	$(MPIRUN) $(BIN)/softjaw figure all -o $(FIGURES) || [ $$? = $(SOME_FAILED) ]
 
 test: setup
 	$(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO)

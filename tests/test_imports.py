@@ -18,7 +18,13 @@ ALLOWED = {
     "fem": {"fem", "friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
     "study": {*OWN, "pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
-PICTURES = {"fem/mesh_object.py", "study/view/window.py", "study/view/drawing.py", "study/view/sides.py"}
+PICTURES = {
+    "fem/mesh_object.py",
+    "study/figures/rendering.py",
+    "study/view/drawing.py",
+    "study/view/sides.py",
+    "study/view/window.py",
+}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "shtab": {"study/completion.py"},

@@ -1,0 +1,120 @@
+"""``softjaw figure``: solves the scenes of the paper's figures, as far as they are not solved, and draws them."""
+
+from __future__ import annotations
+
+import io
+import os
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.commands import first_rank
+from study.exits import CANNOT_WRITE, DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
+from study.figures import JOBS
+
+if TYPE_CHECKING:
+    from study.figures.table import Figure
+
+FOLDER = "results/figures"
+DPI = 140
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """The options of the command."""
+    parser.add_argument("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
+    parser.add_argument("-o", metavar="PNG", dest="output",
+                        help=f"picture, or folder for several (default: {FOLDER})")  # fmt: skip
+    parser.add_argument("--results", metavar="FOLDER", default="results",
+                        help="where the scenes' results are or will be (default: results)")  # fmt: skip
+
+
+def figure(options: Namespace) -> int:
+    """Solve what is missing, then draw; on every rank the same exit code."""
+    wanted = chosen(options.names)
+    paths = targets(wanted, options.output)
+    results, codes = {}, {DONE}
+    for scene in dict.fromkeys(scene for one in wanted for scene in one.scenes):
+        results[scene] = Path(options.results) / f"{scene}.hdf"
+        codes.add(_solved(scene, results[scene]))
+        if failed := codes - {DONE, SOME_FAILED}:
+            return failed.pop()
+    if first_rank():
+        for one, path in zip(wanted, paths, strict=True):
+            print(f"written: {path}\n  {draw(one, results, path)}", flush=True)
+    return max(codes)
+
+
+def chosen(names: list[str]) -> list[Figure]:
+    """The figures of these names, each once.
+
+    Raises
+    ------
+    StudyError
+        For a name that no figure has.
+    """
+    from study.figures.table import EVERY, FIGURES, find
+
+    found = {name: find(name) for name in names}
+    if strange := [name for name, figures in found.items() if not figures]:
+        known = ", ".join(one.name for one in FIGURES)
+        raise StudyError(USAGE, f"FIGURE: found '{strange[0]}', expected one of {known}, or {EVERY}")
+    return list(dict.fromkeys(one for figures in found.values() for one in figures))
+
+
+def targets(wanted: list[Figure], output: str | None) -> list[Path]:
+    """Where each picture goes: one PNG, or files in a folder."""
+    given = Path(output or FOLDER)
+    if given.suffix != ".png":
+        return [given / one.file for one in wanted]
+    if len(wanted) > 1:
+        names = ", ".join(one.name for one in wanted)
+        raise StudyError(USAGE, f"-o: found '{given}' for {len(wanted)} figures ({names}), expected a folder")
+    return [given]
+
+
+def _solved(scene: str, path: Path) -> int:
+    """Run a scene into its file, which takes a second where nothing is missing; the exit code."""
+    from study.cli import main
+
+    source = JOBS / f"{scene}.toml"
+    if not source.is_file():
+        text = f"{source}: there is no such scene; install softjaw from its source folder, which has jobs/"
+        raise StudyError(USAGE, text)
+    if (code := main(["run", str(source), "-o", str(path)])) == OTHER_FILE:
+        raise StudyError(OTHER_FILE, f"{path}: move it away, or choose another folder with --results")
+    return code
+
+
+def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
+    """Write a figure as PNG; the sentence of what was measured."""
+    from contextlib import ExitStack
+
+    from study import pictures
+    from study.report.data import Data
+    from study.store import open_result
+
+    with ExitStack() as stack, pictures.style():
+        opened = [stack.enter_context(open_result(results[scene])) for scene in one.scenes]
+        drawn, said = one.draw(*(Data(result) for result in opened))
+        write(path, as_png(drawn))
+    return said
+
+
+def as_png(drawn: Any) -> bytes:
+    """The figure in the resolution of a page."""
+    store = io.BytesIO()
+    drawn.savefig(store, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
+    return store.getvalue()
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write beside ``path`` and rename, so that nobody sees half a picture."""
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        text = f"{path}: cannot be written: {error.strerror}; choose another place with -o"
+        raise StudyError(CANNOT_WRITE, text) from error
