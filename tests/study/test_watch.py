@@ -39,7 +39,8 @@ class Run:
             codes[first : first + count] = state
             file["study/status/code"][...] = codes.reshape(4, 6, 4)
             messages = np.where(codes == FAILED, b"no contact at this force", b"")
-            file["study/status/message"][...] = messages.reshape(4, 6, 4)
+            stored = file["study/status/message"]
+            stored[...] = messages.reshape(4, 6, 4).astype(stored.dtype)
 
 
 def watched(run, stream):
