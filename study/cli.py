@@ -12,6 +12,7 @@ from typing import Any
 
 from study import commands
 from study.completion import add_options as add_completion_options
+from study.cost.command import add_options as add_cost_options
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
@@ -122,6 +123,8 @@ def program() -> Program:
                            "softjaw figure 4c"))  # fmt: skip
     add_completion_options(add("completion", commands.completion, "a script by which the shell completes words",
                                "softjaw completion bash > softjaw.bash"))  # fmt: skip
+    add_cost_options(add("cost", commands.cost, "what accuracy costs in time: errors and seconds of every setting",
+                         "softjaw cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf"))  # fmt: skip
     add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
     add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
     return parser

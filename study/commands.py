@@ -214,6 +214,14 @@ def completion(options: Namespace) -> int:
     return DONE
 
 
+def cost(options: Namespace) -> int:
+    """Measure what accuracy costs in time."""
+    from study.cost.command import run
+
+    run(options, _scene(options))
+    return DONE
+
+
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
     import json
