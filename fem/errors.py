@@ -5,5 +5,9 @@ class ConvergenceError(RuntimeError):
     """A nonlinear solve stopped without an answer."""
 
 
+class NotReachedError(ConvergenceError):
+    """However far the sheet travelled, the force stayed below the one that was asked for."""
+
+
 class CheckError(RuntimeError):
     """A solve converged to a state that breaks a law of contact or of the material."""

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.checks import Checks, check
+from fem.checks import DIRECTIONS, Checks, check
 from fem.contact import ContactPoints, ContactProblem, Control, Gap
-from fem.errors import ConvergenceError
+from fem.errors import CheckError, ConvergenceError, NotReachedError
 from fem.foam import Foam
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
@@ -27,6 +27,8 @@ from fem.spring_bed import SpringBed
 from fem.stepping import Settings, Stepping, Work
 
 FloatArray = NDArray[np.float64]
+BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
+MOST_FALL = 0.05  # of the travel from one force to the next: weighted and nodal gaps differ by less
 
 
 @dataclass(frozen=True)
@@ -118,8 +120,12 @@ class Press:
         self.solver = self.solver_of(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
-            self._bed.force_scale,
+            self._bed.force_scale, self.pad.rounding, watch=self._remember,
         )  # fmt: skip
+
+    def _remember(self, x: FloatArray, force: float) -> None:
+        """Keep the last state in equilibrium, which tells why there is none beyond."""
+        self._last = x, force
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on the whole pad [N].
@@ -131,7 +137,7 @@ class Press:
         """
         x, reached = None, 0.0
         for force in forces:
-            work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
+            work, before, start, below = Work(), copy(self.solver.seconds), time.perf_counter(), x
             try:
                 x = self._climb(x, reached, force, work)
             except ConvergenceError:
@@ -139,6 +145,7 @@ class Press:
                     raise
                 self._fall_back()
                 x = self._climb(x, reached, force, work)
+            self._refuse_fall(x, below, force, reached)
             reached = force
             seconds = since(before, self.solver.seconds, start)
             left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
@@ -167,4 +174,32 @@ class Press:
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
         if x is None:
             x, reached = self._stepping.first(self._bed.travel(force), force, work)
-        return self._stepping.climb(x, reached, force, work, walk=self.fallback is None)
+        self._remember(x, reached)
+        try:
+            return self._stepping.climb(x, reached, force, work, walk=self.fallback is None)
+        except ConvergenceError as error:
+            raise self._explained(error) from error
+
+    def _explained(self, error: ConvergenceError) -> ConvergenceError:
+        """The error, with what the foam has come to where that is why no further state was found."""
+        x, force = self._last
+        _, strain, acoustic = self.problem.foam.strains(x, DIRECTIONS)
+        if acoustic > BARELY_ELLIPTIC or isinstance(error, NotReachedError):
+            return error
+        return ConvergenceError(
+            f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "
+            f"{acoustic:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "
+            f"equilibrium was found beyond ({error})"
+        )
+
+    def _refuse_fall(self, x: FloatArray, before: FloatArray | None, force: float, reached: float) -> None:
+        """Refuse a state that the pad cannot have come to: on a rigid object more force means more travel."""
+        if before is None or force < reached:
+            return
+        low, high = self.problem.travel(before), self.problem.travel(x)
+        if high < (1.0 - MOST_FALL) * low:
+            raise CheckError(
+                f"the travel falls from {1e3 * low:.4g} mm at {reached:.4g} N to {1e3 * high:.4g} mm at {force:.4g} N: "
+                "one of the two states is not what a growing force leads to; the contact is too small for the mesh, "
+                "refine the pad"
+            )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.contact import Control
-from fem.errors import ConvergenceError
+from fem.errors import ConvergenceError, NotReachedError
 from fem.petsc import NonlinearSolver
 
 FloatArray = NDArray[np.float64]
@@ -147,7 +147,7 @@ class Stepping:
                 step, failures = 0.5 * step, failures + 1
                 if step < shortest or failures > MOST_FAILURES:
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
-        raise ConvergenceError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
+        raise NotReachedError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
         """State at ``force`` between two on the way; Newton's method may jump to one further on, which is refused."""

@@ -24,7 +24,8 @@ FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
 ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
-FEW_ELEMENTS = 6  # loaded ones, below which it is coarse too
+FEW_ELEMENTS, NARROW = 6, 3  # loaded ones in all, and along length or width, below which it is coarse too
+LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as study.quantities says
 UNSTABLE = 131072
@@ -97,9 +98,15 @@ class Contact:
         return self.finger.pose.rotation @ self.frame.axes[2]
 
     @property
-    def loaded_elements(self) -> float:
-        """Hexahedra of the front that carry load."""
-        return np.count_nonzero(self.patch.pressure) / self.state.pad.shape.per_side**2
+    def coarse(self) -> bool:
+        """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
+        shape, law = self.state.pad.shape, self.state.pad.material
+        (n, m, _), k = shape.elements, shape.per_side
+        loaded = self.patch.pressure.reshape(n, k, m, k) > 0
+        widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
+        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
+        overlaps = self.state.checks.overlap > OVERLAP * self.state.travel
+        return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
 
     @property
     def free_front(self) -> float:
@@ -128,8 +135,7 @@ def flags(contacts: Sequence[Contact], mu: float, score_flag: int) -> int:
     found |= PADS_MEET * (one.free_front + two.free_front > between_fronts)
     found |= UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
     for c in contacts:
-        coarse = c.state.checks.overlap > OVERLAP * c.state.travel or c.loaded_elements < FEW_ELEMENTS
-        found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * coarse
+        found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * c.coarse
     return int(found)
 
 
