@@ -1,4 +1,4 @@
-"""Forces and stiffness of the foam of one pad, element by element."""
+"""Forces and stiffness of the foam of one pad, element by element, and of the elastic sheet behind it, if there is."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ class Foam:
         n, nodes = pad.element_nodes.shape
         dofs = pad.dofs[pad.element_nodes].transpose(0, 2, 1)  # (n, 3, nodes)
         pair = np.broadcast_arrays(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
-        self.rows, self.columns = (index.ravel().astype(np.int32) for index in pair)
+        rows, columns = (index.ravel().astype(np.int32) for index in pair)
+        self._elements, behind = len(rows), pad.back_dofs if pad.back else pad.back_dofs[:0]
+        self.rows = np.concatenate([rows, np.repeat(behind, len(behind))])
+        self.columns = np.concatenate([columns, np.tile(behind, len(behind))])
         self.travel_entries = np.flatnonzero(self.rows == pad.travel_dof)
         self._dofs = dofs.ravel()
         self._shape = (n, 3, nodes, 3, nodes)
@@ -38,11 +41,16 @@ class Foam:
     def force(self, x: FloatArray) -> tuple[FloatArray, float]:
         """Internal force on every unknown ``(size,)`` [N], the sheet's in its travel, and the smallest ``det F``."""
         smallest = self._evaluate(x, self._none)
-        return gather(self._dofs, self._r, self.pad.size), smallest
+        R = gather(self._dofs, self._r, self.pad.size)
+        if self.pad.back:
+            R[self.pad.back_dofs] += self.pad.back.K @ x[self.pad.back_dofs]
+        return R, smallest
 
     def stiffness(self, x: FloatArray, out: FloatArray) -> None:
         """Entries of the tangent [N/m] into ``out (entries,)``."""
-        self._evaluate(x, out.reshape(self._shape))
+        self._evaluate(x, out[: self._elements].reshape(self._shape))
+        if self.pad.back:
+            out[self._elements :] = self.pad.back.K.ravel()
 
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""

@@ -23,7 +23,8 @@ AT_ONCE = 256  # right-hand sides; bounds the memory
 def linearised(pad: Pad) -> Pad:
     """The same pad of linear elastic material, with the constants that its foam has at rest."""
     law = pad.material
-    return Pad(pad.shape, material("linear", law.shear_modulus, law.poisson_ratio), pad.symmetry, pad.contact)
+    material_at_rest = material("linear", law.shear_modulus, law.poisson_ratio)
+    return Pad(pad.shape, material_at_rest, pad.symmetry, pad.contact, pad.sheet)
 
 
 def departure(law: Material, strain: float) -> float:

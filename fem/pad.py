@@ -2,7 +2,8 @@
 
 The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
 ``[free displacements | travel of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
-travel, so that the force on the sheet is the residual of that unknown.
+travel, so that the force on the sheet is the residual of that unknown. On an elastic sheet only the nodes that the
+finger holds do; the others are free, and the sheet connects them to the travel.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from skfem import Basis, ElementHex1, ElementHex2, MeshHex
 
 from fem.materials import Material
 from fem.pad_shape import PadShape
+from fem.sheet import BackStiffness, Sheet, back_stiffness
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -33,6 +35,8 @@ class Pad:
     contact : str
         ``"weighted"`` integrates gap and pressure over the contact face with Gauss points, ``"nodal"`` collocates them
         at its nodes.
+    sheet : Sheet, optional
+        The plate behind the pad; rigid without.
 
     Attributes
     ----------
@@ -41,6 +45,10 @@ class Pad:
     nodes : (k, 3) array
         Node positions [m].
     element_nodes : (n, nodes) array
+    back : BackStiffness or None
+        Of an elastic sheet.
+    back_dofs : (k + 1,) array
+        Its unknowns: the free displacements of the back, then the travel.
     dofs : (k, 3) array
         Unknown of each displacement; -1 is fixed.
     face_nodes : (m, face nodes) array
@@ -57,10 +65,11 @@ class Pad:
         material: Material,
         symmetry: tuple[bool, bool] = (False, False),
         contact: str = "weighted",
+        sheet: Sheet | None = None,
     ) -> None:
         if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
             raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
-        self.shape, self.material, self.symmetry = shape, material, tuple(symmetry)
+        self.shape, self.material, self.symmetry, self.sheet = shape, material, tuple(symmetry), sheet
         element, order = BASES[shape.element]
         lines = [shape.lines(0, symmetry[0]), shape.lines(1, symmetry[1]), shape.lines(2, False)]
         basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
@@ -77,24 +86,31 @@ class Pad:
         x, y, z = self.nodes.T
         tol = 1e-9 * max(self.shape.size)
         back = np.abs(z + self.shape.size[2]) < tol
+        front = np.abs(z) < tol
+        self.front_nodes, self.front_grid = _as_grid(self.nodes, front, tol)
+        back_nodes, _ = _as_grid(self.nodes, back, tol)
         free = np.ones((len(x), 3), dtype=bool)
-        free[back] = False
+        self.back = self._on_sheet(back_nodes)
+        free[back_nodes] = self.back.free.reshape(-1, 3) if self.back else False
         for axis, value in enumerate((x, y)):
             if self.symmetry[axis]:
                 free[np.abs(value) < tol, axis] = False
         self.travel_dof = int(free.sum())
         self.dofs = np.full((len(x), 3), -1, dtype=np.int32)
         self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
-        self.dofs[back, 2] = self.travel_dof
-        front = np.abs(z) < tol
-        # nodes inside elements carry rounding errors that would mix up the rows
-        column, row = np.round(x[front] / tol), np.round(y[front] / tol)
-        order = np.lexsort((row, column))
-        self.front_nodes = np.flatnonzero(front)[order].astype(np.int32)
-        self.front_grid = (len(np.unique(column)), len(np.unique(row)))
+        self.dofs[back & ~free[:, 2], 2] = self.travel_dof
+        self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.travel_dof))
         self.pressure_index = np.full(len(x), -1, dtype=np.int32)
-        self.pressure_index[self.front_nodes] = np.arange(len(order), dtype=np.int32)
-        self.size = self.travel_dof + 1 + len(order)
+        self.pressure_index[self.front_nodes] = np.arange(len(self.front_nodes), dtype=np.int32)
+        self.size = self.travel_dof + 1 + len(self.front_nodes)
+
+    def _on_sheet(self, back_nodes: IntArray) -> BackStiffness | None:
+        """Stiffness of the elastic sheet behind the nodes of the back."""
+        if self.sheet is None:
+            return None
+        grid = self.nodes[back_nodes].reshape(*self.front_grid, 3)
+        lines = (tuple(map(float, line)) for line in (grid[:, 0, 0], grid[0, :, 1]))
+        return back_stiffness(*lines, self.symmetry, self.sheet)
 
     def _describe_front(self, lines: list[FloatArray], contact: str) -> None:
         """Faces of the front as a tensor grid, and its quadrature."""
@@ -121,6 +137,13 @@ class Pad:
         """Part of the whole pad that is meshed: 1, 1/2 or 1/4."""
         return 0.5 ** sum(self.symmetry)
 
+    @property
+    def rounding(self) -> float:
+        """Norm of the forces that rounding leaves where a stiff sheet meets the travel [N]."""
+        if self.back is None:
+            return 0.0
+        return float(np.finfo(float).eps * self.shape.size[2] * np.linalg.norm(np.diag(self.back.K)[:-1]))
+
     @cached_property
     def modulus_per_thickness(self) -> float:
         """``E / thickness`` [Pa/m]: scales pressures to lengths and estimates the pad as a bed of springs."""
@@ -131,6 +154,14 @@ class Pad:
         u = np.zeros(self.dofs.shape)
         u[self.dofs >= 0] = x[self.dofs[self.dofs >= 0]]
         return u
+
+
+def _as_grid(nodes: FloatArray, chosen: NDArray[np.bool_], tol: float) -> tuple[IntArray, tuple[int, int]]:
+    """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
+    # nodes inside elements carry rounding errors that would mix up the rows
+    column, row = np.round(nodes[chosen, 0] / tol), np.round(nodes[chosen, 1] / tol)
+    order = np.lexsort((row, column))
+    return np.flatnonzero(chosen)[order].astype(np.int32), (len(np.unique(column)), len(np.unique(row)))
 
 
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
