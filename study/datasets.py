@@ -15,6 +15,7 @@ from study.quantity import FINGERS, MODELS, Quantity
 MISSING = 0  # state of a case that has not been solved
 MESSAGE = 240  # bytes of a message
 ROOT = "/study"
+FIRST_SEEN = ("quality", "e_n")  # maps that viewers open at
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,12 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
     yield Dataset(f"{ROOT}/status/crc", layout.shape, np.dtype("<u4"), 0, crc, layout.names)
     tries = {"long_name": "times this case was begun", "units": ""}
     yield Dataset(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"), 0, tries, layout.names)
+    for name in FIRST_SEEN:
+        q, order = described[f"maps/{name}"], layout.seen
+        shape, scales = (tuple(given[i] for i in order) for given in (layout.shape, layout.names))
+        shown = {"interpretation": ("spectrum", "image")[len(layout.shown) - 1]}
+        attributes = _describe(q, f"{q.key}/{MODELS[0]}") | shown
+        yield Dataset(f"{ROOT}/map/{name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
     if layout.sampled:
         yield from _sample_datasets(layout)
     lengths = dict(zip(layout.names, layout.shape, strict=True))

@@ -112,6 +112,18 @@ class Layout:
         """Names of the axes in the file; NeXus allows no dot in a name, the keys of a sweep have one."""
         return tuple(axis.name.replace(".", "_") for axis in self.axes)
 
+    @cached_property
+    def shown(self) -> tuple[int, ...]:
+        """Positions of the one or two axes that viewers show first: stations and angles, or else what has values."""
+        order = sorted(range(len(self.shape)), key=lambda i: (self.names[i] != "station", self.names[i] != "angle", i))
+        return tuple([i for i in order if self.shape[i] > 1][:2]) or (len(self.shape) - 1,)
+
+    @property
+    def seen(self) -> tuple[int, ...]:
+        """Order of the axes in ``/study/map``: many viewers show the last two and let the others be chosen."""
+        others = [i for i in reversed(range(len(self.shape))) if i not in self.shown]
+        return (*others, *reversed(self.shown))
+
     @property
     def counters(self) -> dict[str, int]:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""

@@ -1,33 +1,50 @@
-"""How NeXus viewers find a plot in a result file: groups with their signals, axes and the slice that is shown first."""
+"""How NeXus viewers find a plot in a result file: groups with their signals, axes and the slice that is shown first.
+
+``map`` is where they open. It repeats two maps with the axes turned so that stations run to the right and angles up,
+which viewers that always draw the last two axes show at once.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from study.datasets import FIRST_SEEN
 from study.layout import Layout
 from study.quantity import MODELS
 
+EVEN = 1e-6  # relative difference of steps that makes an axis uneven
 
-def view_slice(layout: Layout) -> list[str]:
-    """Which two axes a viewer shows first (``.``) and where it stands on the others: the highest force, else 0."""
-    names, shape = layout.names, layout.shape
-    preference = [n for n in ("station", "angle", *names) if n in names]
-    shown = [n for n in dict.fromkeys(preference) if shape[names.index(n)] > 1][:2] or list(names[-1:])
-    last = {"normal_force": shape[-1] - 1}
-    return ["." if n in shown else str(last.get(n, 0)) for n in names]
+
+def view_slice(layout: Layout, order: Sequence[int]) -> list[str]:
+    """Which axes a viewer shows first (``.``) and where it stands on the others: the highest force, else 0."""
+    last = len(layout.shape) - 1
+    return ["." if i in layout.shown else str(layout.shape[i] - 1 if i == last else 0) for i in order]
+
+
+def axes_of(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
+    """Names of the axes in an order, as NeXus wants them.
+
+    silx takes an axis of exactly two values for a linear calibration and draws nothing: no axis (``.``) is better
+    there. Beside an uneven axis it draws dots instead, and then needs both.
+    """
+    values = [np.asarray(layout.axes[i].values, float) for i in order]
+    even = all(np.ptp(np.diff(v)) <= EVEN * np.ptp(v) for v in values[-2:] if len(v) > 2)
+    names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, order, strict=True)]
+    return {"axes": names, **{f"{name}_indices": i for i, name in enumerate(names) if name != "."}}
+
+
+def _plot(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
+    return {"NX_class": "NXdata", **axes_of(layout, order), "default_slice": view_slice(layout, order)}
 
 
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
-    # silx takes an axis of exactly two values for a linear calibration and draws nothing: no axis is better there.
-    names, shape = layout.names, layout.shape
-    plot = {
-        "NX_class": "NXdata",
-        "axes": ["." if k == 2 else n for n, k in zip(names, shape, strict=True)],
-        "default_slice": view_slice(layout),
-        **{f"{n}_indices": i for i, (n, k) in enumerate(zip(names, shape, strict=True)) if k != 2},
-    }
-    found: dict[str, dict[str, Any]] = {}
+    plot = _plot(layout, range(len(layout.shape)))
+    first = {"signal": FIRST_SEEN[0], "auxiliary_signals": list(FIRST_SEEN[1:]), "title": "grasp map, curved model"}
+    found: dict[str, dict[str, Any]] = {"map": {**_plot(layout, layout.seen), **first}}
     for q in layout.quantities:
         if q.group != "maps":
             continue

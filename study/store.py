@@ -20,6 +20,7 @@ import numpy as np
 
 from friction.motion import fibonacci_twists
 from study import grid
+from study.datasets import FIRST_SEEN
 from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
 from study.layout import (
     DONE,
@@ -37,6 +38,7 @@ from study.layout import (
     Layout,
 )
 from study.plots import groups
+from study.quantity import MODELS
 from study.reading import Result, text_of
 from study.record import blank, crc32, text_bytes
 from study.vtkhdf import head
@@ -89,7 +91,7 @@ def _reserve(path: Path, need: int) -> None:
 def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
     file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
     study = file.create_group(ROOT)
-    study.attrs.update(NX_class="NXentry", default="quality", options=layout.options(), title=header.title)
+    study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
     _write_attribute(study, "axes", list(layout.names))
     for name, attributes in groups(layout).items():
         group = study.create_group(name)
@@ -121,7 +123,8 @@ def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
-    for name, text in (("scene", header.scene), ("definitions", layout.definitions())):
+    texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
+    for name, text in texts.items():
         data = text.encode() or b" "
         study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
     study.create_dataset("report", data=_report(UNFINISHED))
@@ -237,6 +240,8 @@ class ResultWriter:
         self.path, self.layout = path, layout
         self._file = h5py.File(path, "r+", driver="mpio", comm=comm, libver=LIBVER)
         self._columns = [self._file[c.path] for c in layout.columns]
+        keys = [c.key for c in layout.columns]
+        self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST_SEEN}
         self._code, self._crc, self._attempts = (self._file[f"{ROOT}/status/{n}"] for n in ("code", "crc", "attempts"))
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session = 0
@@ -279,6 +284,8 @@ class ResultWriter:
                 dataset[index] = value.astype(dataset.dtype)  # with its encoding
             elif value.size:
                 _write_block(dataset, place, value)
+        for position, dataset in self._maps.items():
+            dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
         self._crc[index] = crc32(self.layout, row, values)
         self._code[index] = state
 

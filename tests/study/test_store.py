@@ -14,7 +14,7 @@ import pytest
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout, layout_from_options
 from study.lock import Lock, holder
-from study.plots import groups, view_slice
+from study.plots import axes_of, groups, view_slice
 from study.quantities import MAPS, quantities
 from study.quantity import MODELS
 from study.reading import StoredAxis
@@ -99,13 +99,19 @@ def test_viewers_find_a_plot_from_the_root_down(path):
         plot = entry[entry.attrs["default"]]
         assert plot.attrs["NX_class"] == "NXdata"
         signals = [plot.attrs["signal"], *plot.attrs["auxiliary_signals"]]
-        assert signals == ["curved", "flat", "projected"]
+        assert signals == ["quality", "e_n"]
         # silx draws nothing over an axis of two values: that one is named '.' and keeps its dimension scale.
-        assert list(plot.attrs["axes"]) == ["station", ".", "normal_force"]
-        assert list(plot.attrs["default_slice"]) == [".", ".", "2"]
+        assert list(plot.attrs["axes"]) == ["normal_force", ".", "station"]
+        assert list(plot.attrs["default_slice"]) == ["2", ".", "."]
         for name in signals:
-            assert plot[name].attrs["long_name"] == f"grasp quality, {name}"
-            assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["station", "angle", "normal_force"]
+            assert plot[name].shape == (3, 2, 5)
+            assert plot[name].attrs["interpretation"] == "image"
+            assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["normal_force", "angle", "station"]
+        assert plot["quality"].attrs["long_name"] == "grasp quality, curved"
+        whole = entry["quality"]
+        assert [whole.attrs["signal"], *whole.attrs["auxiliary_signals"]] == ["curved", "flat", "projected"]
+        assert list(whole.attrs["axes"]) == ["station", ".", "normal_force"]
+        assert list(whole.attrs["default_slice"]) == [".", ".", "2"]
         assert entry["e_n/curved"].attrs["units"] == "m"
         assert entry["patch/normal"].dims[3][0].shape == (3,)
 
@@ -130,7 +136,18 @@ def test_every_dimension_has_a_scale_beside_the_data(path):
     ],
 )
 def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expected):
-    assert view_slice(small(sizes=sizes)) == expected
+    layout = small(sizes=sizes)
+    assert view_slice(layout, range(3)) == expected
+    assert [expected[i] for i in layout.seen] == view_slice(layout, layout.seen)
+
+
+def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
+    even = small()
+    uneven = Layout((*even.axes[:-1], even.axes[-1]._replace(values=np.array([1.0, 2.0, 5.0]))), 4)
+    assert axes_of(even, range(3))["axes"] == ["station", ".", "normal_force"]
+    assert axes_of(uneven, range(3))["axes"] == ["station", "angle", "normal_force"]
+    assert axes_of(uneven, (2, 1, 0))["axes"] == ["normal_force", ".", "station"]
+    assert axes_of(uneven, range(3))["angle_indices"] == 1
 
 
 def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
@@ -143,7 +160,7 @@ def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
         assert read.map("e_n_error").shape == read.layout.shape
         assert read.patch(0) == {}
         assert read.derived("slope").shape == (3,)
-    assert view_slice(layout) == ["0", ".", ".", "2"]
+    assert view_slice(layout, range(4)) == ["0", ".", ".", "2"]
     assert "patch" not in groups(layout)
     assert layout_from_options(axes, layout.options()) == layout
     verify(tmp_path / "s.hdf", layout, HEADER)
