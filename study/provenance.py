@@ -14,6 +14,11 @@ from typing import Any
 
 import numpy as np
 
+SAMPLING = (
+    "No seed to choose, and the same numbers in every run: sampled motions and directions are Fibonacci points; where a"
+    " search begins at random points, their generator has a fixed seed in the program."
+)
+
 
 def timestamp() -> str:
     """Local time with its offset from UTC."""
@@ -52,9 +57,11 @@ def cpu() -> str:
 def versions(mpi_library: str) -> str:
     """Versions of the libraries that had a part in the numbers, as far as they are loaded."""
     known = [f"python {platform.python_version()}", mpi_library.split(",")[0].splitlines()[0].strip("\0 ")]
-    for name in ("numpy", "scipy", "numba", "skfem", "mpi4py", "petsc4py", "h5py"):
+    for name in ("numpy", "scipy", "numba", "skfem", "clarabel", "mpi4py", "petsc4py", "h5py"):
         if name in sys.modules:
             known.append(f"{name} {getattr(sys.modules[name], '__version__', '?')}")
+    if "petsc4py.PETSc" in sys.modules:
+        known.append(f"PETSc {'.'.join(map(str, sys.modules['petsc4py.PETSc'].Sys.getVersion()))}")
     if "h5py" in sys.modules:
         known.append(f"HDF5 {sys.modules['h5py'].version.hdf5_version}")
     blas = getattr(np.__config__, "CONFIG", {}).get("Build Dependencies", {}).get("blas", {})

@@ -91,14 +91,16 @@ MAPS = (
         "f_y_max",
         "N",
         "largest friction along y",
-        "Total friction force along the contact frame's y axis when the pad slides along y; of the weaker finger.",
+        "Total friction force along the contact frame's y axis when the pad slides along y, Eqs. (6)-(8); of the weaker"
+        " finger.",
         by_model=True,
     ),
     Quantity(
         "tau_z_max",
         "N m",
         "largest friction torque about z",
-        "Total friction torque about the contact normal when the pad turns about it; of the weaker finger.",
+        "Total friction torque about the contact normal when the pad turns about it, Eqs. (6)-(8); of the weaker"
+        " finger.",
         by_model=True,
     ),
     Quantity(

@@ -38,6 +38,7 @@ from study.layout import (
     Layout,
 )
 from study.plots import groups
+from study.provenance import SAMPLING
 from study.quantity import MODELS
 from study.reading import Result, text_of
 from study.record import blank, crc32, text_bytes
@@ -46,6 +47,12 @@ from study.vtkhdf import head
 LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")
 CODES = np.dtype("u1")
+TEXTS = {
+    "title": "name of the object or of the scene",
+    "scene": "the scene with all settings, as TOML",
+    "definitions": "what every quantity means",
+    "report": "best grasps, failures with their reasons, how to read the file",
+}
 UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF are written at its end."
 
 
@@ -103,7 +110,9 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
         scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
         scale.make_scale(name)
     for name, length in layout.counters.items():
-        study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4")).make_scale(name)
+        count = study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4"))
+        count.attrs.update(units="", long_name=f"number of the {name.removesuffix('_2').replace('_', ' ')}")
+        count.make_scale(name)
     for dataset in layout.datasets:
         _create_dataset(file, dataset)
     _write_texts(study, layout, header)
@@ -128,13 +137,18 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
         data = text.encode() or b" "
         study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
     study.create_dataset("report", data=_report(UNFINISHED))
+    for name, label in TEXTS.items():
+        study[name].attrs["long_name"] = label
+    study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
+    sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
     labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))
     labels[: len(header.labels)] = [text_bytes(label, LABEL) for label in header.labels]
     named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
+    named.attrs["long_name"] = "name of the candidate in the scene"
     _attach_scales(named, layout.names[-3:-1])
     if layout.sampled:
         study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)

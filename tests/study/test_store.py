@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.finger_quantities import PATCH
+from study.grid import Surface
 from study.layout import Derived, Header, Layout, layout_from_options
 from study.lock import Lock, holder
 from study.plots import axes_of, groups, view_slice
 from study.quantities import MAPS, quantities
-from study.quantity import MODELS
+from study.quantity import MODELS, NEEDS
 from study.reading import StoredAxis
 from study.record import blank, crc32, record, text_bytes
 from study.result import CaseResult
@@ -123,6 +125,33 @@ def test_every_dimension_has_a_scale_beside_the_data(path):
             found = file[dataset.path]
             names = [d[0].name.rpartition("/")[2] for d in found.dims]
             assert all(name in found.parent for name in names)
+
+
+def test_every_dataset_says_what_it_is(tmp_path):
+    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), front=(2, 2))
+    surface = Surface(np.eye(3), np.array([[0, 1, 2]]), np.array([0]))
+    create(tmp_path / "whole.hdf", layout, replace(HEADER, surface=surface))
+    quantities_ = {q.key for q in (*layout.quantities, *PATCH)}
+    seen = set()
+
+    def look(name, node):
+        if isinstance(node, h5py.Dataset):
+            assert node.attrs["long_name"], name
+            assert node.dtype.kind in "SV" or isinstance(node.attrs["units"], str), name
+            key = name if name in quantities_ else f"maps/{name.partition('/')[0]}"
+            if key in quantities_ and "CLASS" not in node.attrs:  # the scales beside them
+                seen.add(key)
+                assert len(node.attrs["definition"]) > 5, name
+
+    with h5py.File(tmp_path / "whole.hdf") as file:
+        file["study"].visititems(look)
+        assert seen == quantities_
+        for path in ("Points", *(f"CellData/{name}" for name in file["VTKHDF/CellData"])):
+            assert file[f"VTKHDF/{path}"].attrs["long_name"]
+            assert isinstance(file[f"VTKHDF/{path}"].attrs["units"], str)
+        assert "Fibonacci" in file["study/provenance"].attrs["sampling"]
+        for q in layout.quantities:
+            assert f"{q.key} [" in file["study/definitions"][()].decode()
 
 
 @pytest.mark.parametrize(
