@@ -77,6 +77,8 @@ def back_stiffness(
         Where no node is on the patch that the finger holds.
     """
     shell, fixed, free = _plate(x, y, symmetry, sheet)
+    if not free.any():
+        return BackStiffness(free, np.zeros((1, 1)))
     nodes = np.flatnonzero(free.any(axis=-1).ravel())
     C, _ = LinearShell(shell, fixed).compliance(nodes)
     moving = free.reshape(-1, 3)[nodes].ravel()

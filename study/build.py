@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fem.outer_surface import OuterSurface
     from fem.pad_shape import PadShape
     from fem.shape import GapObject
+    from fem.sheet import Sheet
     from fem.traced_surface import TracedSurface, TraceReport
     from study.scene import Scene
     from study.scene.sections import Gripper
@@ -183,6 +184,13 @@ def pad_material(gripper: Gripper) -> Material:
 
     nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
     return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
+
+
+def sheet(gripper: Gripper) -> Sheet:
+    """Plate behind each pad."""
+    from fem.sheet import Sheet
+
+    return Sheet(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

@@ -11,6 +11,7 @@ import numpy as np
 from study.limit_surface import dropped_share
 from study.quantities import EFFECTS, REASONS
 from study.scene import Scene
+from study.sheet_level import sheet_level
 
 ONLY, FORCED, BELOW, ABOVE, SYMMETRY, DEFAULT = range(6)  # of REASONS
 SURFACES = {
@@ -28,7 +29,8 @@ def effects_of(
     """Level, indicator and reason of every effect of one case; keys and levels as in ``study.quantities.EFFECTS``.
 
     The indicators are those that a choice between levels is made by: the dent that a linear wall would get at the
-    largest force, over the wall's thickness, for the object, the largest strain for the pad, the share of the
+    largest force, over the wall's thickness, for the object, the largest strain for the pad, the compliance of the
+    sheet over that of the pad for the sheet, the share of the
     normal force that the tilt of the loaded normals takes away for the friction model, the mean share of the three
     dropped components for the wrench, the radial misfit for the limit surface.
     """
@@ -37,7 +39,8 @@ def effects_of(
     def only(name: str) -> int:
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
-    pad, strain = solving.pad_level, max(c.state.checks.max_strain for c in contacts)
+    pad, sheet = solving.pad_level, sheet_level(scene)
+    strain = max(c.state.checks.max_strain for c in contacts)
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["curved"] for own in bounds]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
@@ -47,7 +50,7 @@ def effects_of(
     return {
         "object": _object(solving.level),
         "pad": (EFFECTS["pad"][not pad.linear], strain, REASONS.index(pad.reason)),
-        "sheet": ("rigid", nan, only("sheet")),
+        "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),
         "friction": ("curved", 1.0 - F_N / S, only("friction")),

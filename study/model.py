@@ -14,7 +14,7 @@ from fem.pad import Pad
 from fem.pose import Pose
 from fem.shape import GapFunction, GapObject
 from fem.touch import first_touch
-from study.build import pad_material, pad_shape
+from study.build import pad_material, pad_shape, sheet
 from study.scene import Scene
 from study.scene.sections import Gripper
 
@@ -23,15 +23,18 @@ DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the obj
 
 
 @lru_cache(maxsize=8)
-def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool) -> Pad:
-    """Discrete pad; the same for all candidates, so it is made once."""
-    return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact)
+def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool) -> Pad:
+    """Discrete pad with its sheet; the same for all candidates, so it is made once."""
+    behind = sheet(gripper) if elastic_sheet else None
+    return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
 
 
 @lru_cache(maxsize=8)
-def condensed_pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool) -> CondensedPad:
+def condensed_pad(
+    gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool
+) -> CondensedPad:
     """Discrete pad for small strains, reduced to its front; one factorisation for all candidates."""
-    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser)))
+    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser, elastic_sheet)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from study import model
 from study.build import pad_material
 from study.model import Finger
 from study.scene import Scene
+from study.sheet_level import sheet_level
 
 # Over 352 cases (pads, objects, forces and five laws) e_n of the linear pad was off by at most 0.52 times the
 # departure of its law from a straight line at its largest strain; this keeps it below 1.6 %.
@@ -50,13 +51,13 @@ def level_on_wall(scene: Scene) -> PadLevel:
 def _nearly_linear(scene: Scene, finger: Finger) -> bool:
     law, force = pad_material(scene.gripper), scene.load.normal_force[-1]
     symmetry = model.usable_symmetry(scene, finger, scene.gripper.elements)
-    pad = model.pad(scene.gripper, symmetry, scene.accuracy.contact, False)
+    choice = scene.gripper, symmetry, scene.accuracy.contact, False, sheet_level(scene).elastic
+    pad = model.pad(*choice)
     squeezed = SpringBed(pad, finger.gap).travel(force) / pad.shape.size[2]
     if departure(law, squeezed) > NEARLY_LINEAR:
         return False
-    condensed = model.condensed_pad(scene.gripper, symmetry, scene.accuracy.contact, False)
     try:
-        (state,) = linear_press(condensed, finger.gap, settings=Settings()).ladder([force])
+        (state,) = linear_press(model.condensed_pad(*choice), finger.gap, settings=Settings()).ladder([force])
     except (ConvergenceError, CheckError):
         return False
     return departure(law, state.checks.max_strain) <= NEARLY_LINEAR

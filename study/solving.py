@@ -17,6 +17,7 @@ from fem.grip import Grip, Gripped
 from fem.grip_problem import GripProblem
 from fem.linear_pad import linearised
 from fem.linear_press import linear_press
+from fem.pad import Pad
 from fem.press import Press, Pressed, Settings
 from fem.spring_bed import SpringBed
 from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
@@ -28,6 +29,7 @@ from study.contact import Contact
 from study.model import Finger
 from study.pad_level import PadLevel, choose_pad_level, level_on_wall
 from study.scene import Scene
+from study.sheet_level import sheet_level
 from study.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
 
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
@@ -69,7 +71,7 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
         return OnRigid(scene, fingers, poses, None)
     _refuse_along_axis(fingers)
     held = _grasp(scene, fingers, False)
-    pad = model.pad(scene.gripper, held.pad_symmetry, scene.accuracy.contact, False)
+    pad = _pad(scene, held.pad_symmetry, scene.accuracy.contact, False)
     travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
     level = choose_level(scene, held, travel)
     if level.number == RIGID:
@@ -165,18 +167,22 @@ def _settings(scene: Scene) -> Settings:
     return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
 
 
+def _pad(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
+    return model.pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
+
+
 def _press(scene: Scene, finger: Finger, coarser: bool) -> Press:
     elements = pad_shape(scene.gripper, coarser).elements
     symmetry = model.usable_symmetry(scene, finger, elements)
-    wanted, nodal = (model.pad(scene.gripper, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
+    wanted, nodal = (_pad(scene, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
     return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, _settings(scene))
 
 
 def _linear_press(scene: Scene, finger: Finger, coarser: bool) -> Press:
     elements = pad_shape(scene.gripper, coarser).elements
     symmetry, rule = model.usable_symmetry(scene, finger, elements), scene.accuracy.contact
-    fallback = None if rule == "nodal" else linearised(model.pad(scene.gripper, symmetry, "nodal", coarser))
-    pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser)
+    fallback = None if rule == "nodal" else linearised(_pad(scene, symmetry, "nodal", coarser))
+    pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
     return linear_press(pad, finger.gap, fallback, _settings(scene))
 
 
@@ -206,7 +212,7 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarse
     wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
     def problem(rule: str) -> GripProblem:
-        pad = model.pad(scene.gripper, held.pad_symmetry, rule, coarser)
+        pad = _pad(scene, held.pad_symmetry, rule, coarser)
         if scene.effects.pad == "linear":
             pad = linearised(pad)
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])

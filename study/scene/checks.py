@@ -8,7 +8,7 @@ from typing import Any
 
 from study.scene.errors import Finding, shown
 from study.scene.file_checks import output_file, petsc_options
-from study.scene.gripper_checks import pad_material, pad_mesh
+from study.scene.gripper_checks import pad_material, pad_mesh, sheet
 from study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
 from study.scene.sections import Candidates, GraspPose, Gripper, Load
 from study.scene.shapes import Box, Plate, Revolution, Shape
@@ -165,6 +165,7 @@ def forces(load: Load) -> Iterator[Finding]:
 
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("object",), object_size), (("object",), profile), (("object",), box_edges), (("gripper", "effects"), pad_mesh),
+    (("gripper", "effects"), sheet),
     (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
     (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
     (("output",), output_file), (("petsc",), petsc_options), (("limit_surface", "effects"), surface_choice),

@@ -51,6 +51,18 @@ def element_edges(gripper: Gripper) -> list[tuple[float, float]]:
     return edges
 
 
+def sheet(gripper: Gripper, effects: Effects) -> Iterator[Finding]:
+    """The finger holds the sheet by at least one node of the pad's mesh; with even counts one is in the middle."""
+    if effects.sheet == "rigid":
+        return
+    edges = [gripper.pad_length_mm / gripper.elements[0], gripper.pad_width_mm / gripper.elements[1]]
+    need = [edge if n % 2 else 0.0 for edge, n in zip(edges, gripper.elements, strict=False)]
+    if any(held < least for held, least in zip(gripper.sheet_support_mm, need, strict=True)):
+        found = f"{list(gripper.sheet_support_mm)} mm with {list(gripper.elements[:2])} elements along length and width"
+        expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
+        yield Finding(("gripper", "sheet_support_mm"), found, expected, "use even numbers of elements")
+
+
 def pad_material(gripper: Gripper) -> Iterator[Finding]:
     """Constants that the chosen law cannot have."""
     g = gripper

@@ -13,6 +13,7 @@ Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Count = Annotated[int, Field(ge=2, le=400)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
+Extent = Annotated[float, Field(ge=0, le=500)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
 
@@ -41,8 +42,16 @@ class Gripper(Section):
     grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
     grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its front")
+    sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the sheet behind the pad")
+    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the sheet; steel has 200")
+    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the sheet")
+    sheet_support_mm: Annotated[tuple[Extent, Extent], Field(strict=False)] = Field(
+        (20.0, 10.0), description="length and width of the patch in the sheet's middle that the finger holds"
+    )
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
+    sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
+    sheet_support = si("sheet_support_mm")
 
     @model_validator(mode="before")
     @classmethod
@@ -158,7 +167,9 @@ class Effects(Section):
     pad: Literal["auto", "linear", "hyperelastic"] = Field(
         "auto", description="the deformation of the pads: small strains (condensed once for all cases), or finite"
     )
-    sheet: Literal["auto", "rigid"] = Field("auto", description="compliance of the sheet behind the pad")
+    sheet: Literal["auto", "rigid", "elastic"] = Field(
+        "auto", description="the sheet behind the pad: rigid, or a plate that bends"
+    )
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
     friction: Literal["auto", "curved"] = Field("auto", description="friction model behind the score")

@@ -12,7 +12,6 @@ from pydantic import BaseModel, ValidationError
 from study.scene.errors import Finding, KeyPath, closest, key_text, shown
 from study.scene.units import UNITS, split_unit
 
-LATER_KEYS = {"gripper": ("sheet", "sheet_thickness_mm", "sheet_material")}
 EXAMPLES = {
     "stations_mm": "[25, 50, 75]", "station_range_mm": "[25, 175]", "angles_deg": "[0, 90]", "size_mm": "[60, 40, 120]",
     "profile_mm": "[[0, 30], [50, 30], [80, 20], [100, 20]]", "normal_force_n": "[1, 2, 5]", "alpha": "[-2]",
@@ -20,7 +19,6 @@ EXAMPLES = {
     "poses": "[{ point_mm = [0, 0, 20], approach = [1, 0, 0], long_side = [0, 0, 1] }]",
 }  # fmt: skip
 LATER_LEVELS = {
-    "sheet": ("elastic", "elastic_plate"),
     "fingers": ("one",), "friction": ("coupled",),
 }  # fmt: skip
 
@@ -31,9 +29,7 @@ def unknown_key(path: KeyPath, value: Any, keys: Sequence[str], elsewhere: Mappi
     stem, unit = split_unit(key)
     same = sorted((k for k in keys if split_unit(k)[0] == stem), key=lambda k: not split_unit(k)[1])
     homes = [place for place, theirs in elsewhere.items() if key in theirs]
-    if key in LATER_KEYS.get(table, ()):
-        remedy = "this version does not simulate what it describes (the sheet is rigid), so remove it"
-    elif same:
+    if same:
         remedy = f"the unit is part of the key, so write `{same[0]}{_converted(value, unit, split_unit(same[0])[1])}`"
     elif homes:
         remedy = f"it belongs to {homes[0]}"
