@@ -18,6 +18,7 @@ from study.exits import BUG, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
 from study.help import Formatter, Parser, Program
 from study.patch.command import add_options as add_patch_options
+from study.start import add_options as add_init_options
 from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
 from study.watch import add_options as add_watch_options
@@ -70,6 +71,8 @@ def program() -> Program:
         made.set_defaults(command=command)
         return made
 
+    add_init_options(add("init", commands.init, "write a commented scene and a batch script to start from",
+                         "softjaw init bottle"))  # fmt: skip
     check = add("check", commands.check, "find every error of a scene, or say what would be run",
                 "softjaw check jobs/bottle-rigid.toml")  # fmt: skip
     plan = add("plan", commands.plan, "cases, units, disk, memory and time, before anything is spent",

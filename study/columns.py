@@ -28,6 +28,12 @@ def wrapped(text: str, width: int, indent: str = "", more: str = "") -> str:
     )  # fmt: skip
 
 
+def hanging(text: str, width: int) -> str:
+    """Lines such as ``  name        value`` broken so that their values stay in one column."""
+    lines = text.splitlines()
+    return "\n".join(wrapped(line, width, more=" " * (14 if line.startswith("  ") else 2)) for line in lines)
+
+
 def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = ()) -> list[str]:
     """Rows of equal length as lines with aligned columns; those numbered in ``left`` begin at the left.
 

@@ -58,6 +58,14 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
     return [f"petsc.{name}={value}" for name, value in found]
 
 
+def init(options: Namespace) -> int:
+    """Write a scene and a batch script to start from."""
+    from study.start import init
+
+    print(init(options))
+    return DONE
+
+
 def _catalogue(options: Namespace) -> bool:
     from study.catalogue.model import is_catalogue
 
@@ -67,6 +75,7 @@ def _catalogue(options: Namespace) -> bool:
 def check(options: Namespace) -> int:
     """Find every error of a scene or of a catalogue, or say what would be run."""
     from study.build import check_object
+    from study.columns import hanging, terminal_width
     from study.overview import scene_text
 
     if _catalogue(options):
@@ -76,13 +85,14 @@ def check(options: Namespace) -> int:
         return DONE
     scene = _scene(options)
     check_object(scene)
-    print(scene_text(scene, options.scene))
+    print(hanging(scene_text(scene, options.scene), terminal_width()))
     return DONE
 
 
 def plan(options: Namespace) -> int:
     """Say what a run will take."""
     from study.build import warnings
+    from study.columns import hanging, terminal_width
     from study.plan import make_plan, plan_text
 
     if _catalogue(options):
@@ -90,7 +100,8 @@ def plan(options: Namespace) -> int:
     scene = _scene(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
-    print("\n".join([plan_text(made, scene, path, options.ranks), *(f"warning: {text}" for text in warnings(scene))]))
+    lines = [plan_text(made, scene, path, options.ranks), *(f"warning: {text}" for text in warnings(scene))]
+    print(hanging("\n".join(lines), terminal_width()))
     return DONE
 
 

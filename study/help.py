@@ -31,7 +31,10 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
             self.error(f"'{value}' is no command{_meant(value, list(action.choices))} '{self.prog} --help' lists all")
-        super()._check_value(action, value)
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            text = f"found '{value}', expected {', '.join(known)}{_meant(str(value), known)}"
+            raise argparse.ArgumentError(action, text.rstrip(";"))
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Refuse what is left over here, where the options that exist are known."""

@@ -82,12 +82,12 @@ def test_every_command_has_an_example(capsys):
         assert main([command, "--help"]) == 0
         told = capsys.readouterr().out
         assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in told
-        assert max(map(len, told.splitlines())) <= 90
+        assert max(map(len, told.partition("example:")[0].splitlines())) <= 80
 
 
 def test_check_says_what_would_be_run(scene, capsys):
     assert main(["check", str(scene), "--set", "friction.mu=0.5"]) == 0
-    text = capsys.readouterr().out
+    text = " ".join(capsys.readouterr().out.split())
     assert "no errors" in text
     assert "sphere" in text
     assert "mu = 0.5" in text
@@ -164,10 +164,10 @@ def test_examples_are_words_that_the_program_takes_and_name_files_that_exist(exa
     words, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     program().parse_args(words)
     petsc_overrides(petsc)
-    for word in words:
+    for before, word in zip(["", *words], words, strict=False):
         if word.startswith("jobs/"):
             assert (ROOT / word).exists(), word
-        elif word.startswith("results/") and word.endswith(".hdf") and given[0] != "compare":
+        elif word.startswith("results/") and word.endswith(".hdf") and before != "-o" and words[0] != "compare":
             assert (ROOT / "jobs" / Path(word).with_suffix(".toml").name).exists(), word  # what a shipped scene makes
 
 

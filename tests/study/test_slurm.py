@@ -1,0 +1,117 @@
+"""The batch scripts under a stand-in for Slurm: an mpirun that a signal stops, and a scontrol that notes its words."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+
+import pytest
+
+from study.cli import main
+from study.commands import RANK
+from study.start import HERE
+from tests.study.launching import ROOT, wait_for
+
+pytestmark = pytest.mark.launches
+SHARED = "# ---- the same in all scripts"
+SCRIPTS = sorted((ROOT / "jobs" / "slurm").glob("*.sbatch"))
+# The first start works until USR1 comes and then has cases missing; the next one finishes.
+MPIRUN = """#!/bin/bash
+printf '%s\n' "$*" >> calls
+[ -n "$FAKE_CODE" ] && exit "$FAKE_CODE"
+[ -e stopped ] && exit 0
+trap 'touch stopped; sleep 0.2; exit 75' USR1
+touch working
+while :; do sleep 0.02; done
+"""
+SCONTROL = '#!/bin/bash\necho "scontrol $*" >> calls\n'
+
+
+@pytest.fixture
+def slurm(tmp_path):
+    """A folder with a stand-in for mpirun and scontrol, and the variables of a job in it."""
+    for name, text in (("mpirun", MPIRUN), ("scontrol", SCONTROL)):
+        program = tmp_path / "bin" / name
+        program.parent.mkdir(exist_ok=True)
+        program.write_text(text)
+        program.chmod(0o755)
+    job = {"SLURM_JOB_ID": "4711", "SLURM_NTASKS": "3", "SLURM_ARRAY_TASK_ID": "2"}
+    return {**os.environ, **job, "PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"}
+
+
+def started(script, folder, env, *words, **more):
+    return subprocess.Popen(
+        ["bash", str(script), *words], cwd=folder, env={**env, **more}, stdout=subprocess.PIPE, text=True
+    )
+
+
+def finished(*words, **more):
+    process = started(*words, **more)
+    output, _ = process.communicate(timeout=30)
+    return process.returncode, output
+
+
+def calls(folder):
+    return (folder / "calls").read_text().splitlines()
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_signal_stops_the_run_and_puts_the_job_back_into_the_queue(script, tmp_path, slurm):
+    words = ["a.toml", "b.toml"] if script.stem == "array" else ["b.toml"]
+    process = started(script, tmp_path, slurm, *words)
+    wait_for((tmp_path / "working").exists)
+    process.send_signal(signal.SIGUSR1)
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 75, output
+    run = "-n 3 .venv/bin/softjaw run b.toml"
+    assert calls(tmp_path) == [run, "scontrol requeue 4711"]
+    assert finished(script, tmp_path, slurm, *words, SLURM_RESTART_COUNT="1")[0] == 0
+    assert calls(tmp_path) == [run, "scontrol requeue 4711", run]
+
+
+def test_a_job_that_never_ends_is_not_put_back_for_ever(tmp_path, slurm):
+    words = (SCRIPTS[-1], tmp_path, slurm, "a.toml")
+    code, output = finished(*words, SLURM_RESTART_COUNT="5", MOST_RESTARTS="5", FAKE_CODE="75")
+    assert code == 75
+    assert "stopped for good after 5 restarts" in output
+    assert not any("scontrol" in line for line in calls(tmp_path))
+
+
+@pytest.mark.parametrize("code", [0, 2, 6, 70, 137])
+def test_other_ends_are_final_and_keep_their_code(tmp_path, slurm, code):
+    assert finished(SCRIPTS[-1], tmp_path, slurm, "a.toml", FAKE_CODE=str(code))[0] == code
+    assert not any("scontrol" in line for line in calls(tmp_path))
+
+
+def test_outside_slurm_the_script_is_a_plain_run(tmp_path, slurm):
+    plain = {name: value for name, value in slurm.items() if not name.startswith("SLURM")}
+    assert finished(SCRIPTS[-1], tmp_path, plain, "a.toml", FAKE_CODE="75")[0] == 75
+    assert calls(tmp_path) == ["-n 1 .venv/bin/softjaw run a.toml"]
+
+
+def test_a_scene_that_is_not_named_is_asked_for(tmp_path, slurm):
+    for script in SCRIPTS:
+        process = subprocess.run(["bash", script], cwd=tmp_path, env=slurm, capture_output=True, text=True, check=False)
+        assert process.returncode != 0
+        assert "scene" in process.stderr
+    assert not (tmp_path / "calls").exists()
+
+
+def test_all_scripts_are_sound_and_share_what_they_do(tmp_path, slurm, monkeypatch, capsys):
+    texts = [path.read_text() for path in (*SCRIPTS, HERE / "run.sbatch")]
+    assert len(texts) == 4
+    assert len({text.partition(SHARED)[2] for text in texts}) == 1
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "bottle"]) == 0
+    for path in (*SCRIPTS, tmp_path / "bottle.sbatch"):
+        assert subprocess.run(["bash", "-n", path], capture_output=True, check=False).stderr == b""
+        asked = [line for line in path.read_text().splitlines() if line.startswith("#SBATCH")]
+        assert any("--signal=B:USR1@" in line for line in asked)
+        assert any("--requeue" in line for line in asked)
+        assert any("--cpus-per-task=1" in line for line in asked)
+    assert finished(tmp_path / "bottle.sbatch", tmp_path, slurm, FAKE_CODE="0")[0] == 0
+    assert calls(tmp_path)[0].startswith("-n 3 /")
+    assert calls(tmp_path)[0].endswith("softjaw run bottle.toml")

@@ -1,0 +1,126 @@
+"""``softjaw init``: what it writes passes ``check`` and runs, replaces nothing, and knows its mesh."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from study.cli import main
+from study.commands import RANK
+from study.environment import launch_environment
+from study.exits import CANNOT_WRITE, USAGE
+from study.scene import load_scene
+from study.start import KINDS
+from tests.study.launching import ROOT
+
+FLASK = ROOT / "jobs" / "objects" / "flask.stl"
+SMALL = {  # what makes a run of a second or two of each kind
+    "bottle": ["candidates.stations=1", "candidates.station_range_mm=[60,60]", "load.normal_force_n=[2]"],
+    "cup": ["candidates.stations=1", "candidates.station_range_mm=[56,56]", "load.normal_force_n=[0.5]",
+            "effects.object='rigid'"],
+    "cylinder": ["load.normal_force_n=[3]", "accuracy.meshes=1"],
+    "mesh": ["candidates.stations=1", "candidates.station_range_mm=[60,60]", "candidates.angles_deg=[0]",
+             "load.normal_force_n=[2]"],
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path, monkeypatch):
+    """Each test in a folder of its own, and every rank speaks."""
+    monkeypatch.chdir(tmp_path)
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
+
+
+def started(kind, *more):
+    return main(["init", kind, *(["--mesh", str(FLASK), "--unit", "mm"] if kind == "mesh" else []), *more])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_written_passes_check(kind, tmp_path, capsys):
+    assert started(kind, "-o", "mine") == 0
+    assert "softjaw check mine.toml" in capsys.readouterr().out
+    text = (tmp_path / "mine.toml").read_text()
+    assert "@" not in text
+    assert tomllib.loads(text)["object"]["name"] == "mine"
+    assert max(map(len, text.splitlines())) <= 120
+    assert main(["check", "mine.toml"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "no errors" in told
+    assert "warning" not in told
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_written_runs(kind, tmp_path):
+    assert started(kind, "-o", "mine") == 0
+    changes = [word for change in ["gripper.elements=[8,4,2]", *SMALL[kind]] for word in ("--set", change)]
+    done = subprocess.run(
+        [sys.executable, "-m", "study", "run", "mine.toml", *changes], cwd=tmp_path, capture_output=True, text=True,
+        env={**launch_environment(), "PYTHONPATH": str(ROOT)}, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "results" / "mine.hdf").exists()
+
+
+def test_lines_behind_a_number_sign_make_the_bottle_thin_walled(tmp_path):
+    assert started("bottle") == 0
+    path = tmp_path / "bottle.toml"
+    lines = [line[2:] if line.startswith("# ") and " = " in line else line for line in path.read_text().splitlines()]
+    path.write_text("\n".join(lines))
+    scene = load_scene(path)
+    assert (scene.object.wall_mm, scene.object.allowed_dent_mm) == (0.4, 3)
+
+
+def test_stations_and_pads_follow_the_box_round_the_mesh(tmp_path):
+    """The flask is 120 mm high and 49.7 mm wide along y."""
+    assert started("mesh", "-o", "sub/flask") == 0
+    scene = load_scene(tmp_path / "sub" / "flask.toml")
+    assert scene.candidates.station_range_mm == (25, 95)
+    assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
+    assert (tmp_path / "sub" / scene.object.mesh).resolve() == FLASK.resolve()
+    assert started("mesh", "-o", "lying.toml", "--axis", "y") == 0
+    lying = load_scene(tmp_path / "lying.toml")  # shorter pads
+    assert (lying.object.axis, lying.gripper.pad_length_mm) == ("y", 25)
+    assert lying.candidates.station_range_mm[0] == 12
+
+
+@pytest.mark.parametrize("there", ["bottle.toml", "bottle.sbatch"])
+def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
+    (tmp_path / there).write_text("mine")
+    assert started("bottle") == CANNOT_WRITE
+    assert f"{there}: there already" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == [there]
+    assert (tmp_path / there).read_text() == "mine"
+    assert started("bottle", "--force") == 0
+    assert (tmp_path / there).read_text() != "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "{bottle,cup,cylinder,mesh}"),
+        (["botle"], "did you mean 'bottle'?"),
+        (["mesh"], "a mesh needs --mesh FILE and --unit"),
+        (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
+        (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit should be "mm"'),
+        (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"),
+        (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"),
+        (["cup", "-o", "$(rm -r .)"], "expected letters"),
+        (["cup", "-o", 'a"b'], "expected letters"),
+    ],
+)
+def test_what_cannot_be_started_is_refused_and_writes_nothing(words, told, tmp_path, capsys):
+    assert main(["init", *words]) == USAGE
+    assert told in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_kinds_are_listed(capsys):
+    assert main(["init", "--list"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"  {kind} " in text for kind in KINDS)
