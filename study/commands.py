@@ -284,35 +284,56 @@ def _run_on(comm: Any, options: Namespace) -> int:
         return scene, target(options, scene)
 
     scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
-    how = work(scene)  # loads PETSc, which all ranks have to do together
-    plan = on_rank0(comm, prepare, scene, options)
+    from study import pipeline  # noqa: F401  (loads PETSc, which all ranks have to do together)
+
+    scene, choice = on_rank0(comm, _settled, scene, path)
+    how = work(scene, choice)
+    plan = on_rank0(comm, prepare, scene, options, choice)
     return run_study(plan, how, path, comm, retry_failed=options.retry_failed)
 
 
-def work(scene: Any) -> Any:
-    """How the cases of a scene are solved."""
+def _settled(scene: Any, path: Path) -> tuple[Any, Any]:
+    """The scene with what its target of accuracy chooses, and the choice; by one rank."""
+    if scene.accuracy.e_n is None:
+        return scene, None
+    from study.build import check_object
+    from study.cost.target import settled
+
+    check_object(scene)
+    return settled(scene, path, lambda text: print(text, flush=True))
+
+
+def work(scene: Any, choice: Any = None) -> Any:
+    """How the cases of a scene are solved; ``choice`` is what its target of accuracy chose."""
     from study import derived, pipeline
+    from study.cost import stored
     from study.run import Work
     from study.status import summary
+
+    def finalise(writer: Any) -> None:
+        stored.fill(writer, choice)
+        derived.finalise(writer, scene)
 
     return Work(
         solve_unit=pipeline.solve_unit,
         image=pipeline.image,
-        finalise=lambda writer: derived.finalise(writer, scene),
+        finalise=finalise,
         summary=summary,
         time_limit=scene.run.time_limit_s,
         memory=scene.run.memory_gb,
     )
 
 
-def prepare(scene: Any, options: Namespace) -> Any:
+def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
     from study.build import warnings
+    from study.cost.stored import overrides
     from study.plan import make_plan
     from study.reach import check_poses
 
     _check_petsc(dict(scene.petsc))
-    plan = make_plan(scene, options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
+    given = [*options.overrides, *petsc_overrides(options.petsc), *overrides(choice)]
+    plan = make_plan(scene, options.scene, given)
     check_poses(scene, [unit.scene for unit in plan.units])
     for text in warnings(scene):
         print(f"warning: {text}", flush=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from study import curvature, window
+from study.cost import stored
 from study.layout import Derived
 from study.scene import Scene
 
@@ -16,7 +17,7 @@ KINDS = (curvature, window)
 
 def derived(scene: Scene) -> list[Derived]:
     """Everything that is derived for a scene."""
-    return [d for kind in KINDS for d in kind.derived(scene)]
+    return [d for kind in (*KINDS, stored) for d in kind.derived(scene)]
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:

@@ -30,6 +30,7 @@ def scene_text(scene: Any, file: str) -> str:
         "cases": str(scene.cases),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
+        "target": _target(scene),
         "effects": ", ".join(levels),
         "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
@@ -45,6 +46,15 @@ def limits_text(run: Any) -> str:
     limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
     memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
     return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that, and the others go on"
+
+
+def _target(scene: Any) -> str:
+    """What will be chosen for a target of accuracy; empty without one."""
+    if scene.accuracy.e_n is None:
+        return ""
+    from study.cost.target import expected
+
+    return expected(scene)
 
 
 def has_wall(shape: Any) -> bool:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +20,16 @@ from study.cost.file import CostStudy
 from study.cost.knobs import Level, with_level
 from study.cost.measure import Measured, measure
 from study.cost.pareto import front
-from study.cost.probes import Probe
 from study.cost.study import Costs
 from study.scene import Scene
+
+if TYPE_CHECKING:
+    from study.cost.probes import Probe
 
 FloatArray = NDArray[np.float64]
 NOT_CHOSEN = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
 HOPE, MOST_TRIED = 2.0, 8  # predicted errors up to so many targets are tried, at most so many combinations
-Solve = Callable[[str, Probe, Level], Measured]
+Solve = Callable[[str, "Probe", Level], Measured]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from friction.motion import fibonacci_twists
 from friction.wrench import friction_limits, friction_wrench
 from lsfit.ellipsoid import three_motion_ellipsoid
 from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
-from scoring.graspit import graspit_score
+from scoring.graspit import linearised_contacts
 from scoring.pose import pose_volume
 from scoring.score import score
 from study import model
 from study.build import build_object
 from study.contact import X_OF_PAD, Contact
-from study.cost.measure import Measured, cpu_seconds, least_seconds
+from study.cost.levels import HULL, POINTS, SURFACES, WINKLER
+from study.cost.measure import QUANTITIES, Measured, cpu_seconds, least_seconds
 from study.cost.probes import Probe
 from study.cost.winkler import winkler_pad
 from study.grasp import grasp_values, lengths
@@ -31,15 +32,6 @@ from study.scene import Scene
 from study.solving import solver
 
 FloatArray = NDArray[np.float64]
-SAMPLES = (50, 100, 200, 500, 1000, 2000, 4000)
-SURFACES = (
-    ("three motions", "three_motions", "least_squares"), ("axis-aligned ellipsoid", "axis_aligned", "least_squares"),
-    ("full ellipsoid", "full", "least_squares"), ("full ellipsoid, zhou", "full", "zhou"),
-    ("quartic", "quartic", "least_squares"), ("quartic, zhou", "quartic", "zhou"),
-)  # fmt: skip
-HULL = 3000  # wrenches whose hull stands for the limit surface itself
-POINTS = {"hull of 20 points": None, "hull of 50 points": 50}
-WINKLER = "Winkler foundation, planar contact"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,23 +72,6 @@ def solved(probe: Probe) -> Solved:
     return Solved(probe, obj, contacts, seconds / len(probe.forces))
 
 
-def judging_knobs(scene: Scene) -> dict[str, list[str]]:
-    """Levels of every knob, the cheapest first; the last is the reference."""
-    samples = sorted({*SAMPLES, scene.limit_surface.samples})
-    return {
-        "contact model": [WINKLER, "finite elements, planar", "finite elements, curved"],
-        "motions sampled": [str(n) for n in samples],
-        "limit surface": [*(name for name, *_ in SURFACES), f"hull of {HULL} wrenches"],
-        "score": [*POINTS, "exact"],
-    }
-
-
-def expected_seconds(knob: str, level: str) -> float:
-    """Rough time of one case [s], before anything is measured."""
-    slow = {"hull of 20 points": 0.5, "hull of 50 points": 5.0}
-    return slow.get(level, 0.03) * (1 if knob == "score" else 2)
-
-
 def judge(found: Solved, knob: str, level: str) -> Measured:
     """A probe's cases at a level of a knob; the score's hulls only at the highest force, because they take seconds."""
     work: Callable[[list[Contact], float], FloatArray] = {
@@ -105,14 +80,18 @@ def judge(found: Solved, knob: str, level: str) -> Measured:
     forces, contacts = found.probe.forces, found.contacts
     if knob == "score":
         forces, contacts = forces[-1:], contacts[-1:]
-    values, own, repeats = [], 0.0, 1
+    values, own, repeats, message = [], 0.0, 1, ""
     for force, pair in zip(forces, contacts, strict=True):
-        seconds, value, repeats = least_seconds(lambda pair=pair, force=force: work(pair, force))
+        try:
+            seconds, value, repeats = least_seconds(lambda pair=pair, force=force: work(pair, force))
+        except Exception as error:  # whatever a case dies of is its result, as in a run
+            seconds, value, message = np.nan, np.full(len(QUANTITIES), np.nan), f"{type(error).__name__}: {error}"
         values.append(value)
         own += seconds / len(forces)
     whole = own if level == WINKLER else own + found.seconds
-    return Measured(f"{knob}: {level}", level, found.probe.label, np.array(forces), np.array(values), whole, own,
-                    repeats)  # fmt: skip
+    return Measured(
+        f"{knob}: {level}", level, found.probe.label, np.array(forces), np.array(values), whole, own, repeats, message
+    )
 
 
 def _contact_model(found: Solved, level: str) -> Callable:
@@ -144,10 +123,15 @@ def _score(found: Solved, level: str) -> Callable:
         return lambda contacts, _: _with_quality(found, contacts, ellipsoids(contacts))
 
     def hull(contacts: list[Contact], _: float) -> FloatArray:
-        size = lengths(found.scene, found.obj, contacts)
+        size, count = lengths(found.scene, found.obj, contacts), POINTS[level]
         soft = [SoftContact(c.origin, c.axes, body) for c, body in zip(contacts, ellipsoids(contacts), strict=True)]
-        quality = graspit_score(soft, size.arms, size.torques, m=POINTS[level], unit=size.torques).volume
-        return np.array([*_limits(contacts, "curved"), quality])
+        cones = []
+        for contact in linearised_contacts(soft, count, size.torques):
+            V = contact.body.vertices
+            load = np.hstack([np.ones((len(V), 1)), V]) @ contact.wrench_map(size.arms, size.torques, np.zeros(3)).T
+            cones.append(np.vstack([np.zeros(6), load]))
+        sums = (cones[0][:, None] + cones[1][None]).reshape(-1, 6)
+        return np.array([*_limits(contacts, "curved"), ConvexHull(sums, qhull_options="Qx").volume])
 
     return hull
 

@@ -191,7 +191,7 @@ def _steps() -> Knob:
 
 def _collocation(scene: Scene) -> Knob:
     levels = tuple(Level(rule, (("accuracy.contact", rule),)) for rule in ("nodal", "weighted"))
-    return Knob("gap collocation", "gaps that vanish at nodes, or on average round them", levels, -1)
+    return Knob("gap collocation", "gaps that vanish at nodes, or on average round them", levels, -1, family="pad mesh")
 
 
 def _effects(scene: Scene) -> Iterable[Knob]:

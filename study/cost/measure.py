@@ -6,15 +6,16 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study import pipeline
 from study.cost.knobs import EACH_ALONE, Level, with_level
-from study.cost.probes import Probe
 from study.result import CaseFailure
+
+if TYPE_CHECKING:
+    from study.cost.probes import Probe
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -81,7 +82,12 @@ def least_seconds(work: Callable[[], T]) -> tuple[float, T, int]:
     return best, found, times
 
 
-def measure(setting: str, probe: Probe, level: Level) -> Measured:
+def measure_once(setting: str, probe: Probe, level: Level) -> Measured:
+    """`measure` without repeats."""
+    return measure(setting, probe, level, lambda work: (*cpu_seconds(work), 1))
+
+
+def measure(setting: str, probe: Probe, level: Level, timed: Callable = least_seconds) -> Measured:
     """A probe's cases at a level of a contact knob; what fails is a message, never an exception."""
     scene = with_level(probe.unit.scene, level)
     ladders = ladders_of(probe.forces, level.between)
@@ -96,7 +102,7 @@ def measure(setting: str, probe: Probe, level: Level) -> Measured:
             message = message or told
         return found, message
 
-    seconds, (found, message), repeats = least_seconds(solve)
+    seconds, (found, message), repeats = timed(solve)
     nothing = np.full(len(QUANTITIES), np.nan)
     values = np.array([found.get(force, nothing) for force in probe.forces])
     return Measured(setting, level.name, probe.label, np.array(probe.forces), values, seconds / len(probe.forces),
@@ -118,6 +124,8 @@ def ladders_of(forces: Sequence[float], between: int) -> list[tuple[float, ...]]
 
 
 def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, FloatArray], str]:
+    from study import pipeline  # loads PETSc, which is not needed to read a study
+
     found, message = {}, ""
     try:
         for k, result in pipeline.solve_unit(unit):

@@ -89,7 +89,7 @@ def _knob(knob: KnobErrors) -> str:
 
 def _row(level: LevelErrors, own: bool, with_own: bool) -> list[str]:
     errors = [
-        f"{percent(w)} ({percent(m)})" if w > 0 else "reference" if w == 0 else "failed"
+        f"{percent(w)} ({percent(m)})" if w > 0 else "0" if w == 0 else "failed"
         for w, m in zip(level.worst, level.middle, strict=True)
     ]
     part = [seconds_text(level.own)] if with_own else []
@@ -99,7 +99,8 @@ def _row(level: LevelErrors, own: bool, with_own: bool) -> list[str]:
 def _orders(knob: KnobErrors) -> str:
     """Observed orders, or why there are none."""
     if all(found.remark == "no order is expected" for found in knob.limits):
-        return "No order is expected; the reference is the last row."
+        reference = "the limit of the pad meshes" if knob.family else "the last row"
+        return f"No order is expected; the reference is {reference}."
     told = [
         f"{name}: order {found.order:.1f}" if not found.remark else f"{name}: order not seen ({found.remark})"
         for name, found in zip(NAMES, knob.limits, strict=True)

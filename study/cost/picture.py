@@ -10,18 +10,18 @@ import numpy as np
 from study import pictures
 from study.cost.choose import NOT_CHOSEN, Combination
 from study.cost.errors import KnobErrors
-from study.cost.judging import WINKLER
+from study.cost.levels import WINKLER
 from study.report.page import Picture
 
 TITLES = ("eccentricity parameter e_n", "largest friction force", "largest torque", "grasp quality")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"), ("#6b747b", "v"), ("#3d7a1f", "P"))
-LEAST = 1e-6  # errors below are drawn there
+LEAST = 1e-6  # errors below are not drawn
 QUALITY = 3
 
 
 def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) -> tuple[Picture, bytes]:
     """The diagram as SVG for a page and as PNG."""
-    drawn, axes = pictures.figure(10, 7.2, 2, 2, gap=0.12)
+    drawn, axes = pictures.figure(10, 7.2, 2, 2, gap=0.12, sharex=True)
     lines = [t for t in tables if not t.judging and t.name not in NOT_CHOSEN]
     for q, (panel, title) in enumerate(zip(axes.flat, TITLES, strict=True)):
         panel.set(title=title, xscale="log", yscale="log")
@@ -44,7 +44,8 @@ def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) ->
     caption = (
         "Every line changes one knob and leaves the others as the scene has them; a ring marks the scene's own. "
         "Errors are against the limit that the knob's ladder leads to, the largest over all probe cases. Lower left is "
-        "better. The dotted line joins the combinations of all knobs that nothing beats, with predicted errors."
+        "better; errors below 1e-6 are left out. "
+        "The dotted line joins the combinations of all knobs that nothing beats, with predicted errors."
     )
     alt = "Four panels of relative error against CPU seconds per case, logarithmic, one line for each knob."
     return Picture(pictures.as_svg(drawn), alt, caption), pictures.as_png(drawn)
@@ -52,7 +53,7 @@ def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) ->
 
 def _ladder(panel: Any, table: KnobErrors, q: int, colour: str, marker: str) -> None:
     """A knob's levels that are not its reference, joined where they follow one another."""
-    points = [(v.seconds, max(v.worst[q], LEAST), i) for i, v in enumerate(table.levels) if v.worst[q] > 0]
+    points = [(v.seconds, v.worst[q], i) for i, v in enumerate(table.levels) if v.worst[q] > LEAST]
     if not points:
         return
     x, y, place = (np.array(part) for part in zip(*points, strict=True))
@@ -68,13 +69,13 @@ def _baselines(panel: Any, table: KnobErrors, q: int) -> None:
     if table.name == "contact model":
         for level, marker, name in zip(table.levels, "*X", ("Winkler, planar", "finite elements, planar friction"),
                                        strict=False):  # fmt: skip
-            if level.worst[q] > 0:
+            if level.worst[q] > LEAST:
                 known = WINKLER if level.name == WINKLER else level.name
                 size = 10 if known == WINKLER else 6
                 panel.plot(level.seconds, level.worst[q], marker, ms=size, color=pictures.INK, label=name, zorder=4)
     elif q == QUALITY and table.judging:
         styles = {"limit surface": ("<", "#801650"), "motions sampled": (">", "#8a6d00"), "score": ("h", "#b3261e")}
         marker, colour = styles[table.name]
-        points = [(v.seconds, max(v.worst[q], LEAST)) for v in table.levels if v.worst[q] > 0]
+        points = [(v.seconds, v.worst[q]) for v in table.levels if v.worst[q] > LEAST]
         if points:
             panel.plot(*zip(*points, strict=True), marker, color=colour, ms=4.5, label=table.name, zorder=3)

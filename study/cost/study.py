@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.errors import CheckError, ConvergenceError
 from study import provenance
-from study.cost import judging
 from study.cost.errors import KnobErrors, tables
 from study.cost.file import CostStudy, save
 from study.cost.knobs import EACH_ALONE, Knob, Level, Skipped, contact_knobs, weight, with_level
+from study.cost.levels import expected_seconds, judging_knobs
 from study.cost.measure import calibration_seconds, measure, warm_up
-from study.cost.probes import Probe
 from study.progress import duration
 from study.scene import Scene
+
+if TYPE_CHECKING:
+    from study.cost.probes import Probe
 
 FIRST_GUESS = 2e-8  # seconds of one force over `weight`, before anything is measured
 
@@ -79,7 +82,7 @@ def costs(scene: Scene, with_judging: bool = True) -> Costs:
     """The knobs of a scene."""
     own = plain(scene)
     knobs, skipped = contact_knobs(own)
-    return Costs(own, tuple(knobs), tuple(skipped), judging.judging_knobs(own) if with_judging else {})
+    return Costs(own, tuple(knobs), tuple(skipped), judging_knobs(own) if with_judging else {})
 
 
 def new_study(scene: Scene, found: Sequence[Probe], title: str, scene_file: str) -> CostStudy:
@@ -97,7 +100,7 @@ class Measuring:
     def __init__(self, study: CostStudy, found: Sequence[Probe], what: Costs, path: Path | None,
                  say: Callable[[str], None]) -> None:  # fmt: skip
         self.study, self.probes, self.costs, self.path, self.say = study, found, what, path, say
-        self._contacts: list[judging.Solved] = []
+        self._contacts: list[Any] = []
 
     def run(self, seconds: float) -> None:
         """Measure until everything is there or would take the study beyond so many CPU seconds."""
@@ -121,7 +124,7 @@ class Measuring:
         """CPU time that a task will take, by the measured level of its knob that is nearest to it [s]."""
         cases = sum(len(p.forces) for p in self.probes)
         if task.level is None:
-            return judging.expected_seconds(task.knob, task.name) * cases
+            return expected_seconds(task.knob, task.name) * cases
         known = [t for t in self.costs.tasks() if t.level is not None and self.study.has(t.setting)]
         alike = [t for t in known if t.knob == task.knob] or [t for t in known if t.setting == self.study.base]
         if not alike:
@@ -143,7 +146,9 @@ class Measuring:
                 contacts = self._solved()
                 if len(contacts) < len(self.probes):
                     return
-                found = judging.judge(contacts[i], task.knob, task.name)
+                from study.cost.judging import judge
+
+                found = judge(contacts[i], task.knob, task.name)
             self.study.add(found)
             self._save()
         own = self.study.of(task.setting)
@@ -152,11 +157,13 @@ class Measuring:
         knob = f"{task.knob}: " if task.knob else ""
         self.say(f"{knob}{task.name}: {np.mean([m.seconds for m in own]):.3g} s per case{told}")
 
-    def _solved(self) -> list[judging.Solved]:
+    def _solved(self) -> list[Any]:
         """Contacts of all probes at the scene's own settings, solved once; of none where one fails."""
+        from study.cost.judging import solved
+
         if not self._contacts:
             try:
-                self._contacts = [judging.solved(p) for p in self.probes]
+                self._contacts = [solved(p) for p in self.probes]
             except (ConvergenceError, CheckError) as error:
                 self.say(f"friction, limit surfaces and scores are not measured: {error}")
         return self._contacts
