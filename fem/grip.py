@@ -106,7 +106,7 @@ class Grip:
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
-            ROUNDING * self.problem.model.shell.young_modulus,
+            ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
             None if "contact_snes_max_it" in self.options else MOST_ITERATIONS, self._watch,
         )  # fmt: skip
 

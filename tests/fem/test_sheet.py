@@ -1,0 +1,129 @@
+"""The elastic sheet behind the pad: beams in closed form, limits, symmetry, tangent."""
+
+import numpy as np
+import pytest
+
+from fem.contact import ContactProblem, Control
+from fem.linear_pad import CondensedPad, linearised
+from fem.linear_press import linear_press
+from fem.materials import material
+from fem.objects import EllipticCylinder, Sphere
+from fem.pad import Pad, PadShape
+from fem.press import Press
+from fem.sheet import Sheet, back_stiffness, relative_compliance
+from fem.spring_bed import SpringBed
+from tests.fem import reference
+
+SIZE = (0.050, 0.022, 0.015)
+FOAM = material("blatz_ko", 0.040e6)
+OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
+BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
+PLASTIC = Sheet(0.001, 2e9, 0.35, (0.02, 0.011))
+X, Y = tuple(np.linspace(-0.025, 0.025, 21)), tuple(np.linspace(-0.011, 0.011, 5))
+WHOLE = (False, False)
+
+
+def pad_of(sheet, symmetry=(True, True), elements=(8, 4, 3), law=FOAM, contact="weighted"):
+    return Pad(PadShape(SIZE, elements), law, symmetry, contact, sheet)
+
+
+def wings(modulus):
+    """Held across its whole width in the middle: two cantilevers of 20 mm; without Poisson they are beams."""
+    return Sheet(0.001, modulus, 0.0, (0.010, 0.022))
+
+
+def test_wings_bend_as_beams():
+    """``w = F L^3 / (3 E I)`` under a force at the end of a wing; the held part does not move."""
+    E, L, b, t = 70e9, 0.020, 0.022, 0.001
+    back = back_stiffness(X, Y, WHOLE, wings(E))
+    force = np.zeros((len(X), len(Y), 3))
+    force[0, :, 2] = np.array([0.125, 0.25, 0.25, 0.25, 0.125])
+    u = np.zeros_like(force)
+    u[back.free] = np.linalg.solve(back.K[:-1, :-1], force[back.free])
+    assert u[0, :, 2].mean() == pytest.approx(L**3 / (3 * E * b * t**3 / 12), rel=0.005)
+    assert not back.free[8:13].any()
+    assert back.free[:8].all()
+
+
+def test_mean_deflection_under_even_pressure():
+    """``p L^5 / (20 E I)`` for the area under each wing's line, over the whole length and the foam's ``T / E``."""
+    E, L, t = 5e9, 0.020, 0.001
+    mean = 2 * L**5 / (20 * E * t**3 / 12) / SIZE[0]
+    assert relative_compliance(X, Y, WHOLE, wings(E), 0.015 / 1e5) == pytest.approx(mean / (0.015 / 1e5), rel=0.01)
+    half, quarter = X[10:], Y[2:]
+    whole = relative_compliance(X, Y, WHOLE, PLASTIC, 1e-7)
+    assert relative_compliance(half, quarter, (True, True), PLASTIC, 1e-7) == pytest.approx(whole, rel=1e-9)
+
+
+def test_travelling_takes_no_force_and_bending_does():
+    K = back_stiffness(X, Y, WHOLE, PLASTIC).K
+    approach = np.append(np.tile([0.0, 0.0, 1.0], (len(K) - 1) // 3), 1.0)
+    assert np.abs(K @ approach).max() < 1e-9 * np.abs(K).max()
+    np.testing.assert_array_equal(K, K.T)
+    assert np.linalg.eigvalsh(K[:-1, :-1]).min() > 0
+
+
+def test_a_stiff_sheet_is_rigid():
+    """The difference falls with the sheet's modulus, as one over it."""
+    (rigid,) = Press(pad_of(None), OVAL).ladder([5.0])
+    off = []
+    for modulus in (2e11, 2e12):
+        (state,) = Press(pad_of(Sheet(0.002, modulus, 0.3, (0.02, 0.011))), OVAL).ladder([5.0])
+        off.append(np.abs(state.pressure - rigid.pressure).max() / rigid.pressure.max())
+    assert off[0] < 1e-3
+    assert off[0] / off[1] == pytest.approx(10.0, rel=0.01)
+
+
+def test_a_slightly_soft_sheet_adds_its_own_deflection():
+    """To first order the travel grows by the sheet's mean deflection under the pad's even pressure on a plane."""
+    law, force = material("neo_hookean", 0.04e6, 0.0), 1e-3
+    travel = {}
+    for modulus in (None, 1e11):
+        sheet = wings(modulus) if modulus else None
+        (state,) = Press(pad_of(sheet, WHOLE, (10, 4, 2), law), reference.plane).ladder([force])
+        travel[modulus] = state.travel
+    lines = tuple(np.linspace(-0.025, 0.025, 11)), Y
+    expected = relative_compliance(*lines, WHOLE, wings(1e11), SIZE[2] / law.young_modulus)
+    assert 1e-3 < expected < 1e-2
+    assert travel[1e11] / travel[None] - 1.0 == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
+    full, quarter = pad_of(PLASTIC, WHOLE), pad_of(PLASTIC)
+    where = {tuple(np.round(x * 1e9).astype(int)): i for i, x in enumerate(full.nodes[full.front_nodes])}
+    same = [where[tuple(np.round(x * 1e9).astype(int))] for x in quarter.nodes[quarter.front_nodes]]
+    for one, other in zip(*(Press(pad, gap).ladder([2.0, 8.0]) for pad in (quarter, full)), strict=True):
+        assert one.travel == pytest.approx(other.travel, rel=1e-9)
+        assert np.abs(one.pressure - other.pressure[same]).max() < 1e-9 * other.pressure.max()
+
+
+def test_condensed_pad_on_a_sheet_is_the_full_one():
+    pad = linearised(pad_of(PLASTIC, (False, True)))
+    pairs = zip(
+        linear_press(CondensedPad(pad), BALL).ladder([1.0, 5.0]), Press(pad, BALL).ladder([1.0, 5.0]), strict=True
+    )
+    for one, other in pairs:
+        assert np.abs(one.unknowns - other.unknowns).max() < 1e-9 * np.abs(other.unknowns).max()
+        assert np.abs(one.pressure - other.pressure).max() < 1e-8 * other.pressure.max()
+
+
+@pytest.mark.parametrize("control", [Control(force=3.0), Control(travel=0.002)], ids=["force", "travel"])
+def test_tangent_by_finite_differences(control):
+    pad = pad_of(PLASTIC, (True, False), (4, 2, 2))
+    problem = ContactProblem(pad, BALL)
+    problem.control = control
+    x = SpringBed(pad, BALL).guess(0.003)
+    K = np.zeros((pad.size + 1, pad.size + 1))  # negative indices fall into the last row and column
+    np.add.at(K, (problem.rows, problem.columns), problem.tangent(x))
+    d = np.random.default_rng(1).normal(size=pad.size) * 1e-4
+    h = 1e-3
+    found = (problem.residual(x + h * d) - problem.residual(x - h * d)) / (2 * h)
+    np.testing.assert_allclose(K[:-1, :-1] @ d, found, atol=1e-6 * np.abs(found).max())
+
+
+def test_refuses_sheets_that_nothing_holds():
+    with pytest.raises(ValueError, match="even number of elements"):
+        pad_of(Sheet(0.001, 2e9, 0.3, (0.0, 0.0)), WHOLE, (5, 3, 2))
+    with pytest.raises(ValueError, match="positive thickness"):
+        Sheet(0.0, 2e9, 0.3, (0.01, 0.01))

@@ -1,0 +1,61 @@
+"""How the level of the sheet behind the pads is chosen, and what it changes."""
+
+import numpy as np
+import pytest
+
+from study.quantities import REASONS
+from study.sheet_level import STIFF
+from tests.study.test_pad_level import e_n
+from tests.study.test_pipeline import OVAL, cases, solved
+from tests.study.test_walls import CUP
+from tests.study.test_walls import solved as on_wall
+
+STEEL = ("gripper.sheet_thickness_mm=2",)
+PLASTIC = ("gripper.sheet_thickness_mm=1", "gripper.sheet_modulus_gpa=2")
+RIGID = 'effects.sheet="rigid"'
+
+
+def level(*overrides):
+    """Level, indicator and reason, alike in every case."""
+    (found,) = {result.effects["sheet"] for _, ladder in solved(OVAL, *overrides) for result in ladder}
+    return found[0], found[1], REASONS[found[2]]
+
+
+def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
+    name, compliance, reason = level(*STEEL)
+    assert (name, reason) == ("rigid", "indicator below the target")
+    assert compliance < 0.05 * STIFF
+    name, compliance, reason = level(*PLASTIC)
+    assert (name, reason) == ("elastic plate", "indicator above the target")
+    assert compliance > STIFF
+    assert level(*PLASTIC, RIGID) == ("rigid", compliance, "forced by the scene")
+    assert level(*STEEL, 'effects.sheet="elastic"')[::2] == ("elastic plate", "forced by the scene")
+
+
+def test_what_is_neglected_stays_below_the_target():
+    """The rigid level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not."""
+    np.testing.assert_array_equal(e_n(OVAL, *STEEL), e_n(OVAL, *STEEL, RIGID))
+    off = {name: e_n(OVAL, *own, 'effects.sheet="elastic"') / e_n(OVAL, RIGID) - 1.0
+           for name, own in (("steel", STEEL), ("plastic", PLASTIC))}  # fmt: skip
+    assert np.abs(off["steel"]).max() < 1e-3
+    assert (off["plastic"] < -0.02).all()  # the ends of the pad give way and carry less
+    travel = [values["maps/travel"] for values in cases(OVAL, *PLASTIC)]
+    assert (np.array(travel) > [values["maps/travel"] for values in cases(OVAL, RIGID)]).all()
+
+
+def test_linear_pads_bend_their_sheet_too():
+    pads = (*PLASTIC, 'effects.pad="linear"')
+    np.testing.assert_allclose(e_n(OVAL, *pads, forces="[0.1]"), e_n(OVAL, *PLASTIC, forces="[0.1]"), rtol=2e-3)
+    assert (e_n(OVAL, *pads, forces="[0.1]") < 0.99 * e_n(OVAL, *pads, RIGID, forces="[0.1]")).all()
+
+
+@pytest.mark.long
+def test_sheets_behind_the_pads_on_a_thin_wall():
+    """Steel is as good as rigid, plastic is softer: the same force takes more travel."""
+    travel = {}
+    for name, overrides in (("rigid", (RIGID,)), ("steel", STEEL), ("plastic", PLASTIC)):
+        forced = () if name == "rigid" else ('effects.sheet="elastic"',)
+        (result,) = on_wall(CUP, *overrides, *forced, forces="[1]")
+        travel[name] = result.values["maps/travel"]
+    assert travel["steel"] == pytest.approx(travel["rigid"], rel=1e-3)
+    assert travel["plastic"] > 1.02 * travel["rigid"]
