@@ -96,7 +96,8 @@ def plan(options: Namespace) -> int:
     from study.plan import make_plan, plan_text
 
     if _catalogue(options):
-        raise StudyError(USAGE, f"{options.scene}: is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not")
+        text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
+        raise StudyError(USAGE, f"{options.scene}: {text}")
     scene = _scene(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)

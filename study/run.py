@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from mpi4py import MPI
 
-from study import provenance
-from study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError
-from study.ladder import Climber, settle
-from study.layout import FAILED, MISSING
+from study.exits import CANNOT_WRITE, StudyError
+from study.ladder import settle
+from study.layout import MISSING
 from study.lock import Lock
-from study.plan import Plan, by_cost
-from study.progress import Progress
-from study.schedule import Claims
-from study.stopping import Stopper
-from study.store import ResultWriter, create, open_result, torn_rows, verify
+from study.plan import Plan
+from study.session import Session, print_summary
+from study.store import ResultWriter, create, torn_rows, verify
 
 T = TypeVar("T")
 
@@ -41,12 +37,18 @@ class Work:
         ``finalise(writer)`` runs on rank 0 when no case is missing, to fill derived datasets.
     summary : callable, optional
         ``summary(result)`` gives the text that is printed at the end.
+    time_limit : float
+        Of a single case [s].
+    memory : float, "auto" or "none"
+        As for `study.memory.limited_memory`.
     """
 
     solve_unit: Callable[[Any], Iterable[tuple[int, Any]]]
     image: Callable[[Any, Any, int], Any] | None = None
     finalise: Callable[[ResultWriter], None] | None = None
     summary: Callable[[Any], str] | None = None
+    time_limit: float = math.inf
+    memory: float | str = "none"
 
 
 def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
@@ -83,9 +85,14 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         comm.Barrier()
         on_rank0(comm, lock.confirm)
         created, torn = on_rank0(comm, _prepare, path, plan)
-        code = _solve(plan, work, path, comm, torn, retry_failed, created)
+        writer = ResultWriter(path, plan.layout, comm)
+        codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
+        session = Session(plan, work, writer, comm, codes)
         if comm.rank == 0:
-            _print_summary(path, work)
+            print(_begins(path, codes, len(torn), comm.size, created), flush=True)
+        code = session.solve()
+        if comm.rank == 0:
+            print_summary(work, path)
             lock.remove()
         comm.Barrier()
     finally:
@@ -110,64 +117,7 @@ def _prepare(path: Path, plan: Plan) -> tuple[bool, list[int]]:
     return False, torn_rows(path, plan.layout)
 
 
-def _solve(plan: Plan, work: Work, path: Path, comm: Any, torn: list[int], retry_failed: bool, created: bool) -> int:
-    writer = ResultWriter(path, plan.layout, comm)
-    codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
-    todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
-    todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
-    progress = _begin(plan, writer, path, comm, codes, torn, created)
-    claims = Claims(comm, len(todo))
-    climber = Climber(writer, work.solve_unit, work.image, claims)
-    look = (lambda: progress.due() and progress.update(writer.codes())) if progress else (lambda: None)
-    with Stopper(climber.on_stop) as stopper:
-        for position in claims:
-            climber.climb(todo[position], codes, stopper, look)
-        _wait(comm, look)
-        name = max(comm.allgather(stopper.name))
-    claims.free()
-    codes = writer.codes()
-    missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
-    if progress:
-        progress.clear()
-        if work.finalise is not None and not missing:
-            work.finalise(writer)
-        reason = f"stopped by {name or 'another rank'}" if missing else "complete"
-        library = MPI.Get_library_version()
-        counts = {"done": codes.size - missing - failed, "failed": failed}
-        writer.update_session(
-            stop=provenance.timestamp(), reason=reason, versions=provenance.versions(library), **counts
-        )
-    writer.close()
-    return STOPPED if missing else SOME_FAILED if failed else DONE
-
-
-def _begin(plan: Plan, writer: ResultWriter, path: Path, comm: Any, codes: Any, torn: list[int], created: bool):
-    hosts = len(set(comm.allgather(MPI.Get_processor_name())))
-    if comm.rank:
-        return None
-    writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
-    again = f", {len(torn)} torn results are solved again" if torn else ""
-    left = int(np.sum(codes == MISSING))
-    ranks = f"{comm.size} rank{'s' * (comm.size > 1)}"
-    state = "new file" if created else "resumed"
-    print(f"{path}: {state}, {left} of {codes.size} cases to solve on {ranks}{again}", flush=True)
-    weights = np.ones(codes.size)
-    for unit in plan.units:
-        for rows in unit.rows:
-            weights[list(rows)] = unit.cost / max(len(rows) * len(unit.rows), 1) or 1.0
-    # Under mpirun every rank's output claims to be a terminal, also when it goes to a file.
-    launched = comm.size > 1 or any(name.startswith(("OMPI_", "PMIX_", "PMI_")) for name in os.environ)
-    return Progress(weights, codes, sys.stdout, live=not launched and sys.stdout.isatty())
-
-
-def _wait(comm: Any, look: Callable[[], Any]) -> None:
-    request = comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
-    while not request.Test():
-        look()
-        time.sleep(0.02)
-
-
-def _print_summary(path: Path, work: Work) -> None:
-    if work.summary is not None:
-        with open_result(path) as result:
-            print(work.summary(result), flush=True)
+def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool) -> str:
+    state, left = "new file" if created else "resumed", int(np.sum(codes == MISSING))
+    again = f", {torn} torn results are solved again" if torn else ""
+    return f"{path}: {state}, {left} of {codes.size} cases to solve on {ranks} rank{'s' * (ranks > 1)}{again}"

@@ -7,6 +7,7 @@ import os
 os.environ.update(H5PY_ALWAYS_USE_MPI="1", OMP_NUM_THREADS="1")
 
 import argparse
+import itertools
 import resource
 import signal
 import sys
@@ -65,6 +66,15 @@ def fake_ladder(options):
             deadline = time.monotonic() + (60.0 if row == options.hang else options.delay)
             while time.monotonic() < deadline:
                 time.sleep(0.002)
+            if row == options.stuck:
+                all(itertools.repeat(True))  # never comes back, and hears no signal
+            if row == options.greedy:
+                held = [np.ones(10**7) for _ in range(10**4)]  # 800 GB
+                del held
+            if row == options.unplug:  # what a quota or a lost disk answers from now on
+                resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+            if row == options.remove:
+                options.file.unlink()
             if row == options.kill:
                 os.kill(os.getpid(), signal.SIGKILL)
             if row == options.raises:
@@ -88,7 +98,10 @@ def main():
     parser.add_argument("--delay", type=float, default=0.0)
     parser.add_argument("--file-limit", type=int, default=0)
     parser.add_argument("--retry-failed", action="store_true")
-    for name in ("fail", "raises", "kill", "hang", "bug"):
+    parser.add_argument("--limit", type=float, default=600.0)
+    parser.add_argument("--memory", type=float, default=0.5)
+    parser.add_argument("--stations", type=int, default=6)
+    for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args()
     from mpi4py import MPI
@@ -107,9 +120,11 @@ def main():
         def image(result, unit, c):
             return 1 / (unit.index - options.bug) and result
 
-    work = Work(fake_ladder(options), image, finalise, summary)
+    work = Work(fake_ladder(options), image, finalise, summary, options.limit, options.memory)
     try:
-        return run_study(fake_plan(options.digest), work, options.file, comm, retry_failed=options.retry_failed)
+        return run_study(
+            fake_plan(options.digest, options.stations), work, options.file, comm, retry_failed=options.retry_failed
+        )
     except StudyError as error:
         return complain(error)
     except BaseException:
