@@ -18,8 +18,14 @@ MODEL_STYLE = {
     "flat": {"color": "#c05a00", "linestyle": "--", "marker": "s"},
     "projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
 }
-COLOURS = {"quality": "viridis", "e_n": "cividis", "pressure": "magma_r", "dent": "YlGnBu", "wall_stress": "YlOrRd"}
-RASTER = 600  # polygons above which a map is stored as pixels: a page must stay small
+COLOURS = {
+    "quality": "viridis",
+    "e_n": "cividis",
+    "pressure": "magma_r",
+    "dent": "plasma_r",
+    "wall_stress": "inferno_r",
+}
+RASTER = 150  # polygons above which a map is stored as pixels: a page must stay small
 _STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
@@ -80,7 +86,7 @@ def as_png(drawn: Any) -> bytes:
 
 
 def as_webp(drawn: Any) -> bytes:
-    """The figure as WebP, for what is shaded: a tenth of the size of PNG."""
+    """The figure as WebP, for what is shaded or has very many parts: a tenth of the size of SVG or PNG."""
     return _saved(drawn, "webp", dpi=190, facecolor="white", pil_kwargs={"quality": 82, "method": 6})
 
 

@@ -101,8 +101,13 @@ def _side(data: Data, scene: Any, best: tuple[int, ...]) -> str:
 def maps_section(data: Data, best: tuple[int, ...], maps: Picture) -> str:
     """Maps over force and angle, why cases failed, and every case."""
     shown = [maps if data.status.size > 1 else None, report_maps.angle_maps(data, best)]
-    how = paragraph(report_maps.POINT, "note") if any(p and p.spots for p in shown) and cases.listed(data) else ""
-    html = how + _pictures(shown) + cases.failures(data) + cases.every_case(data)
+    pointed = cases.listed(data) and any(p and p.spots for p in shown)
+    html = (
+        paragraph(report_maps.POINT, "note screen") * pointed
+        + _pictures(shown)
+        + cases.failures(data)
+        + cases.every_case(data)
+    )
     return html + paragraph(words.CAVEAT, "note")
 
 

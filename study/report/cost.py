@@ -38,8 +38,9 @@ def cost_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
         if texts:
             panel.set_xticks(places, texts, rotation=90 if max(map(len, texts)) > 6 else 0)
     worst = int(np.nanargmax(np.nan_to_num(iterations)))
+    totals = [number(np.nansum(found), 6) for found in (iterations, cuts)]
     said = (
-        f"{number(np.nansum(iterations), 6)} Newton iterations and {number(np.nansum(cuts), 6)} cuts, most iterations "
+        f"{totals[0]} Newton iterations and {totals[1]} repeated steps (cuts), most iterations "
         f"({number(iterations[worst])}) at {_named(data, x, worst)}"
     )
     where = elsewhere(data, index, x, len(data.shape) - 2, len(data.shape) - 1)
@@ -86,6 +87,7 @@ def _bars(panel: Any, borders: np.ndarray, parts: dict[str, np.ndarray], label: 
         panel.bar(middle, height, width, bottom, color=colour, hatch=hatch, edgecolor="white", lw=0.2, label=name)
         bottom = bottom + height
     panel.set_ylabel(label)
+    panel.locator_params(axis="y", nbins=5, integer=label != "seconds")
     panel.set_ylim(0, 1.08 * max(float(bottom.max()), 1e-3 if label == "seconds" else 1.0))
 
 

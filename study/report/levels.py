@@ -13,6 +13,7 @@ from study.report.maps import elsewhere, main_axis, plane, ticks
 from study.report.page import Picture, paragraph
 
 GREYS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
+MOST = 16  # cells in a row that have room for a number
 FORCED = REASONS.index("forced by the scene")
 
 
@@ -45,7 +46,7 @@ def level_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
 
     look = {"cmap": ListedColormap(GREYS), "vmin": -0.5, "vmax": 2.5}
     mapped = pictures.heat(panel, xe, ye, top, failed, **look)
-    if top.shape[1] <= 16:
+    if top.shape[1] <= MOST:
         for i, j in np.argwhere(np.isfinite(top)):
             colour = "white" if top[i, j] == 2 else pictures.INK
             where = 0.5 * (xe[j] + xe[j + 1]), 0.5 * (ye[i] + ye[i + 1])
@@ -58,9 +59,12 @@ def level_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
     bar.outline.set_visible(False)
     counts = [f"{name}: {int(np.sum(top == k))}" for k, name in enumerate(EFFECTS["object"]) if np.any(top == k)]
     where = elsewhere(data, index, x, y, len(data.shape) - 1)
+    numbers = " Numbers: dent of a linear wall at the largest force, over the wall's thickness." * (
+        top.shape[1] <= MOST
+    )
     caption = (
-        f"{f'At {where}. ' if where else ''}Level of the object by candidate ({', '.join(counts)}). Numbers: dent of a"
-        " linear wall at the largest force, over the wall's thickness. Crossed out: failed."
+        f"{f'At {where}. ' if where else ''}Level of the object by candidate ({', '.join(counts)}).{numbers} Crossed "
+        "out: failed."
     )
     return Picture(pictures.as_svg(drawn), f"Level of the object by candidate: {', '.join(counts)}.", caption)
 

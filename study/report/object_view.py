@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from study import pictures
-from study.layout import FAILED
+from study.layout import FAILED, MISSING
 from study.report.data import Data, number
 from study.report.maps import MAPS, SHORT, extremes, scaled
 from study.report.page import Picture, paragraph, picture
@@ -85,7 +85,8 @@ def _composed(data: Data, index: tuple[int, ...], limits: Limits, sides: np.ndar
         bar = ScalarMappable(Normalize(*ends), pictures.COLOURS[name])
         pictures.colour_bar(drawn, bar, axes[0, 2 * k + 1], SHORT[name], beside=True)
     force, state = number(data.forces[index[-1]]), data.status[(*index[:-3], ..., index[-1])]
-    failed = " Crossed out: failed." if (state == FAILED).any() else ""
+    failed = " Dark grey with crosses: failed." if (state == FAILED).any() else ""
+    failed += " Grey: not solved yet." if (state == MISSING).any() else ""
     marks = "balls: where the fingers first touch" if data.by_poses else "light grey: no candidate there"
     pads = f" With the pads of {data.place(index)} and their pressure (dark: high)." if data.best is not None else ""
     caption = f"At {force} N per finger, from the side of finger 1 and from the other side.{pads} {marks.capitalize()}."

@@ -84,7 +84,7 @@ def patch_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
         "front across the pad, the object above."
     )
     alt = f"Contact pressure{' and directions of friction' * directed} on the pad, {said}"
-    return Picture(pictures.as_svg(drawn), alt, caption)
+    return Picture(pictures.as_webp(drawn), alt, caption, kind="webp")
 
 
 def _alike(pressure: np.ndarray) -> bool:

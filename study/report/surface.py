@@ -111,7 +111,7 @@ def _space(data: Data, index: tuple[int, ...], known: dict[str, StoredSurface]) 
     )
     models = " and the ".join(known)
     alt = f"Wrenches in the space of f_x, f_y and tau_z with the fitted surface, for the {models} model."
-    return Picture(pictures.as_svg(drawn), alt, caption)
+    return Picture(pictures.as_webp(drawn), alt, caption, kind="webp")
 
 
 def _wires(shape: Any, count: int = 12) -> list[np.ndarray]:

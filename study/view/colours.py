@@ -15,10 +15,10 @@ STOPS = {  # of matplotlib's maps of these names, evenly spaced
         dec958 f0d846 fee838""",
     "magma_r": """fcfdbf fde0a1 fec287 fea571 fb8761 f4695c e55064 cf4070 b5367a 9b2e7f 812581 681c81 4f127b 341069
         1c1044 090720 000004""",
-    "YlGnBu": """ffffd9 f6fbc5 edf8b1 daf0b3 c6e9b4 a2dbb8 7ecdbb 5fc1c0 40b5c4 2ea3c2 1d90c0 2076b3 225da8 24489d
-        243392 162874 081d58""",
-    "YlOrRd": """ffffcc fff6b6 ffeda0 fee38b fed976 fec561 feb24c fd9f44 fd8c3c fc6c33 fc4d2a ef3323 e2191c cf0c21
-        bb0026 9d0026 800026""",
+    "plasma_r": """f0f921 f9dd25 fdc328 fdab33 f89441 f07f4f e56b5d d9586a cb4679 bb3488 a82296 9410a2 7d03a8 6400a7
+        4b03a1 2f0596 0d0887""",
+    "inferno_r": """fcffa4 f2e865 f9c932 fcaa0f f98c0a f1711f e35933 d04545 ba3655 a22b62 88226a 6f196e 550f6d 3b0964
+        1f0c48 0a0722 000004""",
 }
 
 

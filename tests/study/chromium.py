@@ -90,6 +90,7 @@ class Browser:
         """Load a page into a window of this size."""
         self.do("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         self.do("Emulation.setTouchEmulationEnabled", enabled=phone)
+        self.do("Emulation.setFocusEmulationEnabled", enabled=True)
         self.told.clear()
         self.do("Page.navigate", url=path.as_uri())
         while ("loaded", "") not in self.told:
