@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def figure(options: Namespace) -> int:
     """Solve what is missing, then draw; on every rank the same exit code."""
+    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported, as a run wants it
     wanted = chosen(options.names)
     paths = targets(wanted, options.output)
     results, codes = {}, {DONE}
@@ -87,8 +89,6 @@ def _solved(scene: str, path: Path) -> int:
 
 def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
     """Write a figure as PNG; the sentence of what was measured."""
-    from contextlib import ExitStack
-
     from study import pictures
     from study.report.data import Data
     from study.store import open_result
@@ -115,6 +115,7 @@ def write(path: Path, content: bytes) -> None:
         part.write_bytes(content)
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()
         text = f"{path}: cannot be written: {error.strerror}; choose another place with -o"
         raise StudyError(CANNOT_WRITE, text) from error
