@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from study.build import axis_span, warnings
-
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
+    from study.build import warnings  # here and below: who only reads results must not load all that checks scenes
+
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
     where = (
@@ -101,6 +101,8 @@ def compliance_text(scene: Any) -> str:
 
 def _extent(shape: Any) -> str:
     """Where the object begins and ends along its axis, and for a mesh what that is counted from."""
+    from study.build import axis_span
+
     span = axis_span(shape)
     if span is None:
         return ", without end along its axis"

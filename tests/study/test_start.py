@@ -18,11 +18,11 @@ from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
 SMALL = {  # what makes a run of a second or two of each kind
-    "bottle": ["candidates.stations=1", "candidates.station_range_mm=[60,60]", "load.normal_force_n=[2]"],
-    "cup": ["candidates.stations=1", "candidates.station_range_mm=[56,56]", "load.normal_force_n=[0.5]",
+    "bottle": ["candidates.stations=2", "load.normal_force_n=[2]"],
+    "cup": ["candidates.stations=2", "load.normal_force_n=[0.5]",
             "effects.object='rigid'"],
     "cylinder": ["load.normal_force_n=[3]", "accuracy.meshes=1"],
-    "mesh": ["candidates.stations=1", "candidates.station_range_mm=[60,60]", "candidates.angles_deg=[0]",
+    "mesh": ["candidates.stations=2", "candidates.angles_deg=[0]",
              "load.normal_force_n=[2]"],
 }  # fmt: skip
 
