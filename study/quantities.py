@@ -151,7 +151,7 @@ MAPS = (
         " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
         " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
         " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"
-        " the travel, fewer than six elements carry load or fewer than three along its length or its width, or"
+        " the travel, fewer than six elements carry load or only one along its length or its width, or"
         " trilinear elements are too stiff for foam with a Poisson's ratio above 0.45; 8192 the wall has snapped in:"
         " on the way to this case the force fell while the fingers closed, or grew less than half as fast as before"
         " on average; 16384 the pads push the object along its axis with more than friction can hold: it slides"
