@@ -1,0 +1,170 @@
+"""A result file opens as plots in the tools people have: silx, nexusformat, xarray, h5ls, h5web in a browser, ParaView.
+
+They live in an environment of their own (``tests/browse``), made once in the user's cache and used again: minutes the
+first time. Where it cannot be had the tests that need it are skipped and say what was missing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from study.store import open_result
+from tests.study.launching import ROOT, launch
+from tests.study.test_vtkhdf import steps_of
+
+pytestmark = [pytest.mark.long, pytest.mark.launches]
+
+BROWSE = ROOT / "tests" / "browse"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+STATIONS = ("--set", "candidates.stations_mm=[-12, 0, 12]")
+
+
+def cached(name, sources, make):
+    """A folder in the user's cache that ``make(folder)`` filled from these sources; skips where that fails."""
+    key = hashlib.sha256(b"".join((BROWSE / source).read_bytes() for source in sources)).hexdigest()[:12]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softjaw"
+    folder = cache / f"{name}-{key}"
+    if not (folder / "complete").exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        make(folder)
+        (folder / "complete").touch()
+    return folder
+
+
+def or_skip(words, **options):
+    """Run a step of an installation; skip the test with its last line where it fails."""
+    try:
+        done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=900, **options)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        pytest.skip(f"cannot be installed here: {error}")
+    if done.returncode:
+        last = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()[-1]
+        pytest.skip(f"cannot be installed here: {' '.join(str(w) for w in words[:4])}: {last}")
+
+
+def answer(words, **options):
+    """What a tool prints; it has to succeed."""
+    done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=180, **options)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def python():
+    """Python of the environment with silx, nexusformat and xarray."""
+
+    def make(folder):
+        or_skip([sys.executable, "-m", "venv", folder / "venv"])
+        or_skip([folder / "venv/bin/pip", "install", "-q", "-r", BROWSE / "requirements.txt"])
+
+    return cached("viewers", ["requirements.txt"], make) / "venv/bin/python"
+
+
+@pytest.fixture(scope="module")
+def web():
+    """Folder with h5web, built as the one page ``dist/index.html``."""
+    sources = ["package.json", "vite.config.js", "index.html", "src/main.jsx", "open.mjs"]
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("no npm on this machine")
+
+    def make(folder):
+        shutil.copytree(BROWSE, folder, dirs_exist_ok=True)
+        or_skip([npm, "install", "--no-audit", "--no-fund"], cwd=folder)
+        or_skip([npm, "run", "build"], cwd=folder)
+
+    return cached("h5web", sources, make)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """A study of 3 stations x 2 angles x 2 forces, solved by the program."""
+    path = tmp_path_factory.mktemp("browsing") / "cylinder.hdf"
+    code, output, errors = launch(0, "-m", "study", "run", ROOT / "jobs/smoke.toml", "-o", path, *STATIONS)
+    assert code == 0, output + errors
+    return path
+
+
+def colours(picture):
+    """How many colours that are no shade of grey are in a picture."""
+    from matplotlib.image import imread
+
+    rgb = (imread(picture)[..., :3] * 15).round().astype(int).reshape(-1, 3)
+    return len(np.unique(rgb[np.ptp(rgb, axis=1) > 2], axis=0))
+
+
+def test_nexus_checks_find_no_error(result, python):
+    told = re.sub(r"\x1b\[[0-9;]*m", "", answer([python.with_name("nxcheck"), result]))
+    assert "Total number of errors: 0" in told
+    assert "NXentry: /study" in told
+
+
+def test_silx_opens_at_a_drawn_map_and_takes_every_group_for_a_plot(result, python, tmp_path):
+    told = json.loads(answer([python, BROWSE / "silx_picture.py", result, tmp_path / "silx.png"]).splitlines()[-1])
+    assert told["issues"] == {}
+    assert told["plots"] > 20
+    assert (told["default"], told["view"]) == ("/study/map", "Image")
+    assert colours(tmp_path / "silx.png") > 20
+
+
+def test_xarray_has_coordinates_with_units(result, python):
+    code = (
+        "import sys, xarray; d = xarray.open_dataset(sys.argv[1], engine='h5netcdf', group='/study/e_n');"
+        "print(float(d.curved.sel(station=0.01, normal_force=1.9, angle=0, method='nearest')), d.curved.units)"
+    )
+    value, units = answer([python, "-c", code, result]).split()
+    with open_result(result) as read:
+        assert float(value) == read.map("e_n", "curved")[2, 0, 1]
+    assert units == "m"
+
+
+@pytest.mark.skipif(shutil.which("h5ls") is None, reason="no h5ls on this machine; apt: hdf5-tools")
+def test_h5ls_shows_units_and_the_report(result):
+    told = answer(["h5ls", "-vd", f"{result}/study/tau_z_max/curved"])
+    assert re.search(r'Attribute: units.*\n.*\n +Data:\n +"N m"', told)
+    assert '"station", "angle", "normal_force"' in told
+    told = answer(["h5dump", "-d", "/study/report", result])
+    assert "Best grasp at 2 N per finger" in told
+    assert "How to read the file" in told
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_h5web_opens_at_the_map_with_its_axes(result, web, tmp_path):
+    words = ["NX Heatmap", "grasp quality, curved", "station along the object's axis [m]", "cylinder.hdf"]
+    command = ["node", web / "open.mjs", web / "dist/index.html", result, tmp_path / "h5web.png", *words]
+    told = json.loads(answer(command, env={**os.environ, "CHROMIUM": CHROMIUM}).splitlines()[-1])
+    assert all(word in told["seen"] for word in words), told["seen"]
+    assert "n 2 2 3" in told["seen"]  # forces, angles, stations
+    assert told["canvases"] == 1
+    assert colours(tmp_path / "h5web.png") > 6
+
+
+def test_pyvista_opens_the_result_file_itself(result):
+    """At every force the pads' pressures add up to S of both fingers, and the maps stand on the object."""
+    grid = pv.read(result)
+    assert isinstance(grid, pv.UnstructuredGrid)
+    with open_result(result) as read:
+        S, quality = read.fingers("S"), read.map("quality", "curved")
+    for k, (force, grid) in enumerate(steps_of(result)):
+        assert force == k + 1
+        load = grid["pressure"] * grid.compute_cell_sizes()["Area"]
+        for candidate in range(6):
+            here = np.divmod(candidate, 2)
+            for finger in (0, 1):
+                own = (grid["candidate"] == candidate) & (grid["part"] == 1 + finger)
+                assert load[own].sum() == pytest.approx(S[(*here, k, finger)], rel=0.1)  # corners are rebuilt
+            shown = grid["quality"][(grid["candidate"] == candidate) & (grid["part"] == 0)]
+            assert len(shown) > 0
+            assert shown == pytest.approx(np.full(len(shown), quality[(*here, k)]), rel=1e-6)
