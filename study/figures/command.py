@@ -88,13 +88,26 @@ def _solved(scene: str, path: Path) -> int:
 
 
 def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
-    """Write a figure as PNG; the sentence of what was measured."""
+    """Write a figure as PNG; the sentence of what was measured.
+
+    Raises
+    ------
+    StudyError
+        If cases failed that the figure cannot do without, or the file cannot be written.
+    """
+    import numpy as np
+
     from study import pictures
+    from study.layout import DONE as SOLVED
     from study.report.data import Data
     from study.store import open_result
 
     with ExitStack() as stack, pictures.style():
         opened = [stack.enter_context(open_result(results[scene])) for scene in one.scenes]
+        for result in opened:
+            if (failed := int(np.sum(result.status != SOLVED))) and not one.gaps:
+                text = f"figure {one.name} is not drawn: {failed} cases of {result.path} failed"
+                raise StudyError(SOME_FAILED, f"{text}; 'softjaw status {result.path}' says why")
         drawn, said = one.draw(*(Data(result) for result in opened))
         write(path, as_png(drawn))
     return said

@@ -91,7 +91,7 @@ def misfit_along(data: Data) -> tuple[Any, str]:
 
 def _compared(data: Data, k: int) -> str:
     ellipsoid, quartic = (data.map(name) for name in FITS)
-    better = np.nanmean(quartic < ellipsoid)
+    better = np.mean((quartic < ellipsoid)[np.isfinite(quartic)])
     one, two = (100 * np.nanmean(m[..., k]) for m in (ellipsoid, quartic))
     return (
         f"at {number(data.forces[k])} N on average {number(one, 2)} % for the ellipsoid, {number(two, 2)} % for the "

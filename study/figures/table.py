@@ -14,12 +14,13 @@ class Figure:
     """One figure: its number with its letters, the scenes it is drawn from, and what draws it.
 
     ``draw`` takes a `study.report.data.Data` of each scene's result and gives the drawing, and a sentence of what was
-    measured.
+    measured. ``gaps`` says whether it can be drawn where cases have failed.
     """
 
     name: str
     scenes: tuple[str, ...]
     draw: Callable[..., tuple[Any, str]]
+    gaps: bool = False
 
     @property
     def file(self) -> str:
@@ -33,9 +34,9 @@ FIGURES = (
     Figure("5a", ("fig5-candidate",), fig5.candidates),
     Figure("5b", ("fig5-candidate", "fig4-curvature"), fig5.wrench_spaces),
     Figure("6ab", ("fig5-candidate",), fig6.fitted_surfaces),
-    Figure("6c", ("bottle",), fig6.misfit_along),
+    Figure("6c", ("bottle",), fig6.misfit_along, gaps=True),
     Figure("7", ("fig7-force-study",), fig7.force_study),
-    Figure("8", ("bottle", "cup"), fig8.maps),
+    Figure("8", ("bottle", "cup"), fig8.maps, gaps=True),
 )
 EVERY = "all"
 

@@ -83,6 +83,15 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     assert (tmp_path / "7.png").read_bytes().startswith(PNG)
 
 
+def test_failed_cases_are_told_of_where_a_figure_needs_them(tmp_path):
+    path = force_file(tmp_path / "force.hdf")
+    lost = make(tmp_path / "lost.hdf", axes=grid_axes([0.0], [0.0], [1.0, 2.0]), status__code=[[[1, 2]]])
+    figure = Figure("7", ("x", "y"), fig7.force_study)
+    with pytest.raises(StudyError, match=r"figure 7 is not drawn: 1 cases of \S+lost.hdf failed; 'softjaw status"):
+        draw(figure, {"x": path, "y": lost}, tmp_path / "7.png")
+    assert not (tmp_path / "7.png").exists()
+
+
 def test_a_picture_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(StudyError, match=r"cannot be written.*choose another place with -o"):
@@ -168,6 +177,19 @@ def test_every_figure_is_drawn_from_coarse_results(coarse, tmp_path, figure):
     assert said
     assert "nan" not in said
     assert (tmp_path / figure.file).read_bytes().startswith(PNG)
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_the_command_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_path):
+    words = ("-m", "study", "figure", "5a", "--results", tmp_path, "-o", tmp_path / "a.png")
+    for ranks, told in ((2, "new file, 1 of 1 cases"), (0, "0 of 1 cases to solve")):
+        code, output, errors = launch(ranks, *words)
+        assert (code, errors) == (0, ""), output
+        assert told in output
+        assert output.count("written: ") == 1
+        assert "20.2 mm from the middle of the pad" in output
+    assert (tmp_path / "a.png").read_bytes().startswith(PNG)
 
 
 @pytest.mark.long
