@@ -23,8 +23,8 @@ OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those tha
 SHOWN = ("quality", "e_n", "tau_z_max", "dent")  # maps; each costs 4 bytes for every face and force
 ABOUT = (
     "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
-    " as time. Choose pads by thresholds on part and candidate. Curved contact model, SI units; NaN where there is no"
-    " value; filled when no case is missing any more."
+    " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that dent its wall"
+    " stand in it. Curved contact model, SI units; NaN: no value. Filled when no case is missing any more."
 )
 
 

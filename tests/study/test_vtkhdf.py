@@ -10,8 +10,13 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from study.cli import main
 from study.exits import CANNOT_WRITE, StudyError
+from study.grid_values import fill_grid
+from study.plan import make_plan
+from study.record import record
+from study.scene import parse_scene
+from study.store import ResultWriter, create
 from study.vtkhdf import write_grid
-from tests.study.view_files import GRID, PRESSURE, SIZE, make, quality
+from tests.study.view_files import GRID, PRESSURE, SCENE, SIZE, make, quality, solved
 
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]
 
@@ -107,3 +112,85 @@ def test_object_and_pads_of_a_result_file(tmp_path, capsys):
     forces, grids = zip(*steps_of(written[2]), strict=True)
     assert forces == (1.0, 5.0)
     assert [grid["pressure"].max() for grid in grids] == pytest.approx([PRESSURE, 5 * PRESSURE])
+
+
+class SerialWriter(ResultWriter):
+    """Writes without MPI."""
+
+    def __init__(self, path, layout):
+        self.path, self.layout, self._file = path, layout, h5py.File(path, "r+")
+
+
+def study(path, scene=SCENE, lost=(), fill=True):
+    """A result file of which all cases but the ``lost`` ones, which failed, are solved."""
+    plan = make_plan(parse_scene(scene))
+    layout = plan.layout
+    create(path, layout, plan.header)
+    assert path.stat().st_size <= layout.nbytes
+    with h5py.File(path, "r+") as file:
+        for row, index in enumerate(np.ndindex(layout.shape)):
+            file["study/status/code"][index] = 2 if index in lost else 1
+            if index in lost:
+                continue
+            places = layout.places(row)
+            for column, value, place in zip(
+                layout.columns, record(layout, solved(layout, index[-3:])), places, strict=True
+            ):
+                file[column.path][place] = value.astype(file[column.path].dtype)
+    if fill:
+        writer = SerialWriter(path, layout)
+        fill_grid(writer)
+        writer.close()
+    return layout
+
+
+def test_the_result_file_itself_is_a_grid_over_the_forces(tmp_path):
+    """Maps on the object, pads where the poses put them; a failed case is empty and its pads have no area."""
+    path, lost = tmp_path / "thing.hdf", (2, 1, 1)
+    study(path, lost=[lost])
+    first = pv.read(path)
+    assert isinstance(first, pv.UnstructuredGrid)
+    assert set(first.cell_data) == {"part", "candidate", "status", "quality", "e_n", "tau_z_max", "pressure"}
+    for k, (force, grid) in enumerate(steps_of(path)):
+        assert force == (1.0, 5.0)[k]
+        part, cell, area = grid["part"], grid["candidate"], grid.compute_cell_sizes()["Area"]
+        assert area[(part == 0) & (cell >= 0)].sum() == pytest.approx(0.06 * RING, rel=1e-3)
+        assert np.isnan(grid["pressure"][part == 0]).all()
+        assert (grid["status"][cell < 0] == -1).all()
+        assert np.isnan(grid["quality"][cell < 0]).all()
+        for candidate, place in enumerate(np.ndindex(3, 2)):
+            index, own = (*place, k), cell == candidate
+            pads = own & (part > 0)
+            assert (grid["status"][own] == (2 if index == lost else 1)).all()
+            if index == lost:
+                assert np.isnan(grid["quality"][own]).all()
+                assert np.isnan(grid["pressure"][pads]).all()
+                assert area[pads].max() == 0
+                continue
+            assert grid["quality"][own] == pytest.approx(np.full(own.sum(), quality(index)), rel=1e-6)
+            assert grid["pressure"][pads].max() == pytest.approx(PRESSURE * force)
+            assert area[pads].sum() == pytest.approx(2 * SIZE[0] * SIZE[1], rel=1e-5)
+            middle = grid.extract_cells(np.flatnonzero(own & (part == 1))).points.mean(axis=0)
+            reach = (0.025, 0.02)[place[1]] * np.array([1 - place[1], place[1], 0])
+            assert middle == pytest.approx(reach + np.array([0, 0, (-0.02, 0, 0.02)[place[0]]]), abs=1e-7)
+
+
+def test_before_the_end_the_grid_shows_the_object_and_nothing_else(tmp_path):
+    study(tmp_path / "thing.hdf", fill=False)
+    for _, grid in steps_of(tmp_path / "thing.hdf"):
+        area = grid.compute_cell_sizes()["Area"]
+        assert area[grid["part"] > 0].max() == 0
+        assert area[grid["part"] == 0].sum() == pytest.approx(0.1 * RING, rel=1e-3)
+        assert all(np.isnan(grid[name]).all() for name in ("quality", "e_n", "pressure"))
+        assert np.abs(grid.bounds) == pytest.approx([0.025] * 2 + [0.02] * 2 + [0.05] * 2)
+
+
+def test_pads_can_be_left_out_and_a_sweep_shows_its_first_point(tmp_path):
+    scene = SCENE + '[output]\npatches = "none"\n[sweep]\n"object.length_mm" = [100, 200]\n'
+    layout = study(tmp_path / "thing.hdf", scene)
+    assert layout.shape == (2, 3, 2, 2)
+    grid = pv.read(tmp_path / "thing.hdf")
+    assert not grid["part"].any()
+    assert "pressure" not in grid.cell_data
+    assert grid.bounds[4:] == pytest.approx((-0.05, 0.05))
+    assert np.nanmax(grid["quality"]) == quality((1, 0, 0))
