@@ -48,17 +48,21 @@ class ContactPoints:
         Signed distance to the object [m]; the solve makes its weighted mean at a node non-negative, not every value.
     load : (faces, points) array
         Contact pressure times reference area [N].
+    friction : (faces, points, 3) array, optional
+        Tangential force on the pad [N]; None without friction.
     """
 
     position: FloatArray
     normal: FloatArray
     gap: FloatArray
     load: FloatArray
+    friction: FloatArray | None = None
 
     @property
     def force(self) -> FloatArray:
         """Contact force of the meshed part on the object ``(3,)`` [N]."""
-        return -np.einsum("fq,fqi->i", self.load, self.normal)
+        normal = np.einsum("fq,fqi->i", self.load, self.normal)
+        return -normal if self.friction is None else -normal - self.friction.sum(axis=(0, 1))
 
 
 class ContactProblem:
@@ -128,9 +132,10 @@ class ContactProblem:
         gap, normal, hessian = self.gap(points.reshape(-1, 3))
         shape = points.shape[:2]
         self._points, self._normal, self._gap = points, normal.reshape(*shape, 3), gap.reshape(shape)
+        self._hessian = hessian.reshape(*shape, 3, 3)
         kernel.contact(
             pad.face_N, pad.face_area, self.kappa * x[self._pressures][self._face_pressures], self._gap,
-            self._normal, hessian.reshape(*shape, 3, 3), self._weighted, self._force,
+            self._normal, self._hessian, self._weighted, self._force,
             *((self._K_uu, self._K_ul) if tangent else self._none),
         )  # fmt: skip
         return np.bincount(self._face_pressures.ravel(), self._weighted.ravel(), len(self.area))
@@ -192,6 +197,9 @@ class ContactProblem:
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of travel and the squeezing of every element within reason."""
         return self.foam.shorten(x, step, self.travel_step)
+
+    def accept(self, x: FloatArray) -> None:
+        """Told every state that the next one starts from; without friction the way to a state does not matter."""
 
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""

@@ -101,6 +101,10 @@ class Press:
     settings : Settings
     solver_of : callable
         Problem and options to its solver.
+    problem_of : callable
+        Pad and gap to the problem.
+    way : callable
+        From one force [N] (0: no contact yet) to the next: the forces to go through, the last of them the next.
     """
 
     pad: Pad
@@ -109,6 +113,8 @@ class Press:
     fallback: Pad | None = None
     settings: Settings = field(default_factory=Settings)
     solver_of: Callable[[ContactProblem, dict[str, Any]], Any] = NonlinearSolver
+    problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
+    way: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
 
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
@@ -116,7 +122,7 @@ class Press:
 
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
-        self.problem = ContactProblem(self.pad, self.gap)
+        self.problem = self.problem_of(self.pad, self.gap)
         self.solver = self.solver_of(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
@@ -126,6 +132,7 @@ class Press:
     def _remember(self, x: FloatArray, force: float) -> None:
         """Keep the last state in equilibrium, which tells why there is none beyond."""
         self._last = x, force
+        self.problem.accept(x)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on the whole pad [N].
@@ -172,11 +179,14 @@ class Press:
 
     def _climb(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
+        way = self.way(reached, force)
         if x is None:
-            x, reached = self._stepping.first(self._bed.travel(force), force, work)
+            x, reached = self._stepping.first(self._bed.travel(way[0]), way[0], work)
         self._remember(x, reached)
         try:
-            return self._stepping.climb(x, reached, force, work, walk=self.fallback is None)
+            for goal in (f for f in way if f > reached or f == force):
+                x, reached = self._stepping.climb(x, reached, goal, work, walk=self.fallback is None), goal
+            return x
         except ConvergenceError as error:
             raise self._explained(error) from error
 
