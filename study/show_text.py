@@ -24,7 +24,7 @@ LEAST = ("misfit", "f_x_max_error", "f_y_max_error", "tau_z_max_error", "quality
          "f_y_max", "f_x_max", "wall_stress", "tau_z_max", "quality_error", "safety_factor", "dent")  # fmt: skip
 ERROR, ERROR_MEANS = "+-", "error of the column before it, from the coarser of two meshes"
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
-FLAGS_WIDTH = 18
+FLAGS_WIDTH, LABEL_WIDTH = 18, 28
 
 
 def as_text(table: Table, width: int = PAPER) -> str:
@@ -78,14 +78,23 @@ def _lines(table: Table) -> tuple[list[list[str]], int]:
         cells = [_cells(row, table.columns) for row in group]
         for name in {"rank", "angle"} & set(names):
             cells[0][names.index(name)] = _several([row[names.index(name)] for row in cells])
-        # flags go on in lines of their own
-        words = textwrap.wrap(cells[0][-1], FLAGS_WIDTH, break_long_words=False) or [""]
+        words = _stacked(cells[0][-1])  # flags go on in lines of their own
         body.append([*cells[0][:-1], words[0]])
         body += [[""] * (len(names) - 1) + [more] for more in words[1:]]
     flags = 0
     for row in table.rows:
         flags |= row[names.index("flags")]
     return body, flags
+
+
+def _stacked(flags: str) -> list[str]:
+    """Flags in as many narrow lines as they take, each flag in one piece.
+
+    >>> _stacked("hole, askew, too weak")
+    ['hole, askew,', 'too weak']
+    """
+    whole = textwrap.wrap(flags.replace(" ", "\xa0").replace(",\xa0", ", "), FLAGS_WIDTH, break_long_words=False)
+    return [line.replace("\xa0", " ") for line in whole] or [""]
 
 
 def _several(texts: list[str]) -> str:
@@ -98,7 +107,13 @@ def _several(texts: list[str]) -> str:
 
 
 def _for_people(table: Table) -> Table:
-    """Both bounds of the window of forces in one column of text."""
+    """Both bounds of the window of forces in one column of text; explicit poses by number and label alone."""
+    if ("label", "") in table.columns:
+        kept = [i for i, (name, _) in enumerate(table.columns) if name != "angle"]
+        columns = tuple(
+            ("pose" if table.columns[i][0] == "station" else table.columns[i][0], table.columns[i][1]) for i in kept
+        )
+        table = replace(table, columns=columns, rows=tuple(tuple(row[i] for i in kept) for row in table.rows))
     at = [i for i, (name, _) in enumerate(table.columns) if name in WINDOW]
     if not at:
         return table
@@ -138,7 +153,8 @@ def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
     if name == "flags":
         return ", ".join(word for mask, word, _ in FLAGS if value & mask)
     if not isinstance(value, float):
-        return str(value)
+        text = str(value)
+        return text if len(text) <= LABEL_WIDTH else f"{text[: LABEL_WIDTH - 3]}..."
     if np.isnan(value):
         return "-"
     if name.endswith("_error"):

@@ -142,6 +142,13 @@ def test_errors_stand_behind_what_they_belong_to_and_are_percent():
     assert "not known" not in text
 
 
+def test_a_pose_is_shown_by_number_and_label_alone():
+    lines = as_text(best(study([[2.0], [1.0]], labels=["near", "far from the rim of the box, lying"]))).splitlines()
+    assert lines[2].split()[:4] == ["rank", "pose", "label", "quality"]
+    assert lines[3].split()[:4] == ["1", "0", "near", "2.000"]
+    assert "far from the rim of the b..." in lines[4]
+
+
 def test_many_flags_go_on_below_and_many_images_are_a_range():
     text = as_text(best(study([[4, 4, 4]], flags=[float(contact.SLIPS + contact.COARSE + 256)])), 200)
     lines = text.splitlines()
