@@ -32,6 +32,7 @@ from study.report import maps as report_maps
 from study.report import patch as report_patch
 from study.report import side as report_side
 from study.report import surface as report_surface
+from study.report.angle_maps import angle_maps
 from study.report.data import Data
 from study.report.outline import read_scene
 from study.report.page import Picture, heading, page, paragraph, picture
@@ -91,7 +92,7 @@ def build(result: Any, candidate: int | None = None, place: Place = (None, None)
         ("scene", "Scene in effect", background.scene_text(data)),
     ]
     title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
-    return page(title, words.subtitle(data), sections), png
+    return page(title, words.subtitle(data), [s for s in sections if s[2]]), png
 
 
 def _side(data: Data, scene: Any, best: tuple[int, ...]) -> str:
@@ -100,15 +101,11 @@ def _side(data: Data, scene: Any, best: tuple[int, ...]) -> str:
 
 def maps_section(data: Data, best: tuple[int, ...], maps: Picture) -> str:
     """Maps over force and angle, why cases failed, and every case."""
-    shown = [maps if data.status.size > 1 else None, report_maps.angle_maps(data, best)]
-    pointed = cases.listed(data) and any(p and p.spots for p in shown)
-    html = (
-        paragraph(report_maps.POINT, "note screen") * pointed
-        + _pictures(shown)
-        + cases.failures(data)
-        + cases.every_case(data)
-    )
-    return html + paragraph(words.CAVEAT, "note")
+    if data.status.size == 1:
+        return cases.failures(data)
+    how = paragraph(report_maps.POINT, "note screen") if cases.listed(data) else ""
+    html = how + picture(maps) + angle_maps(data, best)
+    return html + cases.failures(data) + cases.every_case(data)
 
 
 def case_sections(data: Data, best: tuple[int, ...], mu: float | None) -> Sections:
@@ -151,7 +148,8 @@ def wall_section(data: Data, scene: Any, best: tuple[int, ...]) -> str:
 def effects(data: Data, best: tuple[int, ...]) -> str:
     """Levels of all effects, and where and why the wall's were taken."""
     shown = levels.level_picture(data, best)
-    return background.effects(data) + levels.rule(data) + _pictures([shown])
+    html = background.effects(data) + levels.rule(data) + _pictures([shown])
+    return html + paragraph(words.CAVEAT, "note")
 
 
 def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:

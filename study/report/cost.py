@@ -94,4 +94,6 @@ def _bars(panel: Any, borders: np.ndarray, parts: dict[str, np.ndarray], label: 
 def _named(data: Data, x: int, i: int) -> str:
     index = [0] * len(data.shape)
     index[x] = i
-    return elsewhere(data, index, *(k for k in range(len(data.shape)) if k != x)) or f"place {i}"
+    if data.by_poses and x == len(index) - 3:
+        return data.place(index)
+    return elsewhere(data, index, *(k for k in range(len(data.shape)) if k != x))

@@ -89,7 +89,10 @@ def chosen_angles(data: Data, index: Sequence[int]) -> list[int]:
     return sorted(spread if best in spread else {best, *sorted(spread)[1:]})
 
 
-def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], limits: tuple[float, float]) -> Any:
+def draw_panel(
+    data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], limits: tuple[float, float]
+) -> Any:
+    """One map over two axes, its largest value marked; returns what its colour bar belongs to."""
     (xe, xt, xl), (ye, yt, yl) = ticks(data, x), ticks(data, y)
     values, failed = plane(data, scaled(data, name), x, y, index), plane(data, data.status == FAILED, x, y, index)
     drawn = pictures.heat(
@@ -110,7 +113,7 @@ def _draw(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int]
     return drawn
 
 
-def _spot(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], where: str = "") -> Spot:
+def panel_spot(data: Data, axes: Any, name: str, x: int, y: int, index: Sequence[int], where: str = "") -> Spot:
     """Where the cells of a panel are on a drawn picture, and their cases."""
     cases = plane(data, data.rows, x, y, index)
     label = f"{data.units(name)[0]}{f' at {where}' if where else ''}"
@@ -153,7 +156,7 @@ def force_maps(data: Data, index: tuple[int, ...], names: tuple[str, str] = MAPS
         limits, last = pictures.span(np.take(values, rows, angle)), None
         for row, j in enumerate(rows):
             here = (*index[:angle], j, index[-1])
-            last = _draw(data, axes[row, column], name, x, y, here, limits)
+            last = draw_panel(data, axes[row, column], name, x, y, here, limits)
             title = f"angle {data.axes[angle].values[j] * at:.4g}°" if data.shape[angle] > 1 else ""
             axes[row, column].set_title(title)
         if np.isfinite(values).any():
@@ -177,10 +180,11 @@ def force_maps(data: Data, index: tuple[int, ...], names: tuple[str, str] = MAPS
     over = f"{data.name(data.axes[x])} and normal force"
     alt = f"Heat maps of {' and '.join(labels)} over {over}. {extremes(data, index, names)}"
     svg = pictures.as_svg(drawn)
-    spots = [
-        _spot(data, axes[row, column], name, x, y, (*index[:angle], j, index[-1]), axes[row, column].get_title("left"))
-        for row, j in enumerate(rows) for column, name in enumerate(names)
-    ]  # fmt: skip
+    spots = []
+    for row, j in enumerate(rows):
+        here = (*index[:angle], j, index[-1])
+        titles = [panel.get_title("left") for panel in axes[row]]
+        spots += [panel_spot(data, axes[row, c], name, x, y, here, titles[c]) for c, name in enumerate(names)]
     shown_ = Picture(svg, alt, caption, spots=tuple(spots))
     drawn.suptitle(f"{data.title}: {' and '.join(labels)}", fontsize=10, x=0.01, ha="left")
     return shown_, pictures.as_png(drawn)
@@ -199,23 +203,3 @@ def extremes(data: Data, index: tuple[int, ...], names: tuple[str, ...] = MAPS) 
                 f"{number(values[high])} {unit} ({data.place((*high, index[-1]))})".replace("  ", " ")
             )
     return f"At {number(data.forces[index[-1]])} N " + "; ".join(words) + "." if words else "No values."
-
-
-def angle_maps(data: Data, index: tuple[int, ...]) -> Picture | None:
-    """Quality and e_n over the main axis and the angle at the force shown; None where all angles give the same."""
-    if len(different_angles(data)) < 2:
-        return None
-    x, y = main_axis(data), len(data.shape) - 2
-    drawn, axes = pictures.figure(10, min(max(1.1 + 0.25 * data.shape[y], 1.8), 4.5) + 0.5, 1, 2, sharey=True)
-    for column, name in enumerate(MAPS):
-        values = scaled(data, name)[..., index[-1]]
-        last = _draw(data, axes[0, column], name, x, y, index, pictures.span(values))
-        if np.isfinite(values).any():
-            pictures.colour_bar(drawn, last, axes[0, column], SHORT[name])
-        axes[0, column].set_xlabel(data.axis_label(data.axes[x]))
-    axes[0, 0].set_ylabel("angle [°]")
-    caption = f"At {elsewhere(data, index, x, y) or number(data.forces[index[-1]]) + ' N'}. {HOW_TO_READ}"
-    alt = f"Heat maps of grasp quality and e_n over {data.name(data.axes[x])} and angle. {extremes(data, index)}"
-    svg = pictures.as_svg(drawn)
-    spots = [_spot(data, axes[0, column], name, x, y, index) for column, name in enumerate(MAPS)]
-    return Picture(svg, alt, caption, spots=tuple(spots))

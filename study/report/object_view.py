@@ -88,8 +88,9 @@ def _composed(data: Data, index: tuple[int, ...], limits: Limits, sides: np.ndar
     failed = " Dark grey with crosses: failed." if (state == FAILED).any() else ""
     failed += " Grey: not solved yet." if (state == MISSING).any() else ""
     marks = "balls: where the fingers first touch" if data.by_poses else "light grey: no candidate there"
-    pads = f" With the pads of {data.place(index)} and their pressure (dark: high)." if data.best is not None else ""
-    caption = f"At {force} N per finger, from the side of finger 1 and from the other side.{pads} {marks.capitalize()}."
+    pads = f" Pads of the best case, {data.place(index)}: pressure (dark: high), blue: friction against a slip along x."
+    pads *= data.best is not None
+    caption = f"At {force} N per finger, from two sides. {marks.capitalize()}.{pads}"
     if data.walled and data.best is not None:
         caption += " The wall is deformed as computed, not exaggerated."
     alt = f"{data.title} in three dimensions from two sides, in the colours of {' and '.join(limits)}. "

@@ -15,6 +15,7 @@ from importlib.resources import files
 
 from study.report.spots import Spot
 
+MOST_CHOICES = 8  # as many as the style knows
 STYLE, SCRIPT = "page.css", "hover.js"
 
 
@@ -92,6 +93,17 @@ def picture(shown: Picture) -> str:
     frame = f'<div class="frame"{told}>{image}</div>'
     frame = frame if shown.narrow else f'<div class="scroll wide">{frame}</div>'
     return f"<figure{kind}>{frame}<figcaption>{escape(shown.caption)}</figcaption></figure>"
+
+
+def choice(title: str, labels: Sequence[str], figures: Sequence[str], first: int) -> str:
+    """One of at most `MOST_CHOICES` figures on the screen, all of them in print; needs no script."""
+    buttons = []
+    for k, label in enumerate(labels):
+        name, mark = f"{title.lower().replace(' ', '-')}-{k}", " checked" * (k == first)
+        group = name.rpartition("-")[0]
+        buttons.append(f'<input type="radio" name="{escape(group)}" id="{escape(name)}"{mark}>')
+        buttons.append(f'<label for="{escape(name)}">{escape(label)}</label>')
+    return f'<fieldset class="choice"><legend>{escape(title)}</legend>{"".join(buttons)}{"".join(figures)}</fieldset>'
 
 
 def details(summary: str, html: str) -> str:

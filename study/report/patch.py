@@ -174,4 +174,4 @@ def _profile(axes: Any, place: np.ndarray, pressure: np.ndarray, top: float) -> 
                  vmax=top or 1.0)  # fmt: skip
     true = np.ptp(place[:, 2]) > 0.25 * np.ptp(place[:, 1])  # else it would be a line
     axes.set(xlabel="y, across [mm]", ylabel="z [mm]", aspect="equal" if true else "auto")
-    axes.set_title("seen along x" if true else "seen along x, z stretched")
+    axes.set_title("along x" if true else "along x, z stretched")

@@ -11,6 +11,7 @@ from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 
 BEST = 6
+LEAST = 1e-4  # relative error below which only a bound is told
 HARM = SLIDES_OUT | YIELDS | TOO_WEAK | TOO_STRONG
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
@@ -95,7 +96,10 @@ def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
 def uncertainty(data: Data, name: str, index: tuple[int, ...]) -> str:
     """How far off a value may be, where the file knows: the one place that says so in verdict, tables and maps."""
     error = data.at(f"{name}_error", index)
-    return f" ± {number(100 * error, 2)} %" if np.isfinite(error) else ""
+    if not np.isfinite(error):
+        return ""
+    share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)
+    return f" ±\u00a0{share}\u00a0%"
 
 
 def value(data: Data, name: str, index: tuple[int, ...], digits: int = 4) -> str:

@@ -14,12 +14,14 @@ from study.view.pads import pads
 
 PIXELS = 900  # a side of a picture before its margins are cut
 MARGIN = 12
+OBLIQUE = 0.65  # angle from the first finger to the first side [rad]
 
 
 def two_sides(view: View, index: tuple[int, ...], limits: Mapping[str, tuple[float, float]]) -> np.ndarray:
     """Pictures ``(map, side, height, width, 3)`` without colour bars: one row for each map in ``limits``, in its unit.
 
-    The first side looks obliquely at finger 1, the second comes from the other side of the object.
+    The first side looks obliquely at finger 1. The second one is a quarter turn on where the object looks alike after
+    half a turn, so that it shows what the first does not, and else half a turn on.
     """
     with pv.vtk_verbosity("off"):
         return trimmed(np.stack([_seen(view, index, name, limits[name]) for name in limits]))
@@ -34,7 +36,9 @@ def _seen(view: View, index: tuple[int, ...], name: str, limits: tuple[float, fl
         for title in list(plotter.scalar_bars.keys()):
             plotter.remove_scalar_bar(title)
         out, beside, up = _directions(view, index)
-        return np.stack([_from(plotter, side * (0.8 * out + 0.6 * beside) + 0.3 * up, up) for side in (1.0, -1.0)])
+        on = 0.5 * np.pi if getattr(view.object, "axis_symmetry", 1) % 2 == 0 else np.pi
+        level = [np.cos(a) * out + np.sin(a) * beside for a in (OBLIQUE, OBLIQUE + on)]
+        return np.stack([_from(plotter, place + 0.3 * up, up) for place in level])
     finally:
         plotter.close()
 

@@ -20,6 +20,7 @@ from study.store import open_result
 from study.view.model import View
 from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser
+from tests.study.formula_results import make
 
 pytestmark = [
     pytest.mark.long,
@@ -147,6 +148,23 @@ def test_on_a_phone_the_page_does_not_scroll_sideways_and_a_tap_tells(browser, p
     assert told["left"] >= 0
     assert told["right"] <= 380
     assert told["bottom"] <= 720
+
+
+def test_the_force_of_maps_over_many_angles_can_be_chosen(browser, tmp_path):
+    path = make(tmp_path / "f.hdf", lambda station, angle, force: 0.01 + station + 0.01 * angle + 1e-3 * force)
+    assert main(["report", str(path), "-o", str(tmp_path / "f.html")]) == 0
+    browser.open(tmp_path / "f.html")
+    assert browser.told == []
+    seen = "[...document.querySelectorAll('.choice figure')].map((f) => f.offsetHeight > 0)"
+    assert browser.ask(seen) == [False, False, False, True]
+    browser.ask("document.querySelectorAll('.choice input')[1].click()")
+    assert browser.ask(seen) == [False, True, False, False]
+    caption = browser.ask("document.querySelectorAll('.choice figcaption')[1].textContent")
+    assert "normal force 2 N" in caption
+    browser.point(*middle(browser, ".choice figure:nth-of-type(2) .spot", 1, 5, 5, 6))
+    assert browser.ask(f"{TOLD}.innerText").replace("\u00a0", " ").startswith("station 10 mm, angle 0°, 2 N")
+    browser.do("Emulation.setEmulatedMedia", media="print")
+    assert browser.ask(seen) == [True, True, True, True]
 
 
 def test_it_prints_and_says_everything_without_its_script(browser, page, tmp_path):
