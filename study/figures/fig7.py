@@ -67,6 +67,6 @@ def _said(data: Data, lines: dict[str, tuple[str, dict[str, np.ndarray]]]) -> st
         one, other = values["curved"][[0, -1]]
         gap = 100 * (1 - values["curved"] / values["flat"])[[0, -1]]
         words.append(
-            f"{name} {number(one)} to {number(other)}, below flat by {number(gap[0], 2)} to {number(gap[1], 2)} %"
+            f"{name} {number(one, 4)} to {number(other, 4)}, below flat by {number(gap[0], 2)} to {number(gap[1], 2)} %"
         )
     return f"from {number(data.forces[0])} to {number(data.forces[-1])} N: {'; '.join(words)}"
