@@ -56,7 +56,7 @@ def effects_of(
         "friction": ("curved", 1.0 - F_N / S, only("friction")),
         "wrench": (six, dropped, DEFAULT if wanted.wrench == "auto" else FORCED),
         "limit_surface": (SURFACES[scene.limit_surface.model], radial, FORCED),
-        "friction_pressure_coupling": ("none", nan, ONLY),
+        "friction_pressure_coupling": _coupling(wanted.friction_pressure_coupling),
     }
 
 
@@ -67,6 +67,12 @@ def _object(level: Any) -> tuple[str, float, int]:
         return names[0], nan, REASONS.index("the object has no wall")
     reason = FORCED if level.forced else BELOW if level.number < len(names) - 1 else ABOVE
     return names[level.number], level.indicator, reason
+
+
+def _coupling(wanted: str) -> tuple[str, float, int]:
+    """Whether friction acted back on the pressure."""
+    names = EFFECTS["friction_pressure_coupling"]
+    return names[wanted == "tangential"], nan, DEFAULT if wanted == "auto" else FORCED
 
 
 def _fingers(solving: Any, only: int) -> tuple[str, float, int]:

@@ -18,6 +18,7 @@ from study.sheet_level import sheet_level
 # Over 352 cases (pads, objects, forces and five laws) e_n of the linear pad was off by at most 0.52 times the
 # departure of its law from a straight line at its largest strain; this keeps it below 1.6 %.
 NEARLY_LINEAR = 0.03
+DEFAULT = "the default level of this version"
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ def choose_pad_level(scene: Scene, fingers: list[Finger]) -> PadLevel:
     """
     if scene.effects.pad != "auto":
         return PadLevel(scene.effects.pad == "linear", "forced by the scene")
+    if scene.effects.friction_pressure_coupling == "tangential":
+        return PadLevel(False, DEFAULT)  # the condensed pad knows no friction
     if all(_nearly_linear(scene, finger) for finger in fingers):
         return PadLevel(True, "indicator below the target")
     return PadLevel(False, "indicator above the target")
@@ -44,7 +47,7 @@ def choose_pad_level(scene: Scene, fingers: list[Finger]) -> PadLevel:
 def level_on_wall(scene: Scene) -> PadLevel:
     """On a thin wall, whose solve takes far longer than the pads', ``auto`` leaves the pads at finite strains."""
     if scene.effects.pad == "auto":
-        return PadLevel(False, "the default level of this version")
+        return PadLevel(False, DEFAULT)
     return PadLevel(scene.effects.pad == "linear", "forced by the scene")
 
 

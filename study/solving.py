@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
+from fem.coupling import CoupledProblem, way
 from fem.errors import CheckError
 from fem.extract import half_turned, mirrored
 from fem.grip import Grip, Gripped
@@ -175,6 +177,9 @@ def _press(scene: Scene, finger: Finger, coarser: bool) -> Press:
     elements = pad_shape(scene.gripper, coarser).elements
     symmetry = model.usable_symmetry(scene, finger, elements)
     wanted, nodal = (_pad(scene, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
+    if scene.effects.friction_pressure_coupling == "tangential":
+        problem = partial(CoupledProblem, mu=scene.friction.mu)
+        return Press(wanted, finger.gap, dict(scene.petsc), None, _settings(scene), problem_of=problem, way=way)
     return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, _settings(scene))
 
 

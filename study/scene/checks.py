@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from study.scene.effect_checks import coupling
 from study.scene.errors import Finding, shown
 from study.scene.file_checks import output_file, petsc_options
 from study.scene.gripper_checks import pad_material, pad_mesh, sheet
@@ -166,6 +167,7 @@ def forces(load: Load) -> Iterator[Finding]:
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("object",), object_size), (("object",), profile), (("object",), box_edges), (("gripper", "effects"), pad_mesh),
     (("gripper", "effects"), sheet),
+    (("object", "effects"), coupling),
     (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
     (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
     (("output",), output_file), (("petsc",), petsc_options), (("limit_surface", "effects"), surface_choice),

@@ -176,6 +176,9 @@ class Effects(Section):
     limit_surface: Literal["auto", "three_motions", "fitted_ellipsoid", "quartic"] = Field(
         "auto", description="form of the limit surface; auto is that of [limit_surface]"
     )
+    friction_pressure_coupling: Literal["auto", "none", "tangential"] = Field(
+        "auto", description="whether friction acts back on the contact pressure; auto is none, as in the paper"
+    )
     wrench: Literal["auto", "3-D", "6-D"] = Field(
         "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"
     )

@@ -18,9 +18,7 @@ EXAMPLES = {
     "shear_moduli_kpa": "[40]", "point_mm": "[0, 0, 20]", "approach": "[1, 0, 0]", "long_side": "[0, 0, 1]",
     "poses": "[{ point_mm = [0, 0, 20], approach = [1, 0, 0], long_side = [0, 0, 1] }]",
 }  # fmt: skip
-LATER_LEVELS = {
-    "fingers": ("one",), "friction": ("coupled",),
-}  # fmt: skip
+LATER_LEVELS = {"fingers": ("one",)}
 
 
 def unknown_key(path: KeyPath, value: Any, keys: Sequence[str], elsewhere: Mapping[str, Sequence[str]]) -> Finding:

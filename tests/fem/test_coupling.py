@@ -1,0 +1,114 @@
+"""Friction that acts back on the contact: limits, Coulomb's law, tangent, and independence of the steps."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from fem import coupling
+from fem.contact import Control
+from fem.coupling import CoupledProblem, way
+from fem.materials import material
+from fem.objects import EllipticCylinder, Sphere
+from fem.pad import Pad, PadShape
+from fem.press import Press
+from fem.spring_bed import SpringBed
+from tests.fem import reference
+
+SIZE = (0.050, 0.022, 0.015)
+FOAM = material("blatz_ko", 0.040e6)
+OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
+BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
+
+
+def pad_of(symmetry=(True, True), elements=(8, 4, 3), law=FOAM):
+    return Pad(PadShape(SIZE, elements), law, symmetry)
+
+
+def press(gap, mu, pad=None):
+    return Press(pad or pad_of(), gap, problem_of=partial(CoupledProblem, mu=mu), way=way)
+
+
+def test_way_grows_evenly():
+    for reached, force in ((0.0, 5.0), (1.0, 5.0), (4.9, 5.0), (5.0, 4.0)):
+        goals = way(reached, force)
+        steps = np.array([reached, *goals] if reached else goals)
+        assert goals[-1] == force
+        assert (steps[1:] / steps[:-1] <= coupling.GROWTH * (1 + 1e-9)).all()
+        assert np.ptp(np.diff(np.log(steps))) < 1e-9
+    assert way(0.0, 5.0)[0] == 5.0 * coupling.START
+
+
+def test_without_friction_nothing_changes():
+    for one, other in zip(press(BALL, 0.0).ladder([2.0, 5.0]), Press(pad_of(), BALL).ladder([2.0, 5.0]), strict=True):
+        assert one.travel == pytest.approx(other.travel, rel=1e-9)
+        assert np.abs(one.pressure - other.pressure).max() < 1e-8 * other.pressure.max()
+
+
+def test_a_pad_that_does_not_spread_rubs_nowhere():
+    """Without Poisson's effect columns on a plane only shorten, so that friction has nothing to resist."""
+    pad = pad_of(law=material("neo_hookean", 0.04e6, 0.0))
+    (rough,), (smooth,) = press(reference.plane, 0.8, pad).ladder([5.0]), Press(pad, reference.plane).ladder([5.0])
+    assert rough.travel == pytest.approx(smooth.travel, rel=1e-9)
+    assert np.abs(rough.points.friction).max() < 1e-9 * rough.points.load.max()
+
+
+def test_a_rough_plane_holds_the_front():
+    """At a large friction coefficient nothing slips; what is left of the spreading is the give of the stick."""
+    (rough,), (smooth,) = press(reference.plane, 50.0).ladder([5.0]), Press(pad_of(), reference.plane).ladder([5.0])
+    home = pad_of().nodes[pad_of().front_nodes][:, :2]
+    spread = [np.abs(state.front[:, :2] - home).max() for state in (rough, smooth)]
+    assert spread[0] < 0.05 * spread[1]
+    assert rough.travel < 0.98 * smooth.travel  # a held pad is stiffer
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.8])
+def test_coulombs_law_and_balance_hold(mu):
+    """``|t| <= mu p``, across the normal, against the way that the pad spreads; the checks of each state passed."""
+    full = pad_of((False, False))
+    (state,) = press(OVAL, mu, full).ladder([3.0])
+    force, normal, load = state.points.friction, state.points.normal, state.points.load
+    size = np.linalg.norm(force, axis=-1)
+    assert (size <= mu * load * (1 + 1e-9)).all()
+    assert np.abs(np.einsum("fqi,fqi->fq", force, normal)).max() < 1e-6 * load.max()
+    slipping = (size > mu * load * (1 - 1e-6)) & (load > 0)
+    assert slipping.any()
+    assert (np.mean(slipping[load > 0]) > 0.5) == (mu == 0.1)  # with 0.8 most of it sticks
+    outwards = state.points.position[..., 0]
+    assert (force[..., 0] * outwards)[load > 0].sum() < 0
+    assert state.checks.force_balance < 1e-8
+
+
+@pytest.mark.parametrize("control", [Control(force=3.0), Control(travel=0.003)], ids=["force", "travel"])
+def test_tangent_by_finite_differences(control):
+    """From a state with a history: some points stick, some slip, some are open."""
+    pad = pad_of((True, False), (6, 4, 2))
+    problem = CoupledProblem(pad, BALL, 0.2)
+    problem.control = control
+    bed = SpringBed(pad, BALL)
+    rng = np.random.default_rng(3)
+    before, x = bed.guess(0.0020), bed.guess(0.0021)
+    x[: pad.travel_dof] += 3e-6 * rng.normal(size=pad.travel_dof)
+    problem.accept(before)
+    problem.accept(before + 0.5 * (x - before))
+    K = np.zeros((pad.size + 1, pad.size + 1))  # negative indices fall into the last row and column
+    np.add.at(K, (problem.rows, problem.columns), problem.tangent(x))
+    size = np.linalg.norm(problem._traction(x)[0], axis=-1)
+    slips = np.isclose(size, 0.2 * problem._pressure(x), rtol=1e-9) & (size > 0)
+    assert slips.any()
+    assert ((size > 0) & ~slips).any()
+    d, h = rng.normal(size=pad.size) * 1e-8, 1e-2
+    found = (problem.residual(x + h * d) - problem.residual(x - h * d)) / (2 * h)
+    np.testing.assert_allclose(K[:-1, :-1] @ d, found, atol=1e-5 * np.abs(found).max())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+def test_finer_steps_and_a_stiffer_stick_change_little(gap, monkeypatch):
+    (state,) = press(gap, 0.4).ladder([6.0])
+    for name, value in (("GROWTH", 1.2), ("STICK", 200.0)):
+        with monkeypatch.context() as changed:
+            changed.setattr(coupling, name, value)
+            (finer,) = press(gap, 0.4).ladder([6.0])
+        assert finer.travel == pytest.approx(state.travel, rel=2e-3)
+        assert finer.points.load.sum() == pytest.approx(state.points.load.sum(), rel=2e-3)

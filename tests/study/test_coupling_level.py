@@ -1,0 +1,35 @@
+"""Friction that acts back on the pressure, through the whole study."""
+
+import numpy as np
+import pytest
+
+from study.quantities import REASONS
+from tests.study.test_pad_level import e_n
+from tests.study.test_pipeline import OVAL, cases, solved
+
+COUPLED = 'effects.friction_pressure_coupling="tangential"'
+
+
+def test_levels_and_what_they_change():
+    """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
+    found = {result.effects["friction_pressure_coupling"][::2] for _, ladder in solved(OVAL) for result in ladder}
+    assert {(level, REASONS[reason]) for level, reason in found} == {("none", "the default level of this version")}
+    found = {result.effects["friction_pressure_coupling"][::2] for _, own in solved(OVAL, COUPLED) for result in own}
+    assert {(level, REASONS[reason]) for level, reason in found} == {("tangential traction", "forced by the scene")}
+    off = e_n(OVAL, COUPLED) / e_n(OVAL) - 1.0
+    assert (np.abs(off) < 0.05).all()
+    assert (np.abs(off) > 1e-3).all()
+    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL), strict=True):
+        assert one["maps/travel"] < other["maps/travel"]
+        assert one["work/load_steps"][0] > other["work/load_steps"][0]
+    smooth = ("friction.mu=0", COUPLED)
+    travel = [[v["maps/travel"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0",))]
+    np.testing.assert_allclose(*travel, rtol=1e-9)
+
+
+@pytest.mark.long
+def test_symmetry_does_not_matter_with_friction():
+    small = {"forces": "[3]", "elements": "[8, 4, 3]"}
+    np.testing.assert_allclose(
+        e_n(OVAL, COUPLED, **small), e_n(OVAL, COUPLED, 'effects.model_size="full"', **small), rtol=1e-7
+    )
