@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections import namedtuple
@@ -402,3 +403,22 @@ def test_the_keys_in_which_another_scene_differs_are_named(tmp_path):
     assert "and 6 more keys" in many  # 9 here and 2 there, less the five that are named
     assert "another mesh file" in said(theirs)
     assert "cannot be read" in said("no toml")
+
+
+def test_a_file_of_the_version_before_is_read_but_not_gone_on_with(path):
+    with h5py.File(path, "r+") as file:
+        file.attrs["layout_version"] = 2
+        options = json.loads(file["study"].attrs["options"])
+        file["study"].attrs["options"] = json.dumps({k: v for k, v in options.items() if k not in ("surface", "front")})
+        for name in ("report", "map", "title"):
+            del file[f"study/{name}"]
+    with open_result(path) as read:
+        assert read.map("e_n", "curved").shape == (5, 2, 3)
+        assert read.report == ""
+    with pytest.raises(StudyError, match="can be read, but not gone on with: choose another file"):
+        verify(path, small(), HEADER)
+
+
+def test_the_report_says_that_it_is_not_written_yet(path):
+    with open_result(path) as read:
+        assert "Not all cases of this study are solved yet" in read.report

@@ -1,0 +1,39 @@
+"""The report as text in the file itself: what somebody learns who has nothing but the file."""
+
+from __future__ import annotations
+
+import h5py
+
+from study.layout import REPORT
+from study.plain_report import plain, plain_report
+from study.store import open_result
+from tests.study.view_files import make
+
+
+def test_it_says_what_it_is_the_best_grasps_the_failures_and_how_to_read_them(tmp_path):
+    with open_result(make(tmp_path / "thing.hdf")) as result:
+        text = plain_report(result, 0.8)
+    assert text.startswith(
+        "<b>thing</b>: 3 stations (-20 to 20 mm) × 2 angles (0 to 90°) × 2 normal forces (1 to 5 N)\n"
+    )
+    assert "Best grasp at 5 N per finger: station 0 mm, angle 0°, quality 2," in text
+    assert "10 of 12 cases are solved, 1 failed, 1 are missing." in text
+    assert "failed 1 x no </script> convergence [station 20 mm, angle 90°, 5 N]" in text
+    assert "0 missing, 1 done, 2 failed" in text.partition("How to read the file")[2]
+    assert str(tmp_path) not in text  # the same bits wherever it is solved
+    assert max(map(len, text.splitlines())) <= 120
+    assert len(text.encode()) < REPORT
+
+
+def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
+    path = make(tmp_path / "thing.hdf")
+    with h5py.File(path, "r+") as file:
+        file["study/status/code"][...] = 2
+    with open_result(path) as result:
+        text = plain_report(result, None)
+    assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
+    assert "failed 11 x no reason was given" in text
+
+
+def test_paragraphs_of_a_page_become_lines():
+    assert plain("<div class='x'><p>a &lt; <b>b</b></p><p> </p>\n<p>c\xa0mm</p></div>") == "a < b\nc mm"
