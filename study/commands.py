@@ -137,6 +137,22 @@ def watch(options: Namespace) -> int:
     return watch(Path(options.file), options.every)
 
 
+def repair(options: Namespace) -> int:
+    """Say what of a damaged file is good, and make it usable."""
+    from study.repair import repair
+
+    print(repair(Path(options.file), options.write, options.in_place))
+    return DONE
+
+
+def scale(options: Namespace) -> int:
+    """Replay a finished study on many ranks."""
+    from study.scaling import scaling_text
+
+    print(scaling_text(Path(options.file), options))
+    return DONE
+
+
 def show(options: Namespace) -> int:
     """Print the best grasps."""
     from study.columns import terminal_width
@@ -185,7 +201,7 @@ def export(options: Namespace) -> int:
 
 def report(options: Namespace) -> int:
     """Write one page with everything."""
-    from study.report import write_report
+    from study.report.writing import write_report
     from study.view.command import choice
 
     page = Path(options.output or Path(options.file).with_suffix(".html"))

@@ -22,11 +22,12 @@ from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
-from study.report import build, cases, object_view, words, write_report
+from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
 from study.report.data import Data, number
 from study.report.outline import read_scene, shape_outline, slice_polygon
 from study.report.patch import cells
+from study.report.writing import build, write_report
 from study.result import CaseResult
 from study.scene.shapes import EllipticCylinder, Sphere
 from study.show import best
@@ -428,5 +429,5 @@ def test_numbers_for_people(value, text):
 
 
 def test_nothing_is_imported_before_a_picture_is_drawn():
-    code = "import sys, study.report; sys.exit(any(m.startswith('matplotlib') for m in sys.modules))"
+    code = "import sys, study.report.writing; sys.exit(any(m.startswith('matplotlib') for m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0
