@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from study.finger_quantities import PATCH
-from study.quantities import EFFECTS, REASONS
+from study.quantities import EFFECTS, INDICATORS, REASONS
 from study.quantity import FINGERS, MODELS, Quantity
 
 MISSING = 0  # state of a case that has not been solved
@@ -136,6 +136,8 @@ def _describe_effect(key: str) -> dict[str, str]:
     attributes = {"long_name": f"{part} of the effect '{name}'", "units": ""}
     if meaning:
         attributes["meaning"] = ", ".join(f"{i} {text}" for i, text in enumerate(meaning))
+    if part == "indicator" and name in INDICATORS:
+        attributes["definition"] = INDICATORS[name]
     return attributes
 
 

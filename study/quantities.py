@@ -225,6 +225,15 @@ EFFECTS = {
     "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
     "friction_pressure_coupling": ("none", "tangential traction"),
 }
+# What the indicator of an effect is, where it has one; effects/<name>_indicator.
+INDICATORS = {
+    "object": "dent that a linear wall would get at the largest force, over the wall's thickness",
+    "pad": "largest |principal stretch - 1| of the pads in this state",
+    "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
+    "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
+    "wrench": "mean share of the three dropped components in the friction wrench",
+    "limit_surface": "radial misfit of the fitted limit surface, curved model, of the finger where it is larger",
+}
 REASONS = (
     "the only level of this version",
     "forced by the scene",

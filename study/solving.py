@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fem.coupling import CoupledProblem, way
-from fem.errors import CheckError
+from fem.errors import CheckError, ConvergenceError
 from fem.extract import half_turned, mirrored
 from fem.grip import Grip, Gripped
 from fem.grip_problem import GripProblem
@@ -96,13 +96,23 @@ class OnRigid:
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        for states in zip(*(zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses), strict=True):
+        ladders = (zip(*(self._climbed(p, forces) for p in own), strict=True) for own in self.presses)
+        for states in zip(*ladders, strict=True):
             contacts = [
                 [Contact(self.scene, f, state) for state in own] for f, own in zip(self.fingers, states, strict=False)
             ]
             if self.shared:  # an image finger has its partner's states; only its place differs
                 contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
             yield Solved(contacts, [s for own in states for s in own], [])
+
+    def _climbed(self, press: Press, forces: Sequence[float]) -> Iterator[Pressed]:
+        try:
+            yield from press.ladder(forces)
+        except (ConvergenceError, CheckError) as error:
+            if not self.pad_level.linear:
+                raise
+            hint = "the scene asks for pads at small strains; effects.pad = 'auto' allows finite ones"
+            raise type(error)(f"{error} ({hint})") from error
 
     def destroy(self) -> None:
         """See `Solver`."""

@@ -47,6 +47,14 @@ def test_forced_levels_are_kept():
     assert (off > 0.02).all()  # what auto is there to prevent
 
 
+def test_too_large_forces_for_the_linear_pad_say_so():
+    (failed,) = (
+        result for _, ladder in solved(BALL, 'effects.pad="linear"', forces="[1, 60]") for result in ladder[1:]
+    )
+    assert "inverted" in failed.message
+    assert "effects.pad = 'auto'" in failed.message
+
+
 def test_a_foam_of_linear_material_is_condensed_at_any_force():
     linear = 'gripper.material="linear"'
     chosen = levels(BALL, linear, forces="[1, 3]")
