@@ -28,6 +28,7 @@ from fem.stepping import Settings, Stepping, Work
 
 FloatArray = NDArray[np.float64]
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
+TOO_MUCH = 0.7  # strain beyond which not the contact is what fails
 MOST_FALL = 0.05  # of the travel from one force to the next: weighted and nodal gaps differ by less
 
 
@@ -193,9 +194,14 @@ class Press:
     def _explained(self, error: ConvergenceError) -> ConvergenceError:
         """The error, with what the foam has come to where that is why no further state was found."""
         x, force = self._last
-        _, strain, acoustic = self.problem.foam.strains(x, DIRECTIONS)
-        if acoustic > BARELY_ELLIPTIC or isinstance(error, NotReachedError):
+        det, strain, acoustic = self.problem.foam.strains(x, DIRECTIONS)
+        if isinstance(error, NotReachedError) or (acoustic > BARELY_ELLIPTIC and strain < TOO_MUCH):
             return error
+        if acoustic > BARELY_ELLIPTIC:
+            return ConvergenceError(
+                f"the pad is squeezed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
+                f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
+            )
         return ConvergenceError(
             f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "
             f"{acoustic:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "

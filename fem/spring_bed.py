@@ -12,6 +12,7 @@ from fem.pad import Pad
 
 FloatArray = NDArray[np.float64]
 BISECTIONS = 60
+STIFF_VOLUME = 0.45  # Poisson's ratio above which squeezed columns are a worse start than columns that only move
 
 
 class SpringBed:
@@ -51,7 +52,9 @@ class SpringBed:
         pad = self.pad
         squeeze = np.clip(travel - self.height, 0.0, 0.6 * pad.shape.size[2])
         u = np.zeros(pad.dofs.shape)
-        u[:, 2] = travel - squeeze[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
+        u[:, 2] = travel
+        if pad.material.poisson_ratio <= STIFF_VOLUME:
+            u[:, 2] -= squeeze[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
         x = np.zeros(pad.size)
         x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
         x[pad.travel_dof] = travel
