@@ -80,7 +80,9 @@ def back_stiffness(
     if not free.any():
         return BackStiffness(free, np.zeros((1, 1)))
     nodes = np.flatnonzero(free.any(axis=-1).ravel())
-    C, _ = LinearShell(shell, fixed).compliance(nodes)
+    linear = LinearShell(shell, fixed)
+    C, _ = linear.compliance(nodes)
+    linear.destroy()
     moving = free.reshape(-1, 3)[nodes].ravel()
     C = C[np.ix_(moving, moving)]
     approach = np.tile([0.0, 0.0, 1.0], len(nodes))[moving]

@@ -65,7 +65,7 @@ def test_a_rough_plane_holds_the_front():
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_coulombs_law_and_balance_hold(mu):
     """``|t| <= mu p``, across the normal, against the way that the pad spreads; the checks of each state passed."""
-    full = pad_of((False, False))
+    full = pad_of((False, False), (6, 4, 2))
     (state,) = press(OVAL, mu, full).ladder([3.0])
     force, normal, load = state.points.friction, state.points.normal, state.points.load
     size = np.linalg.norm(force, axis=-1)

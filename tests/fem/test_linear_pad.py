@@ -24,7 +24,7 @@ SIZE = (0.050, 0.022, 0.015)
 FOAM = material("blatz_ko", G)
 OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
 BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
-FORCES = [1.0, 3.0, 10.0, 20.0]
+FORCES = [1.0, 10.0, 20.0]
 
 
 @lru_cache

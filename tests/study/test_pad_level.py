@@ -64,6 +64,7 @@ def test_a_foam_of_linear_material_is_condensed_at_any_force():
     )
 
 
+@pytest.mark.long
 def test_both_meshes_of_an_error_estimate_have_one_level():
     finest = [v["maps/e_n_error"] for v in cases(BOX, "accuracy.meshes=2", forces=LIGHT, elements="[8, 4, 4]")]
     foam = ("accuracy.meshes=2", 'effects.pad="hyperelastic"')
