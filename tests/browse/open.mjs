@@ -1,5 +1,5 @@
 // node open.mjs PAGE FILE PICTURE WORD...: open the built page in Chromium, give it the file and wait for the words.
-// FILE '-' is for a page that has its file embedded. Prints the text that a reader sees and the number of canvases.
+// Prints the text that a reader sees and the number of canvases.
 import puppeteer from 'puppeteer-core';
 
 const [page, file, picture, ...words] = process.argv.slice(2);
@@ -16,7 +16,7 @@ try {
   await tab.setViewport({ width: 1400, height: 850 });
   tab.on('pageerror', (error) => console.error(`page error: ${error}`));
   await tab.goto(`file://${page}`, { waitUntil: 'load' });
-  if (file !== '-') await (await tab.waitForSelector('input[type=file]')).uploadFile(file);
+  await (await tab.waitForSelector('input[type=file]')).uploadFile(file);
   let seen = '';
   for (const until = Date.now() + 60000; Date.now() < until && !words.every((word) => seen.includes(word)); ) {
     await new Promise((resolve) => setTimeout(resolve, 200));

@@ -185,6 +185,7 @@ def test_before_the_end_the_grid_shows_the_object_and_nothing_else(tmp_path):
         assert np.abs(grid.bounds) == pytest.approx([0.025] * 2 + [0.02] * 2 + [0.05] * 2)
 
 
+@pytest.mark.long
 def test_pads_can_be_left_out_and_a_sweep_shows_its_first_point(tmp_path):
     scene = SCENE + '[output]\npatches = "none"\n[sweep]\n"object.length_mm" = [100, 200]\n'
     layout = study(tmp_path / "thing.hdf", scene)
