@@ -16,6 +16,7 @@ from study.cost.command import add_options as add_cost_options
 from study.environment import keep_compiled_loops, pin_threads
 from study.exits import BUG, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
+from study.file_options import add_repair_options, add_scale_options
 from study.help import Formatter, Parser, Program
 from study.patch.command import add_options as add_patch_options
 from study.start import add_options as add_init_options
@@ -91,6 +92,10 @@ def program() -> Program:
                  "softjaw status results/bottle-rigid.hdf")  # fmt: skip
     add_watch_options(add("watch", commands.watch, "live view of a run, in another terminal",
                           "softjaw watch results/bottle-rigid.hdf --every 5"))  # fmt: skip
+    add_repair_options(add("repair", commands.repair, "what of a damaged file is good; make it usable again",
+                           "softjaw repair results/bottle-rigid.hdf --write"))  # fmt: skip
+    add_scale_options(add("scale", commands.scale, "replay the times of a finished file on many ranks",
+                          "softjaw scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"))  # fmt: skip
     show = add("show", commands.show, "the best grasps as a table",
                "softjaw show results/bottle-rigid.hdf --force 4 --top 3 --json")  # fmt: skip
     report = add("report", commands.report, "one self-contained page: maps, definitions, provenance",

@@ -14,7 +14,7 @@ from study.exits import MEANING
 
 GROUPS = (  # in the order of use; a command that stands nowhere is listed under the last title
     ("prepare", ("init", "check", "plan", "cost")),
-    ("solve", ("run", "watch", "status")),
+    ("solve", ("run", "watch", "status", "repair", "scale")),
     ("look at results", ("show", "report", "view", "figure", "compare")),
     ("use the numbers", ("export", "patch")),
     ("this program", ("schema", "doctor", "completion")),

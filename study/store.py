@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -218,27 +218,31 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
         for dataset in (*result.layout.datasets, *result.layout.grid):
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
-                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file"
+                text = f"{path}: was repacked and cannot be written in parallel any more; 'softjaw repair' undoes that"
                 raise StudyError(OTHER_FILE, text)
 
 
 def torn_rows(path: Path, layout: Layout) -> list[int]:
     """Rows that are marked done but do not match their checksum."""
+    return [row for row, state, values in rows_of(path, layout) if state == DONE and values is None]
+
+
+def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
+    """Every row that is done or failed: number, state, and values, or None where they do not match their checksum."""
     with h5py.File(path, "r") as file:
         views = [_mapped(path, file[c.path], c.dtype) for c in layout.columns]
-        done = np.flatnonzero(file[f"{ROOT}/status/code"][()].ravel() == DONE)
-        crc = file[f"{ROOT}/status/crc"][()].ravel()
-
-    def stored(row: int) -> list[Any]:
+        codes, crc = (file[f"{ROOT}/status/{name}"][()].ravel() for name in ("code", "crc"))
+    for row in np.flatnonzero(codes != MISSING):
         pairs = zip(views, layout.places(row), strict=True)
-        return [None if place is None else view[place] for view, place in pairs]
-
-    return [int(row) for row in done if crc32(layout, row, stored(row)) != crc[row]]
+        values = [None if place is None else view[place] for view, place in pairs]
+        yield int(row), int(codes[row]), values if crc32(layout, row, values) == crc[row] else None
 
 
 def _mapped(path: Path, dataset: h5py.Dataset, dtype: np.dtype) -> np.ndarray:
     if dataset.size == 0:
         return np.empty(dataset.shape, dtype)
+    if dataset.chunks:  # a file that was repacked
+        return dataset[()].astype(dtype)
     return np.memmap(path, dtype, "r", dataset.id.get_offset(), dataset.shape)
 
 
@@ -246,13 +250,17 @@ def _mapped(path: Path, dataset: h5py.Dataset, dtype: np.dtype) -> np.ndarray:
 
 
 class ResultWriter:
-    """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not."""
+    """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not.
+
+    With ``comm = None`` this process has it alone and needs no MPI.
+    """
 
     def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
-        if not h5py.get_config().mpi:
+        if comm is not None and not h5py.get_config().mpi:
             raise StudyError(CANNOT_WRITE, "this h5py was built without MPI; 'softjaw doctor' says how to cure that")
         self.path, self.layout = path, layout
-        self._file = h5py.File(path, "r+", driver="mpio", comm=comm, libver=LIBVER)
+        shared = {} if comm is None else {"driver": "mpio", "comm": comm}
+        self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
         self._columns = [self._file[c.path] for c in layout.columns]
         keys = [c.key for c in layout.columns]
         self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST_SEEN}
@@ -285,6 +293,10 @@ class ResultWriter:
     def fail(self, row: int, message: str) -> None:
         """Store why a case has no result."""
         self._store(row, blank(self.layout, message), FAILED)
+
+    def copy(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
+        """Store a row as another file has it."""
+        self._store(row, values, state)
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
