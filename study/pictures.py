@@ -87,7 +87,7 @@ def as_png(drawn: Any) -> bytes:
 
 def as_webp(drawn: Any) -> bytes:
     """The figure as WebP, for what is shaded or has very many parts: a tenth of the size of SVG or PNG."""
-    return _saved(drawn, "webp", dpi=190, facecolor="white", pil_kwargs={"quality": 82, "method": 6})
+    return _saved(drawn, "webp", dpi=190, facecolor="white", pil_kwargs={"quality": 82, "method": 4})
 
 
 def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:

@@ -58,9 +58,9 @@ def patch_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
     try:
         for row, finger in enumerate(fingers):
             place = 1e3 * patch["centroid"][finger]
-            frame = _contact_frame(data, index, finger)
+            frame, corners = _contact_frame(data, index, finger), cells(place[:, :2])
             for panel, motion in zip(axes[row], MOTIONS, strict=False):
-                mapped = _front(panel, place, pressure[finger], top)
+                mapped = _front(panel, corners, pressure[finger], top)
                 if frame is not None:
                     directed |= _friction(panel, patch, finger, frame, motion)
                     _frame(panel, *frame, 0.28 * np.ptp(place[:, :2], axis=0).min())
@@ -92,8 +92,7 @@ def _alike(pressure: np.ndarray) -> bool:
     return bool(np.abs(one - two).max() <= ALIKE * max(pressure.max(), 1e-300))
 
 
-def _front(axes: Any, place: np.ndarray, pressure: np.ndarray, top: float) -> Any:
-    corners = cells(place[:, :2])
+def _front(axes: Any, corners: list[np.ndarray], pressure: np.ndarray, top: float) -> Any:
     loaded = pressure > LOADED * top
     free = [corners[i] for i in np.flatnonzero(~loaded)]
     if free:
