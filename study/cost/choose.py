@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study.cost.errors import KnobErrors
+from study.cost.errors import KnobErrors, best_known
 from study.cost.file import CostStudy
 from study.cost.knobs import Level, with_level
 from study.cost.measure import Measured, measure
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 NOT_CHOSEN = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
 HOPE, MOST_TRIED = 2.0, 8  # predicted errors up to so many targets are tried, at most so many combinations
+NOISE, SMALL = 0.1, 1e-4  # of a time, and of e_n: less is no difference
 Solve = Callable[[str, "Probe", Level], Measured]
 
 
@@ -101,15 +102,26 @@ def combinations(tables: Sequence[KnobErrors], base_seconds: float, given: Mappi
     for table in tables:
         if table.judging or table.name in NOT_CHOSEN:
             continue
-        for level, found in zip(table.settings, table.levels, strict=True):
-            if allowed(level, given) and np.isfinite(found.worst[0]):
-                option = (level, found.seconds / base_seconds, float(found.worst[0]))
-                families.setdefault(table.family or table.name, []).append(option)
+        options = families.setdefault(table.family or table.name, [])
+        for i, (level, found) in enumerate(zip(table.settings, table.levels, strict=True)):
+            if i == table.own:
+                options.append((Level(level.name), 1.0, float(found.worst[0])))
+            elif allowed(level, given) and np.isfinite(found.worst[0]) and _matters(table, i):
+                options.append((level, found.seconds / base_seconds, float(found.worst[0])))
     made = []
-    for choice in product(*families.values()):
+    for choice in product(*filter(None, families.values())):
         seconds = base_seconds * math.prod(c[1] for c in choice)
         made.append(Combination(tuple(c[0] for c in choice), seconds, sum(c[2] for c in choice)))
     return sorted(made, key=lambda c: (c.seconds, c.error))
+
+
+def _matters(table: KnobErrors, i: int) -> bool:
+    """Whether a level differs from the scene's own by more than the noise of a measurement."""
+    if table.own < 0:
+        return True
+    own, level = table.levels[table.own], table.levels[i]
+    cheaper = level.seconds < (1.0 - NOISE) * own.seconds
+    return cheaper or level.worst[0] < own.worst[0] - SMALL
 
 
 def best_of(made: Sequence[Combination]) -> list[Combination]:
@@ -125,8 +137,7 @@ def reference(study: CostStudy, tables: Sequence[KnobErrors]) -> FloatArray:
         family = table.family or table.name
         if table.judging or table.name in NOT_CHOSEN or family in families:
             continue
-        own = [t for t in tables if (t.family or t.name) == family]
-        best = min(own, key=lambda t: float(np.nan_to_num(t.limits[0].uncertainty / t.limits[0].value, nan=9.0).max()))
+        best = best_known(tables, family)
         found = found * best.limits[0].value / base
         families.add(family)
     return found

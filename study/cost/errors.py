@@ -57,6 +57,16 @@ class KnobErrors:
         """Whether the knob leaves the contact as it is."""
         return not self.settings
 
+    @property
+    def ladder(self) -> bool:
+        """Whether finer levels lead on to a limit, or the last of discrete levels is exact by definition."""
+        return bool(self.settings) and not any(np.isnan(s.size) for s in self.settings)
+
+    @property
+    def doubt(self) -> float:
+        """To what the limit of e_n is known, relative to it: the worst case."""
+        return float(np.nan_to_num(self.limits[0].uncertainty / np.abs(self.limits[0].value), nan=np.inf).max())
+
 
 def knob_errors(knob: Knob, found: Sequence[Sequence[Measured]], levels: Sequence[Level]) -> KnobErrors:
     """Errors of the levels of a contact knob that were measured, ``found[level][probe]``, the finest last."""
@@ -91,25 +101,37 @@ def _with_limits(table: KnobErrors, values: FloatArray, limits: Sequence[Limit])
         errors = np.array([
             np.abs(values[i, :, q] - found.value) / np.abs(found.value) for q, found in enumerate(limits)
         ])  # fmt: skip
-        if i == last and last > 0:
-            floor = [f.uncertainty / np.abs(f.value) for f in table.limits]
-            seen = [not np.isnan(s.size) for s in table.settings] or [False]
-            if all(seen):  # a ladder without an end; the last of discrete levels is exact by definition
-                errors = np.fmax(errors, np.array(floor))
+        if i == last and table.ladder:
+            errors = np.fmax(errors, np.array([f.uncertainty / np.abs(f.value) for f in table.limits]))
         made.append(replace(level, worst=errors.max(axis=1), middle=np.median(errors, axis=1), by_case=errors))
     return replace(table, levels=tuple(made))
+
+
+def best_known(tables: Sequence[KnobErrors], family: str) -> KnobErrors:
+    """The knob of a family, or of this name, whose limit is known best."""
+    own = [t for t in tables if (t.family or t.name) == family]
+    return min([t for t in own if t.ladder] or own, key=lambda t: t.doubt)
 
 
 def share_limits(tables: list[KnobErrors], values: dict[str, FloatArray]) -> list[KnobErrors]:
     """Give knobs of one family the limit of the one that is known best; ``values[name]`` are ``(level, case, 4)``."""
     made = list(tables)
     for family in {t.family for t in tables if t.family}:
-        own = [t for t in tables if t.family == family]
-        best = min(own, key=lambda t: float(np.nan_to_num(t.limits[0].uncertainty / t.limits[0].value, nan=9.0).max()))
+        best = best_known(tables, family)
         for i, table in enumerate(made):
             if table.family == family and table is not best:
                 made[i] = replace(_with_limits(table, values[table.name], best.limits), limits=table.limits)
     return made
+
+
+def _own(settings: Sequence[str], values: FloatArray, study: CostStudy) -> int:
+    """The level that is the scene's own setting, or the finest that gives the same as it; -1 for none."""
+    base = np.concatenate([m.values for m in study.of(study.base)])
+    for i, setting in enumerate(settings):
+        if setting == study.base:
+            return i
+    alike = [np.allclose(v, base, rtol=1e-12, atol=0.0) for v in values]
+    return max((i for i, same in enumerate(alike) if same), default=-1)
 
 
 def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],
@@ -124,9 +146,8 @@ def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, st
             continue
         levels, found = [v for v, _ in pairs], [f for _, f in pairs]
         table = knob_errors(knob, found, levels)
-        own = next((i for i, v in enumerate(levels) if settings[knob.name, v.name] == study.base), -1)
-        made.append(replace(table, own=own))
         values[knob.name] = np.array([np.concatenate([m.values for m in f]) for f in found])
+        made.append(replace(table, own=_own([settings[knob.name, v.name] for v in levels], values[knob.name], study)))
     made = share_limits(made, values)
     for name, levels in judging.items():
         known = [v for v in levels if study.has(f"{name}: {v}")]

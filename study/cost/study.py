@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,11 +57,12 @@ class Costs:
     skipped: tuple[Skipped, ...]
     judging: dict[str, list[str]]
 
-    @property
+    @cached_property
     def settings(self) -> dict[tuple[str, str], str]:
         """Settings by knob and level."""
         return {(k.name, v.name): setting_of(self.scene, v) for k in self.knobs for v in k.levels}
 
+    @cached_property
     def tasks(self) -> list[Task]:
         """Everything to be measured, each setting once, the scene's own first."""
         found: dict[str, Task] = {}
@@ -104,7 +106,7 @@ class Measuring:
 
     def run(self, seconds: float) -> None:
         """Measure until everything is there or would take the study beyond so many CPU seconds."""
-        todo = [task for task in self.costs.tasks() if not self.study.has(task.setting)]
+        todo = [task for task in self.costs.tasks if not self.study.has(task.setting)]
         self.study.skipped = list(self.costs.skipped)
         if todo:
             warm_up(self.probes[0])
@@ -125,7 +127,7 @@ class Measuring:
         cases = sum(len(p.forces) for p in self.probes)
         if task.level is None:
             return expected_seconds(task.knob, task.name) * cases
-        known = [t for t in self.costs.tasks() if t.level is not None and self.study.has(t.setting)]
+        known = [t for t in self.costs.tasks if t.level is not None and self.study.has(t.setting)]
         alike = [t for t in known if t.knob == task.knob] or [t for t in known if t.setting == self.study.base]
         if not alike:
             return FIRST_GUESS * task.weight * cases

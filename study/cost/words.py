@@ -55,15 +55,24 @@ def sentences(study: CostStudy, tables: Sequence[KnobErrors]) -> list[str]:
     """The answer: what an error of e_n costs, what the next halving costs, which effects are needed."""
     base = float(np.mean([m.seconds for m in study.of(study.base)]))
     best = best_of(combinations(_meshes_only(tables), base, {}))
-    return [text for text in (_price(best), _own(tables, base), *map(_need, tables)) if text]
+    return [text for text in (_price(best, _known(tables)), _own(tables, base), *map(_need, tables)) if text]
 
 
 def _meshes_only(tables: Sequence[KnobErrors]) -> list[KnobErrors]:
-    return [t for t in tables if t.family or "mesh" in t.name or t.name == "object grid"]
+    return [t for t in tables if "mesh" in t.name or t.name == "object grid"]
 
 
-def _price(best: Sequence[Combination]) -> str:
-    """The coarsest round error that the front reaches at a moderate price, and the price of the next halving."""
+def _known(tables: Sequence[KnobErrors]) -> float:
+    """To what the limits of all meshes are known, relative to e_n: the best of every family, added up."""
+    found: dict[str, float] = {}
+    for table in _meshes_only(tables):
+        name = table.family or table.name
+        found[name] = min(table.doubt, found.get(name, math.inf))
+    return sum(found.values())
+
+
+def _price(best: Sequence[Combination], known: float) -> str:
+    """What 2 % cost, or what the front reaches, and the price of the next halving of the error."""
     reached = [g for g in GOALS if best and best[-1].error <= g]
     if not reached:
         error = percent(best[-1].error) if best else "–"
@@ -73,7 +82,7 @@ def _price(best: Sequence[Combination]) -> str:
     half = next((c for c in best if c.error <= 0.5 * now.error), None)
     text = f"{percent(now.error)} in e_n costs {seconds_text(now.seconds)} per case with {settings_text(now)}"
     if half is None:
-        return f"{text}; half that error is beyond the finest mesh that was measured."
+        return f"{text}; half that error is less than the {percent(known)} to which the finest meshes are known."
     return f"{text}; the next halving of the error costs {half.seconds / now.seconds:.2g} times as much."
 
 

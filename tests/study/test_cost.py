@@ -1,0 +1,355 @@
+"""What accuracy costs: extrapolation, baseline, knobs, file and choice, on formulas; the command in the long tests."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from study.scene import parse_scene
+
+CYLINDER = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 80
+[candidates]
+stations_mm = [0]
+angles_deg = [0, 90]
+[load]
+normal_force_n = [2, 8]
+"""
+BOTTLE = """
+[object]
+shape = "revolution"
+profile_mm = [[0, 30], [10, 30], [20, 30], [80, 30], [90, 30], [100, 30]]
+wall_mm = {wall}
+wall_material = "PET"
+open_top = true
+[gripper]
+pad_length_mm = 30
+[candidates]
+stations_mm = [50]
+angles_deg = [0]
+[load]
+normal_force_n = [2, 6]
+"""
+COARSE = ["gripper.elements=[12,6,4]"]
+COARSE_WALL = ["accuracy.wall_around_mm=3", "accuracy.wall_along_mm=5", "accuracy.wall_coarse_mm=10"]
+
+
+def scene(text=CYLINDER, overrides=()):
+    return parse_scene(text, overrides=overrides)
+
+
+# --- extrapolation ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", [0.8, 1.5, 2.0, 2.9])
+def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
+    from study.cost.extrapolate import limit
+
+    h, scale = np.array([3.0, 2.1, 1.0]), np.array([0.1, -0.02, 0.3])
+    exact = np.array([1.0, 2.0, 0.5])
+    found = limit(h, exact + scale * h[:, None] ** order, formal=3.0)
+    assert found.order == pytest.approx(order, rel=1e-8)
+    assert found.value == pytest.approx(exact, rel=1e-9)
+    assert found.uncertainty == pytest.approx(np.abs(scale), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        ([1.0, 1.2, 1.1], "same way"),
+        ([1.3, 1.2, 1.1], "shrink too little"),
+        ([2.0, 1.000001, 1.0], "more than any order"),
+        ([1.0, 1.0, 1.0], "do not differ"),
+        ([1.0, math.nan, 1.0], "no case"),
+    ],
+)
+def test_an_order_that_is_not_there_is_not_seen(values, why):
+    from study.cost.extrapolate import limit
+
+    found = limit([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
+    assert math.isnan(found.order)
+    assert why in found.remark
+    assert found.value == values[-1]  # the finest level, not a guess
+
+
+def test_an_order_above_the_formal_one_is_not_trusted():
+    from study.cost.extrapolate import limit
+
+    h = np.array([4.0, 2.0, 1.0])
+    found = limit(h, (1.0 + 0.01 * h**4)[:, None], formal=2.0)
+    assert found.order == pytest.approx(4.0)
+    assert found.uncertainty[0] == pytest.approx(0.01 * 15 / 3)  # the last step over 2^2 - 1
+
+
+def test_the_front_is_what_nothing_beats():
+    from study.cost.pareto import front
+
+    random = np.random.default_rng(3)
+    t, e = random.random((2, 50))
+    kept = front(t, e)
+    for i in range(50):
+        beaten = any(t[k] <= t[i] and e[k] <= e[i] and (t[k], e[k]) != (t[i], e[i]) for k in range(50))
+        assert (i in kept) != beaten
+
+
+# --- Winkler baseline ---------------------------------------------------------------------------------------------
+
+
+def finger_on(obj, gripper):
+    from study import model
+    from study.candidates import axis_poses
+
+    return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
+
+
+def test_springs_on_a_plane_carry_alike():
+    """Uniform pressure, travel F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
+    from fem.objects import Plane
+    from study.cost.winkler import winkler_pad
+
+    gripper = scene().gripper
+    pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
+    area = gripper.pad_length * gripper.pad_width
+    assert pad.travel(5.0) == pytest.approx(5.0 * gripper.pad_thickness / (3 * gripper.shear_modulus * area), rel=1e-9)
+    assert pad.patch(5.0).pressure == pytest.approx(5.0 / area, rel=1e-6)
+
+
+def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
+    """p = k (d - y^2 / 2R): F = 2/3 k L a^3 / R for narrow contacts, order 2 in the spacing of the springs."""
+    from fem.objects import EllipticCylinder
+    from study.cost.winkler import stiffness, winkler_pad
+
+    gripper, R, force = scene().gripper, 0.2, 1.0
+    finger = finger_on(EllipticCylinder(R, R, 1.0), gripper)
+    k, L = stiffness(gripper), gripper.pad_length
+    a = (1.5 * force * R / (k * L)) ** (1 / 3)
+    assert a < gripper.pad_width / 2
+    travel = [winkler_pad(gripper, finger, (4, n)).travel(force) for n in (40, 160)]
+    errors = np.abs(np.array(travel) / (a**2 / (2 * R)) - 1)
+    assert errors[0] < 0.02
+    assert errors[1] < 1.5e-3
+    patch = winkler_pad(gripper, finger, (4, 160)).patch(force)
+    assert patch.load.sum() == pytest.approx(force, rel=1e-12)
+    assert (patch.normal == [0, 0, 1]).all()
+
+
+# --- knobs --------------------------------------------------------------------------------------------------------
+
+
+def test_every_level_is_a_scene_and_refused_ones_say_why():
+    from study.cost.knobs import contact_knobs, with_level
+
+    own = scene(BOTTLE.format(wall=0.4), COARSE_WALL)
+    knobs, _ = contact_knobs(own)
+    names = [k.name for k in knobs]
+    assert {"pad mesh, hex8", "pad mesh, hex27", "wall mesh", "solver tolerance", "effect: object"} <= set(names)
+    for knob in knobs:
+        digests = [with_level(own, level).digest for level in knob.levels]
+        assert len(set(digests)) == len(digests) or knob.name == "load steps"
+    pad = knobs[0]
+    assert len(pad.levels) >= 4
+    assert with_level(own, pad.levels[pad.own]).digest == own.digest
+    assert all(np.diff([level.size for level in pad.levels]) < 0)
+    assert [level.name for level in knobs[names.index("effect: object")].levels][-1] == "nonlinear shell"
+    assert "wall mesh" not in [k.name for k in contact_knobs(scene())[0]]
+
+
+def test_a_level_that_the_scene_refuses_is_skipped_with_its_reason():
+    from study.cost.knobs import Level, refusal
+
+    assert not refusal(scene(), Level("good", (("gripper.elements", [8, 4, 2]),)))
+    assert "gripper.elements" in refusal(scene(), Level("odd", (("gripper.elements", [7, 4, 2]),)))
+
+
+# --- file and choice ----------------------------------------------------------------------------------------------
+
+
+def e_n_of(point):
+    """A made-up e_n: 10 mm and the squares of the sizes of elements; nothing else but a rigid wall has an effect."""
+    finer = 1.0 if point.gripper.element == "hex8" else 0.5
+    h = finer * math.prod(point.gripper.elements) ** (-1 / 3)
+    wall = point.accuracy.wall_around_mm if getattr(point.object, "wall", None) else 0.0
+    rigid = 0.08 if point.effects.object == "rigid" and wall else 0.0
+    return 0.01 * (1.0 + h**2 + 0.001 * wall**2 + rigid)
+
+
+def formula_study(own):
+    """A study of the formula on two probes, and how it solves what it lacks."""
+    from study.cost.knobs import weight, with_level
+    from study.cost.measure import Measured
+    from study.cost.study import costs, new_study, plain
+
+    own = plain(own)
+    probes = [SimpleNamespace(label=f"probe {i}", forces=(1.0, 2.0)) for i in range(2)]
+    what = costs(own, with_judging=False)
+    study = new_study(own, probes, "formula", "formula.toml")
+    study.calibration = 0.2
+    calls = []
+
+    def solve(setting, probe, level):
+        calls.append(setting)
+        point = with_level(own, level)
+        values = np.full((2, 4), e_n_of(point))
+        return Measured(setting, level.name, probe.label, np.array(probe.forces), values, 1e-9 * weight(point))
+
+    for task in what.tasks:
+        for probe in probes:
+            study.add(solve(task.setting, probe, task.level))
+    calls.clear()
+    return what, study, probes, solve, calls
+
+
+def test_a_study_comes_back_from_its_file(tmp_path):
+    from study.cost.file import load, save
+    from study.cost.knobs import Skipped
+
+    _, study, *_ = formula_study(scene(overrides=COARSE))
+    study.skipped.append(Skipped("pad mesh, hex8", "huge", "would take 3 h; raise --time-limit"))
+    save(tmp_path / "cost.hdf", study)
+    back = load(tmp_path / "cost.hdf")
+    assert (back.digest, back.candidates, back.skipped) == (study.digest, study.candidates, study.skipped)
+    assert back.measured.keys() == study.measured.keys()
+    for key, one in study.measured.items():
+        other = back.measured[key]
+        assert np.array_equal(one.values, other.values)
+        assert (one.seconds, one.message, one.repeats) == (other.seconds, other.message, other.repeats)
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_another_file_is_refused(tmp_path):
+    from study.cost.file import load
+    from study.exits import OTHER_FILE, StudyError
+
+    (tmp_path / "text.hdf").write_text("no HDF5")
+    for name in ("text.hdf", "missing.hdf"):
+        with pytest.raises(StudyError, match=name) as caught:
+            load(tmp_path / name)
+        assert caught.value.code == OTHER_FILE
+
+
+def test_errors_and_orders_are_those_of_the_formula():
+    what, study, *_ = formula_study(scene(overrides=COARSE))
+    table = next(t for t in what.errors(study) if t.name == "pad mesh, hex8")
+    assert table.limits[0].order == pytest.approx(2.0, abs=1e-6)
+    h = np.array([level.size for level in table.settings])
+    assert [level.worst[0] for level in table.levels] == pytest.approx(list(h**2), rel=1e-6)
+    assert table.levels[table.own].name == "12 x 6 x 4"
+
+
+@pytest.mark.parametrize(
+    ("text", "target"),
+    [
+        (CYLINDER, 0.05),
+        (CYLINDER, 0.02),
+        (CYLINDER, 0.004),
+        pytest.param(BOTTLE.format(wall=0.4), 0.02, marks=pytest.mark.long),
+    ],
+)
+def test_the_choice_meets_the_target_at_the_least_cost(text, target):
+    from study.cost.choose import choose, combinations
+    from study.cost.knobs import with_level
+
+    what, study, probes, solve, _ = formula_study(scene(text, [*COARSE, *(COARSE_WALL if "wall" in text else [])]))
+    choice = choose(what, study, target, {}, probes, solve)
+    exact = 0.01
+
+    def error(level):
+        return e_n_of(with_level(what.scene, level)) / exact - 1
+
+    made = combinations(what.errors(study), float(np.mean([m.seconds for m in study.of(study.base)])), {})
+    good = [c for c in made if error(c.level) <= target]
+    assert good, "the ladder of this test has to reach the target"
+    assert error(next(c.level for c in made if dict(c.level.values) == choice.values)) <= target * (1 + 1e-6)
+    assert choice.met
+    assert choice.seconds <= 1.5 * min(c.seconds for c in good)
+
+
+def test_what_the_scene_gives_itself_stays():
+    from study.cost.choose import choose, explicit
+
+    own = scene(overrides=[*COARSE, "gripper.element=hex8", "accuracy.e_n=0.01"])
+    what, study, probes, solve, _ = formula_study(own)
+    given = explicit(own)
+    assert given["gripper.elements"] == (12, 6, 4)
+    assert "effects.pad" not in given
+    choice = choose(what, study, 0.01, given, probes, solve)
+    assert choice.values.get("gripper.elements", [12, 6, 4]) == [12, 6, 4]
+    assert not choice.met
+    assert "no measured setting meets the target" in choice.remark
+
+
+def test_a_second_choice_solves_nothing_and_chooses_the_same():
+    from study.cost.choose import choose
+
+    own = scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL])
+    what, study, probes, solve, calls = formula_study(own)
+    first = choose(what, study, 0.02, {}, probes, solve)
+    assert calls  # combinations that were not on any ladder
+    calls.clear()
+    assert choose(what, study, 0.02, {}, probes, solve) == first
+    assert not calls
+
+
+def test_a_run_without_a_study_climbs_no_further_than_needed():
+    from study.cost.quick import ladder, quick_choice
+
+    own = scene(overrides=["accuracy.e_n=0.02"])
+    _, study, probes, solve, calls = formula_study(own)
+    study.measured.clear()
+    saved = []
+    choice = quick_choice(own, study, probes, 1000, lambda: saved.append(1), solve)
+    names = [level.name for level in ladder(own)]
+    chosen = names.index(" x ".join(map(str, choice.values["gripper.elements"])))
+    assert e_n_of(own.with_values(choice.values)) / 0.01 - 1 <= 0.02
+    assert len(calls) / 2 <= max(3, chosen + 2)  # on two probes: the chosen mesh and one finer
+    assert len(saved) == len(calls)
+    calls.clear()
+    assert quick_choice(own, study, probes, 1000, list, solve).values == choice.values
+    assert not calls
+
+
+def test_a_given_mesh_leaves_nothing_to_choose():
+    from study.cost.quick import quick_choice
+    from study.cost.target import with_choice
+
+    own = scene(overrides=[*COARSE, "accuracy.e_n=0.02"])
+    _, study, probes, solve, _ = formula_study(own)
+    choice = quick_choice(own, study, probes, 10, list, solve)
+    assert choice.values == {}
+    assert not choice.met
+    assert with_choice(own, choice).digest == own.digest
+
+
+@pytest.mark.long
+def test_words_tell_price_and_need():
+    from study.cost.page import cost_page
+    from study.cost.words import sentences
+
+    what, study, *_ = formula_study(scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL]))
+    tables = what.errors(study)
+    text = " ".join(sentences(study, tables))
+    assert "in e_n costs" in text
+    assert "'nonlinear shell' is needed, 'rigid' moves e_n by" in text
+    page, png = cost_page(study, tables)
+    assert page.count("<table>") >= len(tables)
+    assert png.startswith(b"\x89PNG")
+
+
+def test_ranks_are_refused(monkeypatch):
+    from study.cost.command import refuse_ranks
+    from study.exits import USAGE, StudyError
+
+    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"):
+        monkeypatch.delenv(name, raising=False)
+    refuse_ranks()
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    with pytest.raises(StudyError, match="without mpirun") as caught:
+        refuse_ranks()
+    assert caught.value.code == USAGE
