@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from study.cost.errors import KnobErrors, best_known
 from study.cost.file import CostStudy
-from study.cost.knobs import Level, with_level
+from study.cost.knobs import Level
 from study.cost.measure import Measured, measure
 from study.cost.pareto import front
-from study.cost.study import Costs
+from study.cost.study import Costs, same, setting_of
 from study.scene import Scene
 
 if TYPE_CHECKING:
@@ -88,12 +88,7 @@ def explicit(scene: Scene) -> dict[str, Any]:
 
 def allowed(level: Level, given: Mapping[str, Any]) -> bool:
     """Whether a level leaves what is given as it is."""
-    return all(key not in given or _same(value, given[key]) for key, value in level.values)
-
-
-def _same(one: Any, other: Any) -> bool:
-    plain = [tuple(v) if isinstance(v, list | tuple) else v for v in (one, other)]
-    return plain[0] == plain[1]
+    return all(key not in given or same(value, given[key]) for key, value in level.values)
 
 
 def combinations(tables: Sequence[KnobErrors], base_seconds: float, given: Mapping[str, Any]) -> list[Combination]:
@@ -167,7 +162,7 @@ def choose(
     for combination in hopeful:
         if len(tried) == MOST_TRIED:
             break
-        setting = with_level(costs.scene, combination.level).digest[:16]
+        setting = setting_of(costs.scene, combination.level)
         if not study.has(setting):
             if not probes:
                 continue

@@ -18,7 +18,7 @@ from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
 TEXT = h5py.string_dtype("utf-8")
 MEANING = {
-    "setting": ("", "what tells settings apart: digest of the scene, or knob and level"),
+    "setting": ("", "what tells settings apart: the values by which they differ from the scene, or knob and level"),
     "level": ("", "the setting in words"),
     "candidate": ("", "label of the grasp candidate"),
     "normal_force": ("N", "normal force per finger"),

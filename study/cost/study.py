@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -43,9 +44,25 @@ def plain(scene: Scene) -> Scene:
 
 
 def setting_of(scene: Scene, level: Level) -> str:
-    """What tells a level's setting from others; levels that change nothing are the scene's own."""
-    own = with_level(scene, level).digest[:16]
-    return f"{own} {level.between} between" if level.between else own
+    """What tells a level's setting from others: the values by which it differs from the scene."""
+    changed = {key: value for key, value in level.values if not same(value, value_of(scene, key))}
+    between = {"between": level.between} if level.between else {}
+    return json.dumps(changed | between, sort_keys=True)
+
+
+def value_of(scene: Scene, key: str) -> Any:
+    """Value of a dotted key of a scene."""
+    section, _, name = key.partition(".")
+    return getattr(getattr(scene, section), name)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values of a key are the same; lists and tuples are alike."""
+    plain_values = [tuple(v) if isinstance(v, list | tuple) else v for v in (one, other)]
+    return plain_values[0] == plain_values[1]
+
+
+BASE = "{}"  # the setting of the scene as it is
 
 
 @dataclass(frozen=True)
@@ -92,7 +109,7 @@ def new_study(scene: Scene, found: Sequence[Probe], title: str, scene_file: str)
     own = plain(scene)
     machine = f"{provenance.cpu()}, {provenance.program()}"
     return CostStudy(
-        own.effective_toml(), own.digest, title, scene_file, own.digest[:16], [p.label for p in found], np.nan, machine
+        own.effective_toml(), own.digest, title, scene_file, BASE, [p.label for p in found], np.nan, machine
     )
 
 

@@ -73,9 +73,11 @@ def _known(tables: Sequence[KnobErrors]) -> float:
 
 def _price(best: Sequence[Combination], known: float) -> str:
     """What 2 % cost, or what the front reaches, and the price of the next halving of the error."""
-    reached = [g for g in GOALS if best and best[-1].error <= g]
+    if not best or not best[0].levels:
+        return "No mesh but the scene's own was measured. Raise --time-limit."
+    reached = [g for g in GOALS if best[-1].error <= g]
     if not reached:
-        error = percent(best[-1].error) if best else "–"
+        error = percent(best[-1].error)
         return f"No measured mesh brings e_n within 5 %; the best is at {error}. Raise --time-limit for finer ones."
     goal = 0.02 if 0.02 in reached else reached[-1]
     now = next(c for c in best if c.error <= goal)
