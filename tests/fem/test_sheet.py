@@ -13,6 +13,7 @@ from fem.press import Press
 from fem.sheet import Sheet, back_stiffness, relative_compliance
 from fem.spring_bed import SpringBed
 from tests.fem import reference
+from tests.fem.test_linear_pad import e_n
 
 SIZE = (0.050, 0.022, 0.015)
 FOAM = material("blatz_ko", 0.040e6)
@@ -127,3 +128,18 @@ def test_refuses_sheets_that_nothing_holds():
         pad_of(Sheet(0.001, 2e9, 0.3, (0.0, 0.0)), WHOLE, (5, 3, 2))
     with pytest.raises(ValueError, match="positive thickness"):
         Sheet(0.0, 2e9, 0.3, (0.01, 0.01))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("gap", [OVAL, BALL, reference.plane], ids=["cylinder", "sphere", "plane"])
+def test_what_a_rigid_sheet_neglects_stays_below_eight_tenths_of_its_relative_compliance(gap):
+    """What `study.sheet_level` chooses by, up to 13 N."""
+    forces = [1.0, 5.0, 13.0]
+    rigid = [e_n(state) for state in Press(pad_of(None, elements=(16, 8, 5)), gap).ladder(forces)]
+    lines = (tuple(np.linspace(0.0, side / 2, n // 2 + 1)) for side, n in zip(SIZE, (16, 8), strict=False))
+    x, y = lines
+    for modulus in (3e10, 5e9):
+        sheet = Sheet(0.001, modulus, 0.3, (0.02, 0.01))
+        compliance = relative_compliance(x, y, (True, True), sheet, SIZE[2] / FOAM.young_modulus)
+        for expected, state in zip(rigid, Press(pad_of(sheet, elements=(16, 8, 5)), gap).ladder(forces), strict=True):
+            assert abs(e_n(state) / expected - 1.0) <= 0.8 * compliance
