@@ -10,14 +10,14 @@ import h5py
 import numpy as np
 import pytest
 
-from study import model, pictures, pipeline, report, wall, window
+from study import model, pictures, pipeline, wall, window
 from study.build import build_object
 from study.layout import DONE
 from study.overview import RULE, scene_text
 from study.plan import make_plan, memory, plan_text
 from study.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
 from study.record import blank, crc32, record
-from study.report import cases, wall_words, words
+from study.report import cases, wall_words, words, writing
 from study.report.data import Data
 from study.report.levels import level_picture, rule
 from study.report.outline import read_scene
@@ -108,7 +108,7 @@ def page(can, solved):
     with open_result(can) as result, pictures.style():
         data, mu = Data(result), solved[0].friction.mu
         told = words.verdict(data, mu) + words.best_tables(data)
-        return Page(told + report.wall_section(data, solved[0], data.best) + report.effects(data, data.best))
+        return Page(told + writing.wall_section(data, solved[0], data.best) + writing.effects(data, data.best))
 
 
 def changed(path, folder, name, values, index=...):
