@@ -69,7 +69,7 @@ def fake_ladder(options):
             if row == options.stuck:
                 all(itertools.repeat(True))  # never comes back, and hears no signal
             if row == options.greedy:
-                held = [np.ones(10**7) for _ in range(10**4)]  # 800 GB
+                held = [np.empty(10**7) for _ in range(10**4)]  # 800 GB
                 del held
             if row == options.unplug:  # what a quota or a lost disk answers from now on
                 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))

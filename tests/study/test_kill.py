@@ -1,0 +1,131 @@
+"""Kill -9 of one rank, of all ranks and of mpirun at random moments: no result is lost and every file goes on."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import pytest
+
+from study.environment import launch_environment
+from study.layout import DONE, MISSING
+from study.lock import holder
+from study.store import open_result, rows_of
+from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
+
+pytestmark = [pytest.mark.long, pytest.mark.launches]
+VICTIMS = ("one rank", "all ranks", "mpirun")
+KILLS, FILES = 6, 9  # of each file, and how many files
+OPTIONS = ("--stations", 14, "--retry-failed")  # two kills in one case would mark it as deadly
+
+
+def ranks_of(process):
+    """Processes that an mpirun has started."""
+    return [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+
+
+def kill(process, victim, chance):
+    """End some of it at once, then see the rest out; whether there was somebody to kill."""
+    ranks = ranks_of(process) if process.poll() is None else []
+    chosen = {"one rank": chance.sample(ranks, min(1, len(ranks))), "all ranks": ranks, "mpirun": [process.pid]}[victim]
+    for pid in chosen if ranks else ():
+        os.kill(pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    return bool(ranks)
+
+
+def done_rows(path):
+    """Rows that are marked done; each must match its checksum, and ordinary tools must open the file."""
+    if not path.exists():
+        return set()
+    with h5py.File(path, "r") as file:
+        assert file.attrs["default"]
+    for tool in (["h5ls", "-r"], ["h5dump", "-d", "/study/status/code"]):
+        if shutil.which(tool[0]):
+            assert subprocess.run([*tool, path], capture_output=True, timeout=60).returncode == 0
+    with open_result(path) as result:
+        layout = result.layout
+    rows = [(row, values) for row, state, values in rows_of(path, layout) if state == DONE]
+    assert not [row for row, values in rows if values is None]
+    return {row for row, _ in rows}
+
+
+def count_done(path):
+    if not path.exists():
+        return 0
+    with open_result(path) as result:
+        return int((result.status == DONE).sum())
+
+
+def killed_again_and_again(path, number, chance):
+    """Kill a study several times, then let it finish; how many kills met it, and rows done when they did."""
+    met, progress = 0, [set()]
+    for k in range(KILLS):
+        process = start(2 + number % 2, path, *OPTIONS, "--delay", 0.03)
+        if k or number % 3:  # in the middle of the work, else anywhere from the start on
+            before = count_done(path)
+            wait_for(lambda: process.poll() is not None or count_done(path) > before)  # noqa: B023
+            time.sleep(chance.uniform(0.0, 0.3))
+        else:
+            time.sleep(chance.uniform(0.1, 1.2))
+        met += kill(process, VICTIMS[(number + k) % 3], chance)
+        wait_for(lambda: not holder(path))  # ranks outlive their mpirun
+        progress.append(done_rows(path))
+    code, _, errors = study(0, path, *OPTIONS)
+    assert code == 0, errors
+    return met, progress
+
+
+def test_no_kill_loses_a_result(once, shared_path):
+    seed = 20240721
+    whole = shared_path / "whole.hdf"
+    assert once(study, 0, whole, *OPTIONS)[0] == 0
+    expected = once(contents, whole)
+
+    def campaign():
+        chance, met, kept = random.Random(seed), 0, 0
+        for number in range(FILES):
+            path = shared_path / f"{number}.hdf"
+            hits, progress = killed_again_and_again(path, number, chance)
+            for before, after in pairwise(progress):
+                assert before <= after, f"rows {sorted(before - after)} of {path} were lost"
+            assert differing(path, expected) == []
+            met, kept = met + hits, kept + len(progress[-1])
+        return met, kept
+
+    met, kept = once(campaign)
+    print(f"{met} kills, {kept} results kept over them")
+    assert met >= 50
+    assert kept > 10 * FILES
+
+
+@pytest.mark.parametrize("victim", VICTIMS)
+def test_a_real_study_goes_on_to_the_same_bits(once, shared_path, victim):
+    path, whole = shared_path / "killed.hdf", shared_path / "whole.hdf"
+    scene = ("-m", "study", "run", "jobs/smoke.toml", "--set", "candidates.stations_mm=[-10, 0, 10]", "-o")
+
+    def interrupt():
+        words = command(2, *scene, path)
+        process = subprocess.Popen(
+            words[words.index("mpirun") :], env=launch_environment(), cwd=ROOT, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        wait_for(lambda: process.poll() is not None or count_done(path) > 0, 60)
+        kill(process, victim, random.Random(1))
+        wait_for(lambda: not holder(path))
+        done_rows(path)
+        return launch(0, *scene, path), launch(0, *scene, whole)
+
+    (code, _, errors), (first, _, _) = once(interrupt)
+    assert (code, first) == (0, 0), errors
+    assert once(differing, path, once(contents, whole)) == []
+    with open_result(path) as result:
+        assert not (result.status == MISSING).any()
+        assert len(result.sessions) == 2

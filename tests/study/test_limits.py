@@ -1,0 +1,308 @@
+"""What one case, one rank or one disk can do to a study: fail its own cases, end the run with a sentence, no more."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from study import memory
+from study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
+from study.layout import DONE, FAILED, MISSING
+from study.memory import available, limited_memory
+from study.standing import Standing
+from study.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
+from study.store import open_result
+from tests.study.launching import contents, differing, start, study, wait_for
+
+
+def wait():
+    """A solver that goes on for ever, but comes back to Python now and then."""
+    while True:
+        time.sleep(0.01)
+
+
+def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
+    with Stopper(lambda: None, 0.1) as stopper:
+        with pytest.raises(TimeLimitError), stopper.case():
+            wait()
+        time.sleep(0.15)  # between two cases nothing is raised
+        with stopper.case():
+            pass
+        with pytest.raises(TimeLimitError), stopper.case():
+            wait()
+    assert signal.getsignal(signal.SIGALRM) == signal.SIG_DFL
+
+
+def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
+    monkeypatch.setattr("study.stopping.AGAIN", 0.05)
+
+    def deaf():
+        with contextlib.suppress(TimeLimitError):  # as what is raised inside a finaliser is
+            wait()
+        wait()
+
+    with Stopper(lambda: None, 0.05) as stopper, pytest.raises(TimeLimitError), stopper.case():
+        deaf()
+
+
+def test_a_signal_stops_before_the_time_limit_does(monkeypatch):
+    monkeypatch.setitem(GRACE, signal.SIGUSR1, 0.05)
+    told = []
+
+    def interrupted():
+        os.kill(os.getpid(), signal.SIGUSR1)
+        wait()
+
+    with Stopper(lambda: told.append("stop"), 60.0) as stopper, pytest.raises(AbandonedError), stopper.case():
+        interrupted()
+    assert (told, stopper.name) == (["stop"], "SIGUSR1")
+
+
+def test_memory_is_bounded_and_the_bound_goes_away():
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    with limited_memory(0.3, 1):
+        np.empty(10**7)  # 80 MB
+        with pytest.raises(MemoryError):
+            np.empty(10**8)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+    np.empty(10**8)
+
+
+def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path, monkeypatch):
+    files = {"memory.max": "8000000000", "memory.current": "7000000000", "memory.stat": "inactive_file 3000000000\n"}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(memory, "CGROUPS", tmp_path)
+    ask = memory._lines
+    asked = {"/proc/self/cgroup": ["0::/"], "/proc/meminfo": ["MemAvailable:   9000000 kB"]}
+    monkeypatch.setattr(memory, "_lines", lambda path: asked.get(str(path)) or ask(path))
+    assert available() == 4e9  # 8 - 7 + 3 GB; the machine itself would have 9.2
+    (tmp_path / "memory.max").write_text("max\n")
+    assert available() == 1024 * 9e6
+
+
+def test_a_file_that_was_moved_or_replaced_is_noticed(tmp_path):
+    path = tmp_path / "out.hdf"
+    path.write_text("1")
+    standing = Standing(path)
+    standing.check()
+    path.rename(tmp_path / "moved.hdf")
+    with pytest.raises(StudyError, match="was moved or removed while the run was writing it"):
+        standing.check()
+    path.write_text("2")
+    with pytest.raises(StudyError, match="was replaced by another file") as refusal:
+        standing.check()
+    assert refusal.value.code == CANNOT_WRITE
+    with pytest.raises(StudyError, match=r"cannot be written any more \(No space.*the same command goes on"):
+        with standing.writing():
+            raise OSError("No space left on device")
+
+
+# --- under mpirun ----------------------------------------------------------------------------------------------------
+
+
+def states(path):
+    with open_result(path) as result:
+        return result.status.ravel(), result.messages.ravel()
+
+
+def whole(folder, *words):
+    """What an undisturbed run writes."""
+    assert study(0, folder / "whole.hdf", *words)[0] == 0
+    return contents(folder / "whole.hdf")
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize(
+    ("how", "ranks", "text"),
+    [
+        ("hang", 2, "not solved within 3 s"),
+        ("stuck", 3, "did not come back to Python within 6 s, so its rank was given up"),
+        ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
+    ],
+)
+def test_one_case_fails_with_its_reason_and_the_others_go_on(once, shared_path, how, ranks, text):
+    path = shared_path / f"{how}.hdf"
+    code, output, errors = once(study, ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
+    assert code == SOME_FAILED, errors
+    codes, messages = once(states, path)
+    # the case, the force above it, and both for the other candidate of the unit
+    assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
+    assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
+    assert messages[13].startswith(text)
+    assert messages[14].startswith(f"not tried, because a lower force of this candidate failed: {text}")
+    assert "32 of 36 cases done, 4 failed" in output
+    assert once(study, 0, path, "--retry-failed")[0] == 0
+    assert once(differing, path, once(whole, shared_path)) == []
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(once, shared_path):
+    path = shared_path / "alone.hdf"
+    for _ in range(2):
+        code, _, errors = once(study, 0, path, "--stuck", 13, "--limit", 1)
+        assert code == 1
+        assert "Timeout (0:00:02)!" in errors  # and where it was in Python
+        assert "in solve_unit" in errors
+    assert once(study, 0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
+    assert [row for row, code in enumerate(once(states, path)[0]) if code == FAILED] == [13, 14, 16, 17]
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
+def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(once, shared_path, how, ranks):
+    path = shared_path / "lost.hdf"
+    code, _, errors = once(study, ranks, path, f"--{how}", 13)
+    assert code == CANNOT_WRITE, errors
+    assert errors.count("error: ") - errors.count("mca_fbtl_posix_pwritev: error") == 1
+    assert "Traceback" not in errors
+    if how == "unplug":
+        assert "cannot be written any more" in errors
+        assert (once(states, path)[0] == DONE).any()
+    else:
+        assert "was moved or removed" in errors
+    assert once(study, 2, path)[0] == 0
+    assert once(differing, path, once(whole, shared_path)) == []
+
+
+@pytest.fixture
+def small_disk(once, shared_path):
+    """A file system of 3 MB."""
+
+    def mount():
+        words = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", shared_path]
+        return subprocess.run(words, capture_output=True).returncode == 0
+
+    if not once(mount):
+        pytest.skip("no right to mount a small file system")
+    yield shared_path
+    once(lambda: subprocess.run(["umount", "-l", shared_path], check=True))
+
+
+def fill(folder):
+    with (folder / "filler").open("wb") as file:
+        try:
+            while file.write(b"x" * 4096):
+                file.flush()
+        except OSError:
+            pass
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_a_disk_that_fills_up_during_the_run_does_no_harm(once, small_disk):
+    """All space of the file was taken when it was made."""
+    path = small_disk / "full.hdf"
+
+    def run():
+        process = start(2, path, "--delay", 0.15)
+        wait_for(lambda: path.exists() and (states(path)[0] == DONE).sum() >= 2)
+        fill(small_disk)
+        _, errors = process.communicate(timeout=60)
+        return process.returncode, errors
+
+    code, errors = once(run)
+    assert code == 0, errors
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(once, small_disk):
+    """The file's space is given back by hand, as a file system that copies on write would have to take it anew."""
+    path = small_disk / "holes.hdf"
+
+    def run():
+        process = start(2, path, "--delay", 0.15)
+        wait_for(lambda: path.exists() and (states(path)[0] == DONE).sum() >= 6)
+        process.send_signal(signal.SIGUSR1)
+        process.communicate(timeout=60)
+        before = states(path)[0]
+        subprocess.run(["cp", "--sparse=always", path, small_disk / "sparse"], check=True)
+        (small_disk / "sparse").replace(path)
+        fill(small_disk)
+        refused = study(2, path)
+        after = states(path)[0]
+        (small_disk / "filler").unlink()
+        return before, refused, after, study(2, path)
+
+    before, (code, _, errors), after, (last, _, _) = once(run)
+    assert code == CANNOT_WRITE, errors
+    assert "Traceback" not in errors
+    assert (after[before == DONE] == DONE).all()
+    assert last == 0
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
+    path = small_disk / "readonly.hdf"
+
+    def run():
+        assert study(0, path)[0] == 0
+        subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+        answers = study(2, path), study(2, small_disk / "new.hdf")
+        subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
+        return answers
+
+    for code, _, errors in once(run):
+        assert code == CANNOT_WRITE, errors
+        assert errors.count("error: ") == 1
+        assert "Read-only file system" in errors
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
+def test_more_ranks_than_cores_or_ladders(once, shared_path, stations, ranks):
+    path = shared_path / "many.hdf"
+    code, _, errors = once(study, ranks, path, "--stations", stations)
+    assert code == 0, errors
+    assert once(differing, path, once(whole, shared_path, "--stations", stations)) == []
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("ranks", [3, 4])
+def test_an_exception_on_one_rank_ends_all_with_one_traceback(once, shared_path, ranks):
+    code, _, errors = once(study, ranks, shared_path / "bug.hdf", "--bug", 2)
+    assert code == 70
+    assert errors.count("Traceback (most recent call last)") == 1
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1"])
+def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(once, shared_path, name):
+    """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""
+    path = shared_path / "stopped.hdf"
+
+    def stop():
+        process = start(2, path, "--hang", 14, "--delay", 0.1)
+        wait_for(lambda: path.exists() and states(path)[0][13] == DONE)
+        began = time.monotonic()
+        process.send_signal(getattr(signal, name))
+        if name == "SIGUSR1":  # a second signal: there is no time after all
+            time.sleep(0.3)
+            process.send_signal(signal.SIGUSR1)
+        process.communicate(timeout=60)
+        return process.returncode, time.monotonic() - began
+
+    code, seconds = once(stop)
+    assert code == (1 if name == "SIGTERM" else STOPPED)
+    assert seconds < 20  # the case would take a minute
+    with open_result(path) as result:
+        assert result.sessions[0]["reason"].startswith("stopped by SIG")
+        missing = result.status.ravel() == MISSING
+        assert not result.read("status/attempts").ravel()[missing].any()
+    assert once(study, 0, path)[0] == 0
+    assert once(differing, path, once(whole, shared_path)) == []
