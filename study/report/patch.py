@@ -75,9 +75,9 @@ def patch_picture(data: Data, index: tuple[int, ...]) -> Picture | None:
     area, peak = data.at("contact_area", index) * 1e6, float(top)
     said = f"largest pressure {number(peak)} kPa, contact area {number(area)} mm²"
     darts = (
-        "Small arrows: friction of the faces, each in its own plane, against a slip of the object along x and a turn"
-        " about z; their length is its size. " if directed else ""
-    )  # fmt: skip
+        "Small arrows: friction that the pad's faces feel, each in its own plane, while the object slips along x or "
+        "turns about z; their length is its size. " * directed
+    )
     caption = (
         f"{data.place(index, force=True)}: {said}. Faces that touch nothing are pale. {darts}x and y are the axes of "
         "the contact frame at its origin (ring); friction is given along them, and about their normal z. Right: the "

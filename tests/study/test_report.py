@@ -26,7 +26,7 @@ from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
 from study.report.data import Data, number
 from study.report.outline import read_scene, shape_outline, slice_polygon
-from study.report.patch import cells
+from study.report.patch import cells, friction_directions
 from study.report.writing import build, write_report
 from study.result import CaseResult
 from study.scene.shapes import EllipticCylinder, Sphere
@@ -410,6 +410,17 @@ def test_faces_fill_the_patch_without_gaps():
     for line in (points[:3], np.stack([points[:, 0], points[:, 0]], axis=1) * [1, 0]):
         with pytest.raises(ValueError, match="make no patch"):
             cells(line)
+
+
+def test_friction_acts_in_the_plane_of_every_face():
+    """A face turned by t about y takes a slip along x as (cos t, 0, -sin t), one across the slip takes none of it."""
+    t = 0.3
+    normal = np.array([[0.0, 0, 1], [np.sin(t), 0, np.cos(t)], [1, 0, 0]])
+    place = np.array([[0.0, 2, 0], [5.0, 0, 0], [0, 0, 0]])
+    e = friction_directions(place, normal, np.zeros(3), np.eye(3), "x")
+    assert e == pytest.approx(np.array([[1.0, 0, 0], [np.cos(t), 0, -np.sin(t)], [0, 0, 0]]))
+    turned = friction_directions(place, normal, np.zeros(3), np.eye(3), "turn")
+    assert turned == pytest.approx(np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, 0]]))
 
 
 def test_labels_are_pushed_apart_and_stay_inside():
