@@ -120,8 +120,12 @@ def _matters(table: KnobErrors, i: int) -> bool:
 
 
 def best_of(made: Sequence[Combination]) -> list[Combination]:
-    """Those that no other beats in both predicted time and error, the cheapest first."""
-    return [made[i] for i in front([c.seconds for c in made], [c.error for c in made])]
+    """Those that no other beats in both predicted time and error, the cheapest first, by more than noise."""
+    kept: list[Combination] = []
+    for i in front([c.seconds for c in made], [c.error for c in made]):
+        if not kept or made[i].error < (1.0 - NOISE) * kept[-1].error:
+            kept.append(made[i])
+    return kept
 
 
 def reference(study: CostStudy, tables: Sequence[KnobErrors]) -> FloatArray:

@@ -40,7 +40,7 @@ def probes(scene: Scene, named: Sequence[str] = (), count: int = 3) -> list[Prob
     forces = scene.load.normal_force
     few = tuple(dict.fromkeys((forces[0], forces[(len(forces) - 1) // 2], forces[-1])))
     units = sweep.units(scene, lambda point: point.axis_symmetry)
-    chosen = [_named(units, scene.candidates.labels, name) for name in dict.fromkeys(named)] or _spread(units, count)
+    chosen = [_named(units, scene.candidates.labels, name) for name in dict.fromkeys(named)] or spread(units, count)
     return [Probe(f"{unit.candidate.label}{_point(scene, unit)}", unit, few) for unit in chosen]
 
 
@@ -56,7 +56,7 @@ def _named(units: Sequence[Any], labels: Sequence[str], name: str) -> Any:
     )
 
 
-def _spread(units: Sequence[Any], count: int) -> list[Any]:
+def spread(units: Sequence[Any], count: int) -> list[Any]:
     """Units at quantiles of the e_n that a Winkler foundation gives at the highest force: 1/6, 1/2, 5/6 for three."""
     step = -(-len(units) // MOST_LOOKED_AT)
     seen = [(estimate, unit) for unit in units[::step] if (estimate := _estimate(unit)) is not None]
