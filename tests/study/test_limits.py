@@ -164,7 +164,7 @@ def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(once, shared_path
     path = shared_path / "lost.hdf"
     code, _, errors = once(study, ranks, path, f"--{how}", 13)
     assert code == CANNOT_WRITE, errors
-    assert errors.count("error: ") - errors.count("mca_fbtl_posix_pwritev: error") == 1
+    assert errors.count("error: ") == 1  # Open MPI adds lines of its own
     assert "Traceback" not in errors
     if how == "unplug":
         assert "cannot be written any more" in errors
@@ -190,11 +190,9 @@ def small_disk(once, shared_path):
 
 
 def fill(folder):
-    with (folder / "filler").open("wb") as file:
-        try:
-            while file.write(b"x" * 4096):
-                file.flush()
-        except OSError:
+    """Take all space that is left."""
+    with contextlib.suppress(OSError), (folder / "filler").open("wb", buffering=0) as file:
+        while file.write(b"x" * 4096):
             pass
 
 
