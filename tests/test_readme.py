@@ -1,4 +1,4 @@
-"""Every command of the README does what the README says."""
+"""Every command of the README and of docs/ does what it says."""
 
 from __future__ import annotations
 
@@ -14,39 +14,44 @@ import pytest
 from study.environment import launch_environment, mpirun
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
-BLOCKS = [block.strip().splitlines() for block in re.findall(r"^```\n(.*?)^```$", README, re.M | re.S)]
-SOFTJAW = [[line for line in block if "softjaw " in line] for block in BLOCKS if not block[0].startswith("conda")]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TEXT = "\n".join(page.read_text() for page in PAGES)
+BLOCKS = [block.strip().splitlines() for block in re.findall(r"^```\n(.*?)^```$", TEXT, re.M | re.S)]
+TYPED = re.compile(r"^(mkdir|cat) |softjaw ")
+SOFTJAW = [[line for line in block if TYPED.search(line)] for block in BLOCKS if not block[0].startswith("conda")]
 FIRST = "mpirun -n 2 softjaw run jobs/smoke.toml"
+SOLVES = re.compile(r"softjaw (figure|cost) ")
 
 
 def slow(block: list[str]) -> bool:
     """Whether a block solves something, except for the first that a reader tries."""
-    return any("softjaw run " in line and FIRST not in line for line in block)
+    return any(("softjaw run " in line and FIRST not in line) or SOLVES.search(line) for line in block)
 
 
 pytestmark = pytest.mark.launches
 
 
-def words(line: str) -> list[str]:
-    """The command with this interpreter's softjaw and an mpirun that this machine accepts."""
-    given = shlex.split(line)
-    if given[0] == "mpirun":
-        given = [*mpirun(int(given[2])), *given[3:]]
-    at = given.index("softjaw")
-    return [*given[:at], sys.executable, "-m", "study", *given[at + 1 :]]
+def as_typed(line: str) -> str:
+    """The line with an mpirun that this machine accepts."""
+    return re.sub(r"^mpirun -n (\d+)", lambda found: shlex.join(mpirun(int(found[1]))), line)
 
 
 def run_in(folder: Path, block: list[str]) -> None:
-    """Run the lines of a block one after the other, each to exit code 0."""
+    """Type the lines of a block into a shell one after the other, each to exit code 0."""
     (folder / "jobs").symlink_to(ROOT / "jobs")
+    programs = folder / "bin"
+    programs.mkdir()
+    (programs / "softjaw").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m study "$@"\n')
+    (programs / "softjaw").chmod(0o755)
+    path = f"{programs}:{os.environ['PATH']}"
+    env = {**launch_environment(), "PYTHONPATH": str(ROOT), "PATH": path, "HOME": str(folder)}
     for line in block:
         done = subprocess.run(
-            words(line), cwd=folder, env={**launch_environment(), "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, timeout=300, check=False,
+            ["bash", "-c", as_typed(line)], cwd=folder, env=env, stdin=subprocess.DEVNULL, capture_output=True,
+            text=True, timeout=900, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
-        for made in re.findall(r"-o (\S+)", line):
+        for made in re.findall(r"-o (\S+\.\w+)", line):
             assert (folder / made).stat().st_size > 1000
 
 
@@ -63,7 +68,7 @@ def test_commands_that_take_longer(block, tmp_path):
     run_in(tmp_path, block)
 
 
-MADE = sorted(set(re.findall(r"^make [a-z].*?(?=  +#|$)|(?<=`)make [^`]+(?=`)", README, re.M)))
+MADE = sorted(set(re.findall(r"^make [a-z].*?(?=  +#|$)|(?<=`)make [^`]+(?=`)", TEXT, re.M)))
 
 
 @pytest.mark.parametrize("command", MADE)
@@ -85,7 +90,7 @@ for command in sys.argv[1:]:
 """
 
 
-PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", README)))
+PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", TEXT)))
 
 
 def test_the_test_files_that_it_names_exist():
@@ -103,6 +108,6 @@ def test_pytest_finds_the_tests():
 
 
 def test_every_path_that_it_names_exists():
-    named = set(re.findall(r"(?<=[`(])((?:jobs|tests|docs|study)/[\w./-]+\.\w+)(?=[`)])", README))
+    named = set(re.findall(r"(?<=[`(])((?:jobs|tests|docs|study)/[\w./-]+\.\w+)(?=[`)])", TEXT))
     assert len(named) > 5
     assert not [path for path in sorted(named) if not (ROOT / path).exists()]
