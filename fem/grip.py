@@ -144,13 +144,18 @@ class Grip:
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
-        """Say that a wall collapsed where that is why no further state was found."""
+        """Say that a wall collapsed where that is why no further state was found, or that it may have."""
         left, force = self.opening.last
         if left < limit:
-            raise CheckError(
-                f"the wall collapsed: beyond {force:.3g} N, where its opposite sides have come {1 - left:.0%} of their "
-                f"distance closer, no equilibrium was found ({error})"
-            ) from error
+            closer = f"its opposite sides have come {1 - left:.0%} of their distance closer"
+            if left < FOLDED:
+                text = f"the wall collapsed: beyond {force:.3g} N, where {closer}, no equilibrium was found"
+            else:
+                text = (
+                    f"no equilibrium was found beyond {force:.3g} N, where {closer}: either the wall gives way there, "
+                    "or Newton's method did not find which nodes touch; try a finer mesh or shorter pads"
+                )
+            raise CheckError(f"{text} ({error})") from error
 
     def _fall_back(self) -> None:
         """Go on with nodal gaps."""

@@ -36,13 +36,16 @@ class SplineSurface:
     closed: bool
 
     def at(self, theta: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Points ``(n, 3)`` [m] and unit normals ``(n, 3)``, the cross product of the theta and s directions."""
+        """Points ``(n, 3)`` [m] and unit normals ``(n, 3)``, the cross product of the theta and s directions.
+
+        A normal is zero where the surface has none: where a line of the grid shrinks to a point on the axis.
+        """
         theta, s = np.broadcast_arrays(np.asarray(theta, float), np.asarray(s, float))
         D = np.empty((theta.size, 6, 3))
         for n, pair in enumerate(zip(theta.ravel(), s.ravel(), strict=True)):
             evaluate(self.theta, self.s, self.coefficients, self.closed, *pair, D[n])
         normal = np.cross(D[:, 1], D[:, 2])
-        return D[:, 0], normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        return D[:, 0], normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
 def spline_surface(theta: ArrayLike, s: ArrayLike, points: ArrayLike, closed: bool) -> SplineSurface:
