@@ -30,9 +30,9 @@ def effects_of(
 
     The indicators are those that a choice between levels is made by: the dent that a linear wall would get at the
     largest force, over the wall's thickness, for the object, the largest strain for the pad, the compliance of the
-    sheet over that of the pad for the sheet, the share of the
-    normal force that the tilt of the loaded normals takes away for the friction model, the mean share of the three
-    dropped components for the wrench, the radial misfit for the limit surface.
+    sheet over that of the pad for the sheet, the share of the normal force that the tilt of the loaded normals takes
+    away for the friction model, the mean share of the three dropped components for the wrench, the radial misfit for
+    the limit surface.
     """
     wanted = scene.effects
 

@@ -7,31 +7,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
-from fem.coupling import CoupledProblem, way
 from fem.errors import CheckError, ConvergenceError
 from fem.extract import half_turned, mirrored
 from fem.grip import Grip, Gripped
 from fem.grip_problem import GripProblem
 from fem.linear_pad import linearised
-from fem.linear_press import linear_press
-from fem.pad import Pad
-from fem.press import Press, Pressed, Settings
+from fem.press import Press, Pressed
 from fem.spring_bed import SpringBed
 from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
 from friction.patch import ContactPatch
-from study import model
 from study.build import pad_shape
 from study.candidates import turn_of_pose
 from study.contact import Contact
 from study.model import Finger
 from study.pad_level import PadLevel, choose_pad_level, level_on_wall
+from study.pressing import pad_of, press_of, settings
 from study.scene import Scene
-from study.sheet_level import sheet_level
 from study.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
 
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
@@ -73,7 +68,7 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
         return OnRigid(scene, fingers, poses, None)
     _refuse_along_axis(fingers)
     held = _grasp(scene, fingers, False)
-    pad = _pad(scene, held.pad_symmetry, scene.accuracy.contact, False)
+    pad = pad_of(scene, held.pad_symmetry, scene.accuracy.contact, False)
     travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
     level = choose_level(scene, held, travel)
     if level.number == RIGID:
@@ -90,8 +85,8 @@ class OnRigid:
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
         self.pad_level = choose_pad_level(scene, solved)
-        press = _linear_press if self.pad_level.linear else _press
-        self.presses = [[press(scene, f, coarser) for coarser in meshes] for f in solved]
+        linear = self.pad_level.linear
+        self.presses = [[press_of(scene, f, coarser, linear) for coarser in meshes] for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
@@ -175,32 +170,6 @@ def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
         )
 
 
-def _settings(scene: Scene) -> Settings:
-    return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
-
-
-def _pad(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
-    return model.pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
-
-
-def _press(scene: Scene, finger: Finger, coarser: bool) -> Press:
-    elements = pad_shape(scene.gripper, coarser).elements
-    symmetry = model.usable_symmetry(scene, finger, elements)
-    wanted, nodal = (_pad(scene, symmetry, rule, coarser) for rule in (scene.accuracy.contact, "nodal"))
-    if scene.effects.friction_pressure_coupling == "tangential":
-        problem = partial(CoupledProblem, mu=scene.friction.mu)
-        return Press(wanted, finger.gap, dict(scene.petsc), None, _settings(scene), problem_of=problem, way=way)
-    return Press(wanted, finger.gap, dict(scene.petsc), None if nodal is wanted else nodal, _settings(scene))
-
-
-def _linear_press(scene: Scene, finger: Finger, coarser: bool) -> Press:
-    elements = pad_shape(scene.gripper, coarser).elements
-    symmetry, rule = model.usable_symmetry(scene, finger, elements), scene.accuracy.contact
-    fallback = None if rule == "nodal" else linearised(_pad(scene, symmetry, "nodal", coarser))
-    pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
-    return linear_press(pad, finger.gap, fallback, _settings(scene))
-
-
 def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     """Grasp frame and the planes of symmetry that meshes and scene allow."""
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
@@ -227,7 +196,7 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarse
     wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
     def problem(rule: str) -> GripProblem:
-        pad = _pad(scene, held.pad_symmetry, rule, coarser)
+        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
         if scene.effects.pad == "linear":
             pad = linearised(pad)
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
@@ -235,7 +204,7 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarse
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
     rule = scene.accuracy.contact
     fallback = None if rule == "nodal" else lambda: problem("nodal")
-    return Grip(problem(rule), gaps, held.mirrors, dict(scene.petsc), _settings(scene), fallback)
+    return Grip(problem(rule), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
 
 
 def _gap(finger: Finger, turned: bool):
