@@ -50,6 +50,7 @@ PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 
 
+OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 PRINTING = re.compile("monitor|view|converged_reason")
 
 
@@ -173,6 +174,8 @@ class NonlinearSolver:
         ------
         ConvergenceError
             When the solver stops for any other reason.
+        MemoryError
+            When there is no memory for the factors.
         """
         snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
         _, _, _, limit = snes.getTolerances()
@@ -191,12 +194,19 @@ class NonlinearSolver:
             self.seconds.total += time.perf_counter() - start
             self.seconds.factorisation += factorisation_seconds() - factor
         reason, done = snes.getConvergedReason(), snes.getIterationNumber()
+        if reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE and self._out_of_memory():
+            snes.getKSP().getPC().reset()
+            raise MemoryError(f"for the factors of {self.problem.size} unknowns")
         if reason <= 0:
             raise ConvergenceError(
                 f"the {self.prefix.rstrip('_')} solve stopped with {REASONS.get(reason, reason)} after {done} "
                 f"iterations at residual {snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
             )
         return self._x.array.copy(), done
+
+    def _out_of_memory(self) -> bool:
+        factors = self._snes.getKSP().getPC()
+        return factors.getFactorSolverType() == "mumps" and factors.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY
 
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""

@@ -8,10 +8,13 @@ import resource
 import signal
 import subprocess
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
+from fem.petsc import NonlinearSolver
 from study import memory
 from study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from study.layout import DONE, FAILED, MISSING
@@ -73,6 +76,23 @@ def test_memory_is_bounded_and_the_bound_goes_away():
             np.empty(10**8)
     assert resource.getrlimit(resource.RLIMIT_AS) == before
     np.empty(10**8)
+
+
+@pytest.mark.long
+def test_factors_that_find_no_memory_say_so_and_the_next_solve_works():
+    """36^3 unknowns of a Laplacian take more than 100 MB; MUMPS alone would call the system one that diverged."""
+    second = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(36, 36))
+    A = sp.kronsum(sp.kronsum(second, second), second).tocoo()
+    problem = SimpleNamespace(
+        size=A.shape[0], rows=A.row.astype(np.int32), columns=A.col.astype(np.int32),
+        residual=lambda x: A @ x - 1.0, tangent=lambda x: A.data, shorten=lambda x, step: 1.0,
+    )  # fmt: skip
+    solver = NonlinearSolver(problem)
+    with limited_memory(0.02, 1), pytest.raises(MemoryError, match="for the factors of 46656 unknowns"):
+        solver.solve(np.zeros(problem.size), 1e-6)
+    x, _ = solver.solve(np.zeros(problem.size), 1e-6)
+    assert np.linalg.norm(A @ x - 1.0) < 1e-6
+    solver.destroy()
 
 
 def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path, monkeypatch):
