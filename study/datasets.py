@@ -39,7 +39,7 @@ class Dataset:
 class Column:
     """One case's share of a dataset; ``counted`` columns enter the row's checksum, timings do not.
 
-    ``flat`` ones stand in the order of the rows, ``sampled`` ones are stored for some candidates only.
+    ``flat`` ones stand in the order of the rows, those ``among`` some candidates are stored for these only.
     """
 
     key: str
@@ -49,7 +49,7 @@ class Column:
     fill: Any
     counted: bool = True
     flat: bool = False
-    sampled: bool = False
+    among: str = ""
 
 
 def columns_of(layout: Any) -> Iterator[Column]:
@@ -62,7 +62,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         elif q.group == "maps":
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", (), f8, np.nan)
         else:
-            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, q.group != "work", sampled=q.sampled)
+            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, q.group != "work", among=q.among)
     for name in EFFECTS:
         for part, dtype, fill in (("level", "i1", -1), ("indicator", "<f8", np.nan), ("reason", "i1", -1)):
             yield Column(f"effects/{name}_{part}", f"{ROOT}/effects/{name}_{part}", (), np.dtype(dtype), fill)
@@ -80,9 +80,9 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         q = described.get(c.key) or described.get(c.key.rpartition("/")[0])
         attributes = _describe(q, c.key) if q else _describe_effect(c.key)
         lead, scales = ((layout.rows,), ("row",)) if c.flat else (layout.shape, layout.names)
-        if c.sampled:
-            lead = (*lead[:-3], len(layout.sampled), lead[-1])
-            scales = (*scales[:-3], "sampled", scales[-1])
+        if c.among:
+            lead = (*lead[:-3], len(layout.chosen[c.among]), lead[-1])
+            scales = (*scales[:-3], c.among, scales[-1])
         yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, attributes, scales + _labels(q, c))
     state = {"long_name": "state of the case", "meaning": "0 missing, 1 done, 2 failed", "units": ""}
     yield Dataset(f"{ROOT}/status/code", layout.shape, np.dtype("u1"), MISSING, state, layout.names)
@@ -98,6 +98,8 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         yield Dataset(f"{ROOT}/map/{name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
     if layout.sampled:
         yield from _sample_datasets(layout)
+    if layout.probes:
+        yield _numbers(f"{ROOT}/probes/candidate", "candidates that are solved again", len(layout.probes), "probe")
     lengths = dict(zip(layout.names, layout.shape, strict=True))
     for d in layout.derived:
         attributes = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
@@ -113,9 +115,14 @@ def _sample_datasets(layout: Any) -> Iterator[Dataset]:
     about = {"units": "", "long_name": "sampled motions", "definition": text}
     shape = (layout.samples, 3)
     yield Dataset(f"{ROOT}/wrenches/motion", shape, np.dtype("<f8"), np.nan, about, ("sample", "component"))
+    what = "candidates whose wrenches are stored"
+    yield _numbers(f"{ROOT}/wrenches/candidate", what, len(layout.sampled), "sampled")
+
+
+def _numbers(path: str, what: str, count: int, scale: str) -> Dataset:
     text = "Number of the candidate, counted over stations and angles, the angle running fastest."
-    about = {"units": "", "long_name": "candidates whose wrenches are stored", "definition": text}
-    yield Dataset(f"{ROOT}/wrenches/candidate", (len(layout.sampled),), np.dtype("<i4"), 0, about, ("sampled",))
+    about = {"units": "", "long_name": what, "definition": text}
+    return Dataset(path, (count,), np.dtype("<i4"), 0, about, (scale,))
 
 
 def _describe(q: Quantity, key: str) -> dict[str, str]:
@@ -147,6 +154,7 @@ def _labels(q: Quantity | None, column: Column) -> tuple[str, ...]:
     finger = ("finger",) if q.per == "finger" else ()
     face = ("face",) if q.group == "patch" else ()
     sample = {"cor_wrench": ("cor",), "wrench": ("sample",), "place": ("wall_place",)}.get(q.name, ())
+    sample = ("variation",) if q.among == "probe" else sample
     labels = finger + face + (("model",) if q.by_model else ()) + sample
     parts = {6: ("wrench", "wrench_2"), 15: ("monomial",)}.get(column.shape[-1], ("component", "component_2"))
     return labels + parts[: len(column.shape) - len(labels)]

@@ -8,11 +8,12 @@ from study import curvature, window
 from study.cost import stored
 from study.layout import Derived
 from study.scene import Scene
+from study.uncertainty import stored as uncertainty
 
 if TYPE_CHECKING:
     from study.store import ResultWriter
 
-KINDS = (curvature, window)
+KINDS = (curvature, window, uncertainty)
 
 
 def derived(scene: Scene) -> list[Derived]:

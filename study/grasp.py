@@ -78,6 +78,13 @@ def grasp_values(
     return {f"maps/{name}": values for name, values in found.items()}, int(flag)
 
 
+def quality(scene: Scene, obj: Any, contacts: Sequence[Contact]) -> float:
+    """The map ``quality`` of the curved model alone."""
+    size, ellipsoids = lengths(scene, obj, contacts), [c.ellipsoids[MODELS[0]] for c in contacts]
+    closed = score(*(e.semi_axes for e in ellipsoids), size.distance, size.arms, size.torques).quality
+    return closed if max(angles(*contacts)) <= FACING or closed == 0 else _volume(contacts, ellipsoids, size)
+
+
 def _graspit(contacts: Sequence[Contact], model: str, size: Lengths, facing: bool) -> float:
     """Volume with GraspIt!'s 20 points on each ellipsoid; torques over their length decide where the points lie."""
     axes = [c.ellipsoids[model].semi_axes / [1.0, 1.0, size.torques] for c in contacts]

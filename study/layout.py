@@ -69,7 +69,8 @@ class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
-    for the candidates ``sampled``, counted over stations and angles. ``surface`` counts the points and triangles of the
+    for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
+    candidates ``probes``. ``surface`` counts the points and triangles of the
     object, ``front`` the faces along and across a pad, as `study.grid` shows them; zeros where it does not.
     """
 
@@ -85,6 +86,8 @@ class Layout:
     sampled: tuple[int, ...] = ()
     surface: tuple[int, int] = (0, 0)
     front: tuple[int, int] = (0, 0)
+    probes: tuple[int, ...] = ()
+    variations: tuple[str, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -95,7 +98,7 @@ class Layout:
     def quantities(self) -> tuple[Quantity, ...]:
         """All per-case quantities of this file but the patch."""
         has = (*self.has, *[NEEDS[0]] * (self.meshes > 1))
-        return quantities(has, self.cor_grid, self.samples if self.sampled else 0)
+        return quantities(has, self.cor_grid, self.samples if self.sampled else 0, self.variations)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -135,6 +138,8 @@ class Layout:
             parts["wall_place"] = AROUND * ALONG
         if self.sampled:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
+        if self.probes:
+            parts |= {"probe": len(self.probes), "variation": len(self.variations)}
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
     @cached_property
@@ -159,16 +164,22 @@ class Layout:
         count = len(datasets) + len(self.axes) + 16
         return sum(d.nbytes for d in datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
 
+    @property
+    def chosen(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of the candidates that some quantities are stored for alone."""
+        return {"sampled": self.sampled, "probe": self.probes}
+
     @cached_property
-    def _slots(self) -> dict[int, int]:
-        return {candidate: slot for slot, candidate in enumerate(self.sampled)}
+    def _slots(self) -> dict[str, dict[int, int]]:
+        return {name: {number: slot for slot, number in enumerate(own)} for name, own in self.chosen.items()}
 
     def places(self, row: int) -> list[tuple[int, ...] | None]:
         """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
         index = tuple(int(i) for i in np.unravel_index(row, self.shape))
-        slot = self._slots.get(index[-3] * self.shape[-2] + index[-2])
-        among = None if slot is None else (*index[:-3], slot, index[-1])
-        return [(row,) if c.flat else among if c.sampled else index for c in self.columns]
+        number = index[-3] * self.shape[-2] + index[-2]
+        slots = {name: own.get(number) for name, own in self._slots.items()}
+        among = {name: None if slot is None else (*index[:-3], slot, index[-1]) for name, slot in slots.items()}
+        return [(row,) if c.flat else among[c.among] if c.among else index for c in self.columns]
 
     def definitions(self) -> str:
         """The definitions of all quantities of this layout, derived ones included."""
@@ -178,7 +189,8 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface", "front")
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface", "front",
+                 "probes", "variations")  # fmt: skip
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -200,9 +212,11 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
         surface, front = (_pair(options.get(name, (0, 0))) for name in ("surface", "front"))
-        return Layout(
-            tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface, front
-        )
+        probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
+        if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
+            raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
+                      front, probes, variations)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

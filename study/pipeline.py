@@ -20,12 +20,13 @@ from study import model
 from study.build import build_object
 from study.contact import Contact, angles, flags, remark
 from study.effects import effects_of
-from study.grasp import grasp_values
+from study.grasp import grasp_values, quality
 from study.limit_surface import Bound, bound, fit_flag, surface_values
 from study.quantity import MODELS
 from study.result import CaseFailure, CaseResult
 from study.scene import Scene
 from study.solving import Solved, Solver, solver
+from study.uncertainty.probing import Probing
 from study.wall import wall_flags
 from study.weight import safety_factors
 
@@ -39,7 +40,7 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     scene = unit.scene
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in unit.candidate.poses]
-    solving = solver(scene, fingers, unit.candidate.poses)
+    solving, probing = solver(scene, fingers, unit.candidate.poses), Probing(unit)
     try:
         for k, outcome in enumerate(_outcomes(solving, scene.load.normal_force)):
             if isinstance(outcome, CaseFailure):
@@ -55,9 +56,12 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
                 values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
             if scene.accuracy.meshes == 2:
                 values |= _mesh_errors(*zip(*outcome.contacts, strict=True))
+                values |= _quality_error(scene, obj, outcome, values)
             seconds = time.perf_counter() - start
-            yield k, _result(values, outcome, seconds, effects_of(scene, fine, bounds, solving))
+            result = _result(values, outcome, seconds, effects_of(scene, fine, bounds, solving))
+            yield k, replace(result, values=result.values | probing.values())
     finally:
+        probing.close()
         solving.destroy()
 
 
@@ -165,6 +169,11 @@ def _mesh_errors(fine: Sequence[Contact], coarse: Sequence[Contact]) -> dict[str
         errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
     shares, rough = _overestimates(fine), _overestimates(coarse)
     return errors | {f"maps/{key}_error": abs(value - rough[key]) for key, value in shares.items()}
+
+
+def _quality_error(scene: Scene, obj, outcome: Solved, values: dict[str, Any]) -> dict[str, float]:
+    fine, coarse = values["maps/quality"][0], quality(scene, obj, [c for _, c in outcome.contacts])
+    return {"maps/quality_error": abs(coarse - fine) / fine if fine > 0 else np.nan}
 
 
 def _result(values: dict[str, Any], outcome: Solved, friction: float, effects: dict) -> CaseResult:

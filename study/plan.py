@@ -46,12 +46,15 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     from study.build import check_object, pad_shape
     from study.derived import derived
     from study.grid import surface_of
+    from study.uncertainty.probes import changes, probe_candidates, with_probes
 
     check_object(scene)
     patches = scene.output.patches != "none"
     front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(sweep.axes(scene))
     surface = surface_of(scene, axes)
+    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
         scene=scene.effective_toml(),
@@ -75,8 +78,10 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         scene.sampled,
         surface.counts,
         front,
+        probes,
+        changes(scene) if probes else (),
     )
-    return Plan(layout, header, tuple(sweep.units(scene, lambda point: point.axis_symmetry)))
+    return Plan(layout, header, with_probes(scene, units, probes))
 
 
 def has(scene: Any) -> tuple[str, ...]:

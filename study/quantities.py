@@ -6,7 +6,7 @@ these tables.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from study.finger_quantities import CHECKS, FINGER, LIMIT_SURFACE, WORK
 from study.quantity import Quantity, finger
@@ -185,6 +185,7 @@ MAPS = (
         "Difference of e_n (curved) between the mesh and one with half as many elements per direction, over its value.",
         needs="two meshes",
     ),
+    Quantity("quality_error", "", "relative error of quality", "As e_n_error.", needs="two meshes"),
     Quantity("f_x_max_error", "", "relative error of f_x_max", "As e_n_error.", needs="two meshes"),
     Quantity("f_y_max_error", "", "relative error of f_y_max", "As e_n_error.", needs="two meshes"),
     Quantity("tau_z_max_error", "", "relative error of tau_z_max", "As e_n_error.", needs="two meshes"),
@@ -262,10 +263,24 @@ def wrench_samples(n: int) -> Quantity:
         " motions have the opposite wrenches. Of the candidates in wrenches/candidate only."
     )
     name, units = "wrenches of sampled motions", "N, N, N m"
-    return finger("wrenches", "wrench", units, name, text, by_model=True, shape=(n, 3), sampled=True)
+    return finger("wrenches", "wrench", units, name, text, by_model=True, shape=(n, 3), among="sampled")
 
 
-def quantities(has: Collection[str] = (), cor_grid: int = 0, samples: int = 0) -> tuple[Quantity, ...]:
+def probe_values(variations: Sequence[str]) -> tuple[Quantity, ...]:
+    """What the further solves of a probe give."""
+    told = "; ".join(f"{i} {name}" for i, name in enumerate(variations))
+    text = f"Curved model, of the candidates in probes/candidate solved again with one thing changed: {told}."
+    names = {"e_n": ("m", "e_n of changed probes"), "quality": ("", "quality of changed probes")}
+    size = (len(variations),)
+    return tuple(
+        Quantity(name, units, label, text, group="probes", shape=size, among="probe")
+        for name, (units, label) in names.items()
+    )
+
+
+def quantities(
+    has: Collection[str] = (), cor_grid: int = 0, samples: int = 0, variations: Sequence[str] = ()
+) -> tuple[Quantity, ...]:
     """All per-case quantities but the patch.
 
     Parameters
@@ -276,9 +291,12 @@ def quantities(has: Collection[str] = (), cor_grid: int = 0, samples: int = 0) -
         Points a side of the paper's grid of centres of rotation; 0 for none.
     samples : int
         Motions whose wrenches are stored for some candidates; 0 for none.
+    variations : sequence of str
+        What is changed in the further solves of probes.
     """
     everything = MAPS + FINGER + CHECKS + WORK + LIMIT_SURFACE + tuple(q for q in WALL if q.group != "maps")
     more = [cor_wrench(cor_grid)] * bool(cor_grid) + [wrench_samples(samples)] * bool(samples)
+    more += probe_values(variations) if variations else ()
     return tuple(q for q in (*everything, *more) if not q.needs or q.needs in has)
 
 

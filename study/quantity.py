@@ -30,8 +30,8 @@ class Quantity:
         Trailing shape, ``()`` for a scalar.
     needs : "" or one of `NEEDS`
         What the scene must ask for; without it the quantity is not in the file.
-    sampled : bool
-        Whether it is stored only for the candidates that the scene names.
+    among : "", "sampled" or "probe"
+        Which candidates alone it is stored for: those whose wrenches are, or the probes.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Quantity:
     group: str = "maps"
     shape: tuple[int, ...] = ()
     needs: str = ""
-    sampled: bool = False
+    among: str = ""
 
     @property
     def key(self) -> str:

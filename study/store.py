@@ -1,4 +1,4 @@
-"""The only door to HDF5: creates a result file, fills it in parallel, reads it without trusting it.
+"""The door to result files: creates a result file, fills it in parallel, reads it without trusting it.
 
 Crash safety: one process writes the whole skeleton, closes it, and renames it into place; after that all ranks do
 nothing but independent writes to allocated space, in the order values, checksum, state. A killed process can
@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,8 @@ import numpy as np
 from friction.motion import fibonacci_twists
 from study import grid
 from study.datasets import FIRST_SEEN
-from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
+from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.guarded import opened, reason
 from study.layout import (
     DONE,
     FAILED,
@@ -40,7 +42,7 @@ from study.layout import (
 from study.plots import groups
 from study.provenance import SAMPLING
 from study.quantity import MODELS
-from study.reading import Result, text_of
+from study.reading import Result
 from study.record import blank, crc32, text_bytes
 from study.vtkhdf import head
 
@@ -73,7 +75,7 @@ def create(path: Path, layout: Layout, header: Header) -> None:
         part.unlink(missing_ok=True)
         if not isinstance(error, OSError) and "write" not in str(error):
             raise
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {_reason(error)}") from error
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
     part.replace(path)
     folder = os.open(path.parent, os.O_RDONLY)
     os.fsync(folder)
@@ -153,6 +155,8 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     if layout.sampled:
         study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
         study["wrenches/candidate"][...] = layout.sampled
+    if layout.probes:
+        study["probes/candidate"][...] = layout.probes
 
 
 def _report(text: str) -> np.ndarray:
@@ -370,76 +374,19 @@ def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarra
 # --- reading, without MPI ------------------------------------------------------------------------------------------
 
 
-class GuardedFile:
-    """Reads known paths of a file of unknown origin: never another file, never more than the file holds."""
-
-    def __init__(self, path: Path, file: h5py.File) -> None:
-        self.path, self._file, self._bytes = path, file, path.stat().st_size
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def attributes(self, path: str = "") -> dict[str, Any]:
-        """Attributes of a group or dataset, text decoded."""
-        return {key: text_of(value) if np.ndim(value) == 0 else value for key, value in self._node(path).attrs.items()}
-
-    def checked(self, path: str, shape: tuple[int, ...], dtype: np.dtype) -> h5py.Dataset:
-        """A dataset that has the expected shape and type."""
-        found = self.plain(path)
-        if found.shape != shape or found.dtype != dtype:
-            text = f"{path} has shape {found.shape} of {found.dtype}, expected {shape} of {dtype}"
-            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
-        return found
-
-    def plain(self, path: str) -> h5py.Dataset:
-        """A dataset whose data stand in this very file."""
-        found = self._node(path)
-        if not isinstance(found, h5py.Dataset):
-            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is no dataset); restore it from a copy")
-        plist = found.id.get_create_plist()
-        virtual = plist.get_layout() == h5py.h5d.VIRTUAL
-        too_large = found.nbytes > (1000 * self._bytes if found.chunks else self._bytes)  # deflate gains 1000 at most
-        if virtual or plist.get_external_count() or too_large:
-            raise StudyError(OTHER_FILE, f"{self.path}: {path} is not stored in this file; do not trust it")
-        return found
-
-    def _node(self, path: str) -> Any:
-        node: Any = self._file
-        for part in filter(None, path.split("/")):
-            link = node.get(part, getlink=True) if isinstance(node, h5py.Group) else None
-            if not isinstance(link, h5py.HardLink):
-                raise StudyError(OTHER_FILE, f"{self.path}: {path} is missing or in another file; do not trust it")
-            node = node[part]
-        return node
-
-
 def open_result(path: str | Path) -> Result:
     """A result file for reading, also while a run is writing it; raise `StudyError` if it is none."""
     path = Path(path)
-    try:
-        file = GuardedFile(path, h5py.File(path, "r"))
-    except FileNotFoundError as error:
-        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
-    except OSError as error:
-        if "unable to lock file" in str(error):
-            text = f"{path}: another program holds it open for writing; close it there"
-            raise StudyError(IN_USE, text) from error
-        text = f"{path}: not a readable result file ({_reason(error)}); move it away or restore it"
-        raise StudyError(OTHER_FILE, text) from error
-    try:
-        return Result(path, file)
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        file.close()
-        text = f"{path}: not a result file of {PROGRAM} ({error}); choose another file"
-        raise StudyError(OTHER_FILE, text) from error
-    except StudyError:
-        file.close()
-        raise
+    return opened(path, "result file", lambda file: Result(path, file), _go_through)
 
 
-def _reason(error: Exception) -> str:
-    if getattr(error, "strerror", None):
-        return str(error.strerror)  # type: ignore[attr-defined]
-    inner = str(error).partition("(")[2].rstrip(")")
-    return inner or str(error)
+def _go_through(result: Result) -> None:
+    """Touch whatever readers of a result may read, however much of it is broken."""
+    for dataset in (*result.layout.datasets, *result.layout.grid):
+        with suppress(StudyError):
+            found = result.file.plain(dataset.path)
+            if found.chunks:  # data that have to be unpacked
+                result.file.values(found)
+    for name in ("scene", "definitions", "report"):
+        with suppress(StudyError):
+            getattr(result, name)

@@ -49,6 +49,8 @@ class Unit:
         The candidates served, ``candidate`` first, and the angle about z that takes ``candidate`` to each [rad].
     cost : float
         Work, in element solves; only ratios mean something.
+    probe : bool
+        Whether it is solved again with inputs changed, as `study.uncertainty` needs it.
     """
 
     index: int
@@ -58,6 +60,7 @@ class Unit:
     served: tuple[Candidate, ...]
     turns: tuple[float, ...]
     cost: float
+    probe: bool = False
 
 
 def axes(scene: Scene) -> list[Axis]:

@@ -24,6 +24,7 @@ from study.scene.sections import Accuracy, Candidates, Effects, Friction, Grippe
 from study.scene.shapes import Mesh, Object, Section
 from study.scene.sweeps import NOT_SWEPT, put, sweep_findings
 from study.scene.text import key_lines, parse_toml, read_text, toml_text
+from study.scene.uncertainty_section import Uncertainty
 
 Option = str | int | float | bool
 WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print
@@ -42,6 +43,7 @@ class Scene(Section):
     task: Task = Field(default_factory=Task)
     effects: Effects = Field(default_factory=Effects)
     accuracy: Accuracy = Field(default_factory=Accuracy)
+    uncertainty: Uncertainty = Field(default_factory=Uncertainty)
     output: Output = Field(default_factory=Output)
     run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
@@ -103,6 +105,8 @@ class Scene(Section):
         """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[output]``, ``[run]``."""
         data = self.effective()
         del data["output"], data["run"], data["object"]["name"]
+        if not self.uncertainty.parts:  # files of scenes without it keep their digest
+            del data["uncertainty"]
         if isinstance(self.object, Mesh):
             data["object"]["mesh"] = _file_digest(self.object.mesh)
         if self.candidates.poses:

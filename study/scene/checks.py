@@ -13,6 +13,7 @@ from study.scene.gripper_checks import pad_material, pad_mesh, sheet
 from study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
 from study.scene.sections import Candidates, GraspPose, Gripper, Load
 from study.scene.shapes import Box, Plate, Revolution, Shape
+from study.scene.uncertainty_section import no_sweep, uncertainty_checks, wall_is_there
 from study.scene.wall_checks import sections, wall
 
 SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
@@ -172,7 +173,8 @@ CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
     (("output",), output_file), (("petsc",), petsc_options), (("limit_surface", "effects"), surface_choice),
     (("limit_surface", "candidates"), sampled_candidates), (("task",), weight), (("object", "effects"), wall),
-    (("object",), sections),
+    (("object",), sections), (("uncertainty", "candidates", "friction"), uncertainty_checks),
+    (("uncertainty", "object"), wall_is_there), (("uncertainty", "sweep"), no_sweep),
 )  # fmt: skip
 
 

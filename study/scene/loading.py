@@ -15,6 +15,7 @@ from study.scene.score_sections import LimitSurface, Score, Task
 from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
 from study.scene.sentences import model_findings
 from study.scene.shapes import SHAPES, Section
+from study.scene.uncertainty_section import Uncertainty
 
 SECTIONS: dict[str, type[Section]] = {
     "gripper": Gripper,
@@ -26,6 +27,7 @@ SECTIONS: dict[str, type[Section]] = {
     "task": Task,
     "effects": Effects,
     "accuracy": Accuracy,
+    "uncertainty": Uncertainty,
     "output": Output,
     "run": Run,
 }
