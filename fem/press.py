@@ -17,19 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.checks import DIRECTIONS, Checks, check
+from fem.checks import Checks, check
 from fem.contact import ContactPoints, ContactProblem, Control, Gap
-from fem.errors import CheckError, ConvergenceError, NotReachedError
+from fem.errors import ConvergenceError
 from fem.foam import Foam
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
+from fem.reasons import explained, refuse_fall
 from fem.spring_bed import SpringBed
 from fem.stepping import Settings, Stepping, Work
 
 FloatArray = NDArray[np.float64]
-BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
-TOO_MUCH = 0.7  # strain beyond which not the contact is what fails
-MOST_FALL = 0.05  # of the travel from one force to the next: weighted and nodal gaps differ by less
 
 
 @dataclass(frozen=True)
@@ -153,7 +151,8 @@ class Press:
                     raise
                 self._fall_back()
                 x = self._climb(x, reached, force, work)
-            self._refuse_fall(x, below, force, reached)
+            if below is not None:
+                refuse_fall((reached, self.problem.travel(below)), (force, self.problem.travel(x)))
             reached = force
             seconds = since(before, self.solver.seconds, start)
             left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
@@ -189,33 +188,4 @@ class Press:
                 x, reached = self._stepping.climb(x, reached, goal, work, walk=self.fallback is None), goal
             return x
         except ConvergenceError as error:
-            raise self._explained(error) from error
-
-    def _explained(self, error: ConvergenceError) -> ConvergenceError:
-        """The error, with what the foam has come to where that is why no further state was found."""
-        x, force = self._last
-        det, strain, acoustic = self.problem.foam.strains(x, DIRECTIONS)
-        if isinstance(error, NotReachedError) or (acoustic > BARELY_ELLIPTIC and strain < TOO_MUCH):
-            return error
-        if acoustic > BARELY_ELLIPTIC:
-            return ConvergenceError(
-                f"the pad is squeezed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
-                f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
-            )
-        return ConvergenceError(
-            f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "
-            f"{acoustic:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "
-            f"equilibrium was found beyond ({error})"
-        )
-
-    def _refuse_fall(self, x: FloatArray, before: FloatArray | None, force: float, reached: float) -> None:
-        """Refuse a state that the pad cannot have come to: on a rigid object more force means more travel."""
-        if before is None or force < reached:
-            return
-        low, high = self.problem.travel(before), self.problem.travel(x)
-        if high < (1.0 - MOST_FALL) * low:
-            raise CheckError(
-                f"the travel falls from {1e3 * low:.4g} mm at {reached:.4g} N to {1e3 * high:.4g} mm at {force:.4g} N: "
-                "one of the two states is not what a growing force leads to; the contact is too small for the mesh, "
-                "refine the pad"
-            )
+            raise explained(error, self.problem.foam, *self._last) from error
