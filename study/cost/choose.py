@@ -157,8 +157,12 @@ def choose(
     Combinations that the study does not hold are solved on ``probes`` and added to it; without probes only those
     that it holds are tried, and the prediction has the last word.
     """
-    tables = costs.errors(study)
-    base_seconds = float(np.mean([m.seconds for m in study.of(study.base)]))
+    tables, own = costs.errors(study), study.of(study.base)
+    base_seconds = float(np.mean([m.seconds for m in own]))
+    if not all(np.isfinite(m.values).all() for m in own):
+        told = next(m.message for m in own if not np.isfinite(m.values).all())
+        remark = f"a probe has no solution with the scene as it is, so errors are not known: {told}"
+        return Choice({}, target, math.nan, math.nan, base_seconds, remark)
     made = combinations(tables, base_seconds, given)
     goal = reference(study, tables)
     hopeful = [c for c in made if c.error <= HOPE * target]

@@ -14,6 +14,7 @@ import numpy as np
 from study.cost.knobs import Skipped
 from study.cost.measure import QUANTITIES, UNITS, Measured
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.guarded import GuardedFile, opened
 
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
 TEXT = h5py.string_dtype("utf-8")
@@ -128,28 +129,38 @@ def _columns(study: CostStudy) -> dict[str, list]:
 
 def load(path: Path) -> CostStudy:
     """Read a study; raise `StudyError` if the file is none."""
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("kind") != KIND or file.attrs.get("version") != VERSION:
-                raise StudyError(OTHER_FILE, f"{path}: not a cost study of this version; choose another file with -o")
-            header = {name: file.attrs[name] for name in HEADER}
-            header["calibration"] = float(header["calibration"])
-            study = CostStudy(**header, candidates=_texts(file["candidates"]))
-            columns = {name: file[f"measurements/{name}"] for name in MEANING}
-            read = {k: _texts(d) if h5py.check_string_dtype(d.dtype) else d[()] for k, d in columns.items()}
-            skipped = zip(*(_texts(file[f"skipped/{name}"]) for name in ("knob", "level", "reason")), strict=True)
-            study.skipped = [Skipped(*texts) for texts in skipped]
-    except FileNotFoundError as error:
-        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        text = f"{path}: not a readable cost study ({error}); move it away or name another with -o"
-        raise StudyError(OTHER_FILE, text) from error
+
+    def make(file: GuardedFile) -> CostStudy:
+        try:
+            return _read(path, file)
+        finally:
+            file.close()
+
+    return opened(path, "cost study", make, lambda study: None)
+
+
+def _read(path: Path, file: GuardedFile) -> CostStudy:
+    found = file.attributes()
+    if (found.get("kind"), found.get("version")) != (KIND, str(VERSION)):
+        raise StudyError(OTHER_FILE, f"{path}: not a cost study of this version; choose another file with -o")
+    header = {name: str(found[name]) for name in HEADER}
+    study = CostStudy(**{**header, "calibration": float(header["calibration"])}, candidates=file.texts("candidates"))
+    columns = {name: f"measurements/{name}" for name in MEANING}
+    texts = ("setting", "level", "candidate", "message")
+    read = {name: file.texts(at) if name in texts else _numbers(file, at) for name, at in columns.items()}
+    if len({len(values) for values in read.values()}) != 1:
+        raise ValueError("its columns are not equally long")
+    skipped = zip(*(file.texts(f"skipped/{name}") for name in ("knob", "level", "reason")), strict=True)
+    study.skipped = [Skipped(*texts) for texts in skipped]
     _fill(study, read)
     return study
 
 
-def _texts(dataset: h5py.Dataset) -> list[str]:
-    return [str(text) for text in dataset.asstr()[()]]
+def _numbers(file: GuardedFile, path: str) -> np.ndarray:
+    found = file.plain(path)
+    if found.ndim != 1 or found.dtype.kind != "f":
+        raise ValueError(f"{path} is no list of numbers")
+    return file.values(found)
 
 
 def _fill(study: CostStudy, read: dict) -> None:

@@ -365,7 +365,7 @@ LADDERS = ("pad mesh, hex8", "wall mesh", "effect: object")
     ("text", "overrides"),
     [
         pytest.param(CYLINDER, COARSE, id="rigid cylinder"),
-        pytest.param(BOTTLE.format(wall=2.0), [*COARSE, *COARSE_WALL], id="stiff bottle"),
+        pytest.param(BOTTLE.format(wall=1.0), [*COARSE, *COARSE_WALL], id="stiff bottle"),
         pytest.param(BOTTLE.format(wall=0.35), [*COARSE, *COARSE_WALL], id="thin bottle"),
     ],
 )
@@ -399,3 +399,54 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
         seconds = np.mean([m.seconds for m in study.of(setting)])
         good = measured_error(study, setting, goal) <= target
         assert not good or seconds > choice.seconds / 1.5, f"{combination.level.name} is cheaper and good enough"
+
+
+# --- the command ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
+    from study.cli import main
+    from study.cost.file import load
+    from study.exits import DONE, OTHER_FILE, USAGE
+
+    file, out = tmp_path / "small.toml", tmp_path / "small-cost.hdf"
+    file.write_text(CYLINDER)
+    words = ["cost", str(file), "-o", str(out), *(w for v in COARSE for w in ("--set", v))]
+    assert main([*words, "--time-limit", "1"]) == DONE
+    first = load(out)
+    assert first.skipped
+    assert all("--time-limit" in s.reason for s in first.skipped)
+    assert main([*words, "--time-limit", "3"]) == DONE
+    second = load(out)
+    assert second.measured.keys() > first.measured.keys()
+    assert all(second.measured[key].seconds == m.seconds for key, m in first.measured.items())  # not measured again
+    told = capsys.readouterr().out
+    assert "in e_n costs" in told or "No measured mesh" in told
+    page = out.with_suffix(".html").read_text()
+    for part in ("Pareto front", "Calibration", "Winkler foundation", "Not measured"):
+        assert part in page
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    assert main([*words, "--set", "friction.mu=0.5"]) == OTHER_FILE
+    assert main([*words[:4], "--candidate", "nowhere"]) == USAGE
+
+
+@pytest.mark.long
+def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, capsys):
+    from study.cli import main
+    from study.exits import DONE
+    from study.store import open_result
+
+    file, out = tmp_path / "small.toml", tmp_path / "small.hdf"
+    file.write_text(CYLINDER)
+    words = ["run", str(file), "-o", str(out), "--set", "accuracy.e_n=0.03"]
+    assert main(words) == DONE
+    told = capsys.readouterr().out
+    assert "predicted error" in told
+    with open_result(out) as result:
+        assert result.derived("e_n_error_on_probes")[0] <= 0.03
+        assert result.derived("e_n_error_predicted")[0] > 0
+        assert "# chosen" in str(result.scene_attributes["overrides"])
+        assert "e_n = 0.03" in result.scene
+    assert main(words) == DONE
+    assert "resumed, 0 of" in capsys.readouterr().out
