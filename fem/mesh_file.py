@@ -1,4 +1,8 @@
-"""Mesh files as bytes: what can be known of a file before a library's reader, which may crash on it, sees it."""
+"""Mesh files: their bytes, of a size that can be a mesh, and the reader that fits their ending.
+
+The readers are our own: those of VTK trust what a file says of itself, and a damaged one ended the program. These read
+nothing that is not there, and every number and index is checked.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,45 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.mesh_check import MeshError
+from fem.mesh_check import MOST_TRIANGLES, MeshError
 from fem.pose import FloatArray
+from fem.shape import IntArray
 
 ENDINGS = (".stl", ".obj", ".ply")
-LARGEST_FILE = 200 * 2**20
-PLY_BYTES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8,
-             "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+LARGEST_FILE = 200 * 2**20  # bytes
+MOST_POINTS = 3 * MOST_TRIANGLES  # as many as an STL file has, where every triangle has its own
+MOST_CORNERS = 255  # of a face
+MOST_LINES = 5_000_000
+LONGEST_LINE, LONGEST_NUMBER = 20_000, 60  # bytes
+
+Polygons = tuple[FloatArray, IntArray, IntArray]  # points (k, 3), number of corners of each face (m,), all corners
+
+
+def read_polygons(path: Path) -> Polygons:
+    """Points ``(k, 3)`` in the file's own unit, corners of each face ``(m,)``, and all corners, one face after another.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, is no mesh, too large or damaged.
+    """
+    from fem.obj_file import obj_polygons
+    from fem.ply_file import ply_polygons
+    from fem.stl_file import stl_polygons
+
+    data = checked_bytes(path)
+    readers = {".stl": stl_polygons, ".obj": obj_polygons, ".ply": ply_polygons}
+    try:
+        points, sizes, corners = readers[path.suffix.lower()](data)
+    except MeshError as problem:
+        raise MeshError(f"{path}: {problem}") from problem
+    if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
+        astray = corners[(corners < 0) | (corners >= len(points))][0]
+        raise MeshError(
+            f"{path}: a face refers to point {astray}, but there are only {len(points)} (counted from 0); "
+            "the file is damaged, export it again"
+        )
+    return points, sizes, corners
 
 
 def checked_bytes(path: Path) -> bytes:
@@ -21,6 +57,8 @@ def checked_bytes(path: Path) -> bytes:
         raise MeshError(f"{path}: meshes are read from {', '.join(ENDINGS)} files; convert it to one of these")
     try:
         size = path.stat().st_size
+        if not path.is_file():  # a device or a pipe may have no end
+            raise MeshError(f"{path}: is no regular file; name the file of a mesh")
         if size > LARGEST_FILE:
             raise MeshError(f"{path}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB; decimate the mesh")
         data = path.read_bytes()
@@ -31,39 +69,55 @@ def checked_bytes(path: Path) -> bytes:
     return data
 
 
-def binary_stl(path: Path, data: bytes) -> FloatArray | None:
-    """Corners ``(m, 3, 3)`` of a binary STL file's triangles; None if the file is an ASCII one."""
-    if data[:5].lower() == b"solid" and b"facet" in data[:1000].lower():
-        return None
-    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if len(data) < 84 + 50 * count or count < 0:
-        raise MeshError(f"{path}: is cut short or no STL file: {len(data)} bytes, but its header calls for "
-                        f"{84 + 50 * count if count >= 0 else 'at least 84'}; copy or export it again")
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    return np.frombuffer(data, record, count, 84)["corners"].astype(float)
+def check_counts(points: int, faces: int) -> None:
+    """Refuse more points or faces than a mesh may have, before they are read."""
+    if points > MOST_POINTS or faces > MOST_TRIANGLES:
+        raise MeshError(
+            f"the mesh has {points} points and {faces} faces, more than {MOST_POINTS} and {MOST_TRIANGLES}; decimate "
+            "it, to about a tenth of the pad's element size nothing is lost"
+        )
 
 
-def check_ply(path: Path, data: bytes) -> None:
-    """Refuse a PLY file that is shorter than its header says: readers trust the header."""
-    head, found, _ = data[: 2**16].partition(b"end_header")
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    elements: list[list] = []  # name, count, smallest number of bytes per element
+def check_corners(count: int, total: int) -> None:
+    """Refuse a face of ``count`` corners, or so many corners altogether, that no mesh of triangles is made of them."""
+    if count > MOST_CORNERS or total > 4 * MOST_TRIANGLES:
+        raise MeshError(
+            f"a face of {count} corners, {total} in all, more than {MOST_CORNERS} and {4 * MOST_TRIANGLES}; "
+            "triangulate and decimate the mesh"
+        )
+
+
+def text_lines(data: bytes) -> list[bytes]:
+    """Lines of a text, not too many and none too long to be taken apart."""
+    count = data.count(b"\n") + data.count(b"\r")
+    if count > MOST_LINES:
+        raise MeshError(f"has {count} lines, more than {MOST_LINES}; decimate the mesh")
+    lines = data.splitlines()
+    if (longest := max(map(len, lines), default=0)) > LONGEST_LINE:
+        raise MeshError(f"has a line of {longest} bytes, more than {LONGEST_LINE}; export the mesh again")
+    return lines
+
+
+def as_floats(values: np.ndarray) -> FloatArray:
+    """Numbers of any kind as floats; what is none comes out as NaN, without a warning."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(float)
+
+
+def numbers(words: list[bytes], kind: str) -> np.ndarray:
+    """Words as an array of ``f8`` or ``i8``; `MeshError` names the first that is no such number."""
     try:
-        for words in lines:
-            if words[:1] == ["element"]:
-                elements.append([words[1], int(words[2]), 0])
-            elif words[:2] == ["property", "list"]:
-                elements[-1][2] += PLY_BYTES[words[2]] + 3 * PLY_BYTES[words[3]] * (elements[-1][0] == "face")
-            elif words[:1] == ["property"]:
-                elements[-1][2] += PLY_BYTES[words[1]]
-    except (IndexError, KeyError, ValueError):
-        found = b""
-    if not found or lines[0] != ["ply"] or min((count for _, count, _ in elements), default=-1) < 0:
-        raise MeshError(f"{path}: is no PLY file with a complete header; export it again")
-    if ["format", "ascii", "1.0"] in lines:
-        have, need, what = data.rstrip().count(b"\n") - len(lines), sum(count for _, count, _ in elements), "lines"
-    else:
-        have, need, what = len(data) - len(head) - 11, sum(count * size for _, count, size in elements), "bytes"
-    if have < need:
-        raise MeshError(f"{path}: is cut short: {have} {what} of data, but its header calls for {need}; export "
-                        "it again")
+        if max(map(len, words), default=0) <= LONGEST_NUMBER:  # numpy would keep this room for each of them
+            return np.array(words, dtype="S").astype(kind) if words else np.empty(0, kind)
+    except (ValueError, OverflowError):
+        pass
+    word = next((word for word in words if not _is_number(word, kind)), b"a number beyond all bounds")
+    found = word[:LONGEST_NUMBER].decode("ascii", "replace")
+    raise MeshError(f"is damaged: found {found!a} where a number has to stand; export it again")
+
+
+def _is_number(word: bytes, kind: str) -> bool:
+    try:
+        return len(word) <= LONGEST_NUMBER and (kind == "f8" or abs(int(word)) < 2**63) and float(word) is not None
+    except (ValueError, OverflowError):
+        return False

@@ -19,14 +19,13 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from fem.mesh_check import MeshError, sound_mesh
-from fem.mesh_file import binary_stl, check_ply, checked_bytes
+from fem.mesh_file import read_polygons
 from fem.pose import FloatArray, Pose
 from fem.shape import Gap, IntArray, Surface
 from fem.tricubic import coefficients, evaluate
 
 if TYPE_CHECKING:
     import pyvista as pv
-    from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm
     from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
@@ -116,8 +115,10 @@ class MeshObject:
         step = self.grid_step or float((upper - lower).max()) / STEPS_PER_BOX
         cells = np.ceil((upper - lower) / step - 1e-9) + 2 * MARGIN
         if np.prod(cells + 1) > MOST_SAMPLES:
-            raise ValueError(f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
-                             f"more than {MOST_SAMPLES}; raise grid_step")
+            raise ValueError(
+                f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
+                f"more than {MOST_SAMPLES}; raise grid_step"
+            )
         first = lower - MARGIN * step
         axes = [first[d] + step * np.arange(int(cells[d]) + 1) for d in range(3)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -226,43 +227,16 @@ class MeshRegion:
         return g, gradient @ R.T, R @ hessian @ R.T
 
 
-def _reader(ending: str) -> vtkAlgorithm:
-    """VTK's reader of files with this ending."""
-    from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
-    from vtkmodules.vtkIOPLY import vtkPLYReader
-
-    return {".stl": vtkSTLReader, ".obj": vtkOBJReader, ".ply": vtkPLYReader}[ending]()
-
-
 def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
     """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of an STL, OBJ or PLY file, unchecked."""
+    points, sizes, corners = read_polygons(path)
+    if (sizes == 3).all():
+        return points, corners.reshape(-1, 3)
+    if sizes.min() < 3:
+        raise MeshError(f"{path}: is damaged: a face has fewer than three corners; export it again")
+    if not np.isfinite(points).all():  # which sound_mesh tells of; here it is before polygons are cut
+        return points, corners[:3].reshape(1, 3)
     import pyvista as pv
 
-    data = checked_bytes(path)
-    ending = path.suffix.lower()
-    if ending == ".stl" and (corners := binary_stl(path, data)) is not None:
-        return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-    if ending == ".ply":
-        check_ply(path, data)
-    reader, problems = _reader(ending), []
-    reader.AddObserver("ErrorEvent", lambda *_: problems.append(None))
-    reader.SetFileName(str(path))
-    reader.Update()
-    mesh = pv.wrap(reader.GetOutput())
-    if problems:
-        raise MeshError(f"{path}: is damaged or no {ending[1:].upper()} file; export it again")
-    corners = _corners(mesh)
-    if len(corners) and corners.max() < mesh.n_points and not mesh.is_all_triangles:
-        mesh = mesh.triangulate()
-        corners = _corners(mesh)
-    if len(corners) % 3:
-        raise MeshError(f"{path}: a face refers to a point that does not exist; the file is damaged, export it again")
-    return np.asarray(mesh.points, dtype=float), corners.reshape(-1, 3)
-
-
-def _corners(mesh: pv.PolyData) -> IntArray:
-    """Corners of all faces, one behind the other."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    faces = mesh.GetPolys()
-    return vtk_to_numpy(faces.GetConnectivityArray()) if faces.GetNumberOfCells() else np.empty(0, dtype=np.int64)
+    starts = np.insert(corners, np.cumsum(sizes) - sizes, sizes)
+    return points, pv.PolyData(points, starts).triangulate().regular_faces.astype(np.int64)

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study.layout import LABEL, PROGRAM, READABLE, ROOT, SESSION, SESSIONS, layout_from_options
+from study.exits import OTHER_FILE, StudyError
+from study.guarded import text_of
+from study.layout import FAILED, LABEL, PROGRAM, READABLE, ROOT, SESSION, SESSIONS, layout_from_options
 
 
 class StoredAxis(NamedTuple):
@@ -39,7 +41,7 @@ class Result:
         self.layout = layout_from_options(self.axes, study["options"])
         if len(self.axes) < 3 or min(self.layout.shape) < 1:
             raise ValueError("its axes are not those of a study")
-        self.title = study.get("title", "")
+        self.title = str(study.get("title", ""))
         self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
         self._known = {d.path: d for d in self.layout.datasets}
 
@@ -57,7 +59,7 @@ class Result:
 
     def read(self, path: str) -> np.ndarray:
         """A dataset of the layout below ``/study``, for example ``checks/tension`` or ``e_n/flat``."""
-        return self._checked(path)[()]
+        return self.file.values(self._checked(path))
 
     def map(self, name: str, model: str | None = None) -> np.ndarray:
         """One map over all axes; ``model`` where there is one value for each friction model."""
@@ -82,7 +84,7 @@ class Result:
     def patch(self, row: int) -> dict[str, np.ndarray]:
         """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
         names = [path.rpartition("/")[2] for path in self._known if path.startswith(f"{ROOT}/patch/")]
-        return {name: self._checked(f"patch/{name}")[row] for name in names}
+        return {name: self.file.values(self._checked(f"patch/{name}"), row) for name in names}
 
     def derived(self, name: str) -> np.ndarray:
         """A dataset that was filled after all rows."""
@@ -95,12 +97,16 @@ class Result:
     @property
     def status(self) -> np.ndarray:
         """State of every case: 0 missing, 1 done, 2 failed."""
-        return self.read("status/code")
+        found = self.read("status/code")
+        if found.max() > FAILED:
+            text = f"a case has the state {found.max()}, which does not exist"
+            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
+        return found
 
     @property
     def messages(self) -> np.ndarray:
         """Message of every case, as text."""
-        return np.char.decode(self.read("status/message"), "utf-8", "replace")
+        return _texts(self.read("status/message"))
 
     @property
     def scene(self) -> str:
@@ -126,12 +132,12 @@ class Result:
     def labels(self) -> np.ndarray:
         """Names of the candidates, ``(stations, angles)``."""
         found = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL}"))
-        return np.char.decode(found[()], "utf-8", "replace")
+        return _texts(self.file.values(found))
 
     @property
     def sessions(self) -> list[dict[str, Any]]:
         """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
-        rows = self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION)[()]
+        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION))
         fields = [(name, kind[:2]) for name, kind in (SESSION.fields or {}).items()]
         return [
             {name: text_of(row[name]) if kind.kind == "S" else int(row[name]) for name, (kind, _) in fields}
@@ -150,16 +156,19 @@ class Result:
         found, attributes = self.file.plain(path), self.file.attributes(path)
         if found.ndim != 1 or found.dtype != np.dtype("<f8"):
             raise ValueError(f"axis '{name}' is no list of numbers")
-        units = attributes.get("units", "")
-        return StoredAxis(name, found[()], units, attributes.get("long_name", name).removesuffix(f" [{units}]"))
+        units = str(attributes.get("units", ""))
+        values = self.file.values(found)
+        if not np.isfinite(values).all():
+            raise ValueError(f"axis '{name}' has values that are no numbers")
+        return StoredAxis(name, values, units, str(attributes.get("long_name", name)).removesuffix(f" [{units}]"))
 
     def _string(self, name: str) -> str:
         found = self.file.plain(f"{ROOT}/{name}")
         if found.shape != () or found.dtype.kind != "S":
-            raise ValueError(f"{self.path}: {ROOT}/{name} is no text; restore the file from a copy")
-        return text_of(found[()]).strip("\0 ")
+            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({ROOT}/{name} is no text); restore it from a copy")
+        return text_of(self.file.values(found).strip(b"\0 "))
 
 
-def text_of(value: Any) -> str:
-    """Text of an attribute or a fixed-length string."""
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+def _texts(found: np.ndarray) -> np.ndarray:
+    """Texts of an array of fixed-length strings."""
+    return np.array([text_of(text) for text in found.ravel().tolist()], dtype=str).reshape(found.shape)

@@ -23,7 +23,7 @@ from friction.motion import fibonacci_twists
 from study import grid
 from study.datasets import FIRST_SEEN
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.guarded import opened, reason
+from study.guarded import GuardedFile, opened, reason
 from study.layout import (
     DONE,
     FAILED,
