@@ -71,7 +71,8 @@ def _conclude(study: Any, what: Any, path: Path) -> None:
             place.write_bytes(data)
         except OSError as error:
             raise StudyError(CANNOT_WRITE, f"{place}: cannot be written: {error.strerror}") from error
-    left = f"{len(study.skipped)} levels were not measured, the page says why" if study.skipped else ""
+    count = len(study.skipped)
+    left = f"{count} level{'s were' if count > 1 else ' was'} not measured, the page says why" if count else ""
     print("\n".join(["", *sentences(study, tables), *([left] if left else [])]))
     print(f"written: {path}, {path.with_suffix('.html')}, {path.with_suffix('.png')}")
 

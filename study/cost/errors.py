@@ -125,13 +125,15 @@ def share_limits(tables: list[KnobErrors], values: dict[str, FloatArray]) -> lis
 
 
 def _own(settings: Sequence[str], values: FloatArray, study: CostStudy) -> int:
-    """The level that is the scene's own setting, or the finest that gives the same as it; -1 for none."""
+    """The level that is the scene's own setting, or the one that gives the same in the same time; -1 for none."""
     base = np.concatenate([m.values for m in study.of(study.base)])
     for i, setting in enumerate(settings):
         if setting == study.base:
             return i
     alike = [np.allclose(v, base, rtol=1e-12, atol=0.0) for v in values]
-    return max((i for i, same in enumerate(alike) if same), default=-1)
+    seconds = [abs(np.mean([m.seconds for m in study.of(s)]) - np.mean([m.seconds for m in study.of(study.base)]))
+               for s in settings]  # fmt: skip
+    return min((i for i, same in enumerate(alike) if same), key=lambda i: seconds[i], default=-1)
 
 
 def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],

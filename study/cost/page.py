@@ -12,7 +12,7 @@ from study.cost.errors import KnobErrors, LevelErrors
 from study.cost.file import CostStudy
 from study.cost.measure import QUANTITIES
 from study.cost.picture import work_precision
-from study.cost.words import percent, seconds_text, sentences, settings_text
+from study.cost.words import BELOW, percent, seconds_text, sentences, settings_text
 from study.progress import duration
 from study.report.page import box, bullets, heading, page, paragraph, picture, table, text_block
 
@@ -82,17 +82,18 @@ def _knob(knob: KnobErrors) -> str:
     head = ["level", "CPU per case", *(["of it this step"] if own else []), *NAMES]
     rows = [_row(level, i == knob.own, own) for i, level in enumerate(knob.levels)]
     text = WHAT.get(knob.name, f"{knob.long_name.capitalize()}, forced for all candidates.")
-    html = heading(knob.name) + paragraph(text) + table(knob.name, head, rows, texts=(0,))
+    html = heading(knob.name) + table(text, head, rows, texts=(0,))
     failed = [f"{level.name}: {level.message}" for level in knob.levels if level.message]
     return html + paragraph(_orders(knob), "note") + (bullets(failed) if failed else "")
 
 
 def _row(level: LevelErrors, own: bool, with_own: bool) -> list[str]:
     errors = [
-        f"{percent(w)} ({percent(m)})" if w > 0 else "0" if w == 0 else "failed"
+        f"{percent(w)} ({percent(m)})" if w >= BELOW else "0" if w == 0 else percent(w) if w > 0 else "failed"
         for w, m in zip(level.worst, level.middle, strict=True)
     ]
     part = [seconds_text(level.own)] if with_own else []
+    errors = [text.replace(" %", "\u00a0%") for text in errors]
     return [("→ " if own else "") + level.name, seconds_text(level.seconds), *part, *errors]
 
 

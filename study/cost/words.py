@@ -21,12 +21,12 @@ def percent(error: float) -> str:
     """A relative error for people.
 
     >>> percent(0.0213), percent(0.00123), percent(3e-8), percent(0.34)
-    ('2.1 %', '0.12 %', 'below 0.0001 %', '34 %')
+    ('2.1 %', '0.12 %', '< 0.0001 %', '34 %')
     """
     if not math.isfinite(error):
         return "–"
     if error < BELOW:
-        return "below 0.0001 %"
+        return "< 0.0001 %"
     return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
 
 
