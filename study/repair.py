@@ -112,9 +112,9 @@ def _whole(path: Path) -> int:
 def _examine(path: Path, copy: Path) -> Findings:
     if (
         copy != path
-        and ask(f"from study import repair; repair.probe({str(copy.absolute())!r})", limit=PATIENCE).code is None
+        and ask(f"from study import repair; repair.probe({str(copy.absolute())!r})", limit=PATIENCE).code != 0
     ):
-        raise _hopeless(path, "reading what is left of its structure does not come to an end")
+        raise _hopeless(path, "what is left of its structure cannot be read")
     try:
         with open_result(copy) as result:
             layout, codes = result.layout, result.status.ravel()
@@ -130,7 +130,7 @@ def _examine(path: Path, copy: Path) -> Findings:
 
 
 def probe(copy: str) -> None:
-    """Read whatever a repair reads, in a process of its own: in a structure of zeros HDF5 may turn for ever."""
+    """Read whatever a repair reads, in a process of its own: over zeros HDF5 may crash or turn for ever."""
     with suppress(*BROKEN), open_result(copy) as result:
         _lost_part(result, 2**63)
         list(rows_of(Path(copy), result.layout))
