@@ -432,21 +432,23 @@ def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
 
 
 @pytest.mark.long
-def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, capsys):
-    from study.cli import main
+@pytest.mark.launches
+def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, once):
     from study.exits import DONE
     from study.store import open_result
+    from tests.study.launching import launch
 
     file, out = tmp_path / "small.toml", tmp_path / "small.hdf"
     file.write_text(CYLINDER)
-    words = ["run", str(file), "-o", str(out), "--set", "accuracy.e_n=0.03"]
-    assert main(words) == DONE
-    told = capsys.readouterr().out
+    words = ["-m", "study", "run", file, "-o", out, "--set", "accuracy.e_n=0.03"]
+    code, told, _ = once(launch, 0, *words)
+    assert code == DONE
     assert "predicted error" in told
     with open_result(out) as result:
         assert result.derived("e_n_error_on_probes")[0] <= 0.03
         assert result.derived("e_n_error_predicted")[0] > 0
         assert "# chosen" in str(result.scene_attributes["overrides"])
         assert "e_n = 0.03" in result.scene
-    assert main(words) == DONE
-    assert "resumed, 0 of" in capsys.readouterr().out
+    code, told, _ = once(launch, 2, *words)
+    assert code == DONE
+    assert "resumed, 0 of" in told
