@@ -7,11 +7,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fem.crossing import crossing_pairs
+from fem.file_limits import MOST_TRIANGLES
 from fem.pose import FloatArray
 from fem.shape import IntArray
 from fem.units import LENGTHS
 
-MOST_TRIANGLES = 500_000
 MOST_PIECES = 50
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 TOLERATED_CROSSINGS = 1e-3  # share of crossing triangle pairs that is a scan's blemish, not a wrong shape

@@ -10,16 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.mesh_check import MOST_TRIANGLES, MeshError
+from fem.file_limits import (
+    ENDINGS,
+    LARGEST_FILE,
+    LONGEST_LINE,
+    LONGEST_NUMBER,
+    MOST_CORNERS,
+    MOST_LINES,
+    MOST_POINTS,
+    MOST_TRIANGLES,
+)
+from fem.mesh_check import MeshError
 from fem.pose import FloatArray
 from fem.shape import IntArray
-
-ENDINGS = (".stl", ".obj", ".ply")
-LARGEST_FILE = 200 * 2**20  # bytes
-MOST_POINTS = 3 * MOST_TRIANGLES  # as many as an STL file has, where every triangle has its own
-MOST_CORNERS = 255  # of a face
-MOST_LINES = 5_000_000
-LONGEST_LINE, LONGEST_NUMBER = 20_000, 60  # bytes
 
 Polygons = tuple[FloatArray, IntArray, IntArray]  # points (k, 3), number of corners of each face (m,), all corners
 

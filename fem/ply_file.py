@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fem.file_limits import MOST_CORNERS
 from fem.mesh_check import MeshError
-from fem.mesh_file import MOST_CORNERS, Polygons, as_floats, check_corners, check_counts, numbers, text_lines
+from fem.mesh_file import Polygons, as_floats, check_corners, check_counts, numbers, text_lines
 
 KINDS = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",

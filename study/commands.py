@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
+from study.printable import printable
 
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 
@@ -24,8 +25,13 @@ def complain(error: StudyError) -> int:
     """Say what went wrong, once, and give the exit code."""
     if first_rank():
         for line in error.message.splitlines():
-            print(f"error: {line}", file=sys.stderr, flush=True)
+            print(f"error: {printable(line)}", file=sys.stderr, flush=True)
     return error.code
+
+
+def _say(text: str) -> None:
+    """Print what may hold texts of files from elsewhere."""
+    print(printable(text))
 
 
 def _scene(options: Namespace) -> Any:
@@ -81,11 +87,11 @@ def check(options: Namespace) -> int:
     if _catalogue(options):
         from study.catalogue.run import check_text
 
-        print(check_text(Path(options.scene), options.overrides))
+        _say(check_text(Path(options.scene), options.overrides))
         return DONE
     scene = _scene(options)
     check_object(scene)
-    print(hanging(scene_text(scene, options.scene), terminal_width()))
+    _say(hanging(scene_text(scene, options.scene), terminal_width()))
     return DONE
 
 
@@ -102,7 +108,7 @@ def plan(options: Namespace) -> int:
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
     lines = [plan_text(made, scene, path, options.ranks), *(f"warning: {text}" for text in warnings(scene))]
-    print(hanging("\n".join(lines), terminal_width()))
+    _say(hanging("\n".join(lines), terminal_width()))
     return DONE
 
 
@@ -126,7 +132,7 @@ def status(options: Namespace) -> int:
 
     forms = {"json": status_json, "csv": status_csv}
     with open_result(options.file) as result:
-        print(forms[options.form](result) if options.form else status_text(result, terminal_width()))
+        _say(forms[options.form](result) if options.form else status_text(result, terminal_width()))
     return DONE
 
 
@@ -141,7 +147,7 @@ def repair(options: Namespace) -> int:
     """Say what of a damaged file is good, and make it usable."""
     from study.repair import repair
 
-    print(repair(Path(options.file), options.write, options.in_place))
+    _say(repair(Path(options.file), options.write, options.in_place))
     return DONE
 
 
@@ -149,7 +155,7 @@ def scale(options: Namespace) -> int:
     """Replay a finished study on many ranks."""
     from study.scaling import scaling_text
 
-    print(scaling_text(Path(options.file), options))
+    _say(scaling_text(Path(options.file), options))
     return DONE
 
 
@@ -162,7 +168,7 @@ def show(options: Namespace) -> int:
     with open_result(options.file) as result:
         table = best(result, options.force, options.top, whole_lines=options.form is None)
     forms = {"json": as_json, "csv": as_csv}
-    print(forms[options.form](table) if options.form else as_text(table, terminal_width()))
+    _say(forms[options.form](table) if options.form else as_text(table, terminal_width()))
     return DONE
 
 
@@ -177,7 +183,7 @@ def compare(options: Namespace) -> int:
         found = compare(one, other, options.quantity, options.model)
     forms = {"json": comparison_json, "csv": comparison_csv}
     text = forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
-    print(text)
+    _say(text)
     return DONE
 
 
@@ -189,7 +195,7 @@ def export(options: Namespace) -> int:
     with open_result(options.file) as result:
         text = {"json": as_json, "csv": as_csv}[options.form](result, options.model)
     if options.output is None:
-        print(text)
+        _say(text)
         return DONE
     try:
         Path(options.output).write_text(f"{text}\n", encoding="utf-8")
@@ -214,7 +220,7 @@ def patch(options: Namespace) -> int:
     """Judge a pressure field from elsewhere."""
     from study.patch.command import answer_text
 
-    print(answer_text(options))
+    _say(answer_text(options))
     return DONE
 
 

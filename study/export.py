@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from study.columns import cell
 from study.finger_quantities import MONOMIALS
 from study.quantity import MODELS
 from study.ranking import FLAGS
@@ -136,7 +137,7 @@ def as_csv(result: Any, model: str = "curved") -> str:
     for case in cases(result, model):
         flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
         numbers = [*(float(case["maps"][name]) for name in maps), *flat]
-        lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"]]
+        lead = [*case["place"].values(), cell(case["label"]), case["state"], cell(case["message"]), case["flags"]]
         writer.writerow([*lead, *("" if np.isnan(v) else repr(v) for v in numbers)])
     return text.getvalue().rstrip("\n")
 

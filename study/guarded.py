@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from study.exits import IN_USE, OTHER_FILE, StudyError
-from study.scene.errors import printable
+from study.printable import printable
 from study.trial import trouble
 
 # what h5py raises for damage: its own errors have no class of their own

@@ -22,6 +22,7 @@ def scene_text(scene: Any, file: str) -> str:
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
     rows = {
         "object": f"{o.shape}{name}{_extent(o)}",
+        "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
         "wall": wall_text(o),
         "candidates": where,
         "forces": _list(scene.load.normal_force_n, "N"),

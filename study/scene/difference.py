@@ -43,7 +43,11 @@ def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
 
 def _values(text: str) -> dict[str, Any]:
     """Values by dotted key, without those that change no result."""
-    values = flat({name: table for name, table in tomllib.loads(text).items() if name not in ("output", "run")})
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    values = flat({name: table for name, table in tables.items() if name not in ("output", "run")})
     for pose in values.get("candidates.poses", ()):
         pose.pop("label", None)
     return {key: value for key, value in values.items() if key != "object.name"}

@@ -5,14 +5,13 @@ from __future__ import annotations
 import datetime
 import difflib
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from study.printable import printable
+
 KeyPath = tuple[str | int, ...]
-# What a terminal obeys or what hides text: control characters, line separators, changes of direction, halves of letters
-UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")
 
 
 class Finding(NamedTuple):
@@ -66,15 +65,6 @@ def shown(value: Any, width: int = 60) -> str:
         text = text if isinstance(value, str) else text.replace("Infinity", "inf").replace("NaN", "nan")
     text = printable(text)
     return text if len(text) <= width else text[: width - 4] + " ..."
-
-
-def printable(text: str) -> str:
-    r"""A text of unknown origin with nothing in it that a terminal would obey.
-
-    >>> print(printable("a\x1b[2Jb"))
-    a\u001b[2Jb
-    """
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def closest(word: str, words: Sequence[str]) -> str | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
+from fem.file_limits import ENDINGS, LARGEST_FILE
 from study.scene.errors import Finding, shown
 from study.scene.sections import Output
 from study.scene.shapes import Mesh
@@ -46,10 +47,13 @@ def mesh_file(shape: Mesh) -> Iterator[Finding]:
     """The mesh's file exists and can be one (its content is judged when it is read)."""
     file, path = Path(shape.mesh), ("object", "mesh")
     remedy = "the path is relative to the scene file"
-    if file.suffix.lower() not in (".stl", ".ply", ".obj"):
+    if file.suffix.lower() not in ENDINGS:
         yield Finding(path, shown(file.name), "a triangle mesh in a .stl, .ply or .obj file", "convert it to .stl")
     elif not file.is_file():
         found = "a directory" if file.is_dir() else "no such file"
         yield Finding(path, f"{found} at {file}", "the file of a triangle mesh", remedy)
-    elif not file.stat().st_size:
+    elif not (size := file.stat().st_size):
         yield Finding(path, f"an empty file at {file}", "the file of a triangle mesh", remedy)
+    elif size > LARGEST_FILE:
+        expected = f"at most {LARGEST_FILE >> 20} MiB"
+        yield Finding(path, f"{size >> 20} MiB in {file}", expected, "decimate the mesh, or save it as binary .stl")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
+from study.printable import UNPRINTABLE
 from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, closest, shown
 from study.scene.score_sections import LimitSurface, Score, Task
@@ -69,7 +70,22 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
             except ValidationError as error:
                 others = {place: keys for place, keys in keys_by_place().items() if keys != list(model.model_fields)}
                 found.extend(model_findings(error, model, name, table, others))
-    return sections, found + scene_checks.findings(sections)
+    return sections, found + scene_checks.findings(sections) + list(_unprintable(data))
+
+
+def _unprintable(value: Any, path: KeyPath = ()) -> Iterator[Finding]:
+    """Texts and keys that a terminal would obey, or that would break lines wherever they are shown."""
+    if isinstance(value, str) and (UNPRINTABLE.search(value) or "\n" in value or "\t" in value):
+        yield Finding(path, shown(value), "text without control characters", "remove them")
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            if UNPRINTABLE.search(key) or "\n" in key:
+                yield Finding(path, f"the key {shown(key)}", "a key without control characters", "remove them")
+            else:
+                yield from _unprintable(inner, (*path, key))
+    elif isinstance(value, list | tuple):
+        for index, inner in enumerate(value):
+            yield from _unprintable(inner, (*path, index))
 
 
 def _unknown_section(name: str, value: Any) -> Finding:
