@@ -74,9 +74,7 @@ def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: 
             scene = case_scene(catalogue, case, path, overrides)
             plan = prepare(scene, own)
             return run_study(plan, work(scene), target, MPI.COMM_SELF, retry_failed=options.retry_failed), ""
-    except StudyError as error:
-        if error.code != USAGE:
-            raise StudyError(error.code, f"case '{case.name}': {error.message}") from error
+    except StudyError as error:  # also a file of another scene: raised here, it would leave the other ranks waiting
         return DONE, error.message
 
 
