@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from study.cost.probes import Probe
 
 FloatArray = NDArray[np.float64]
-NOT_CHOSEN = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
+NO_LOSS = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
+NOT_CHOSEN = (*NO_LOSS, "effect: friction pressure coupling")  # which is another model than the paper's
 HOPE, MOST_TRIED = 2.0, 8  # predicted errors up to so many targets are tried, at most so many combinations
 NOISE, SMALL = 0.1, 1e-4  # of a time, and of e_n: less is no difference
 Solve = Callable[[str, "Probe", Level], Measured]

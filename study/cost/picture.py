@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from study import pictures
-from study.cost.choose import NOT_CHOSEN, Combination
+from study.cost.choose import NO_LOSS, Combination
 from study.cost.errors import KnobErrors
 from study.cost.levels import WINKLER
 from study.report.page import Picture
@@ -22,7 +22,7 @@ QUALITY = 3
 def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) -> tuple[Picture, bytes]:
     """The diagram as SVG for a page and as PNG."""
     drawn, axes = pictures.figure(10, 7.2, 2, 2, gap=0.12, sharex=True)
-    lines = [t for t in tables if not t.judging and t.name not in NOT_CHOSEN]
+    lines = [t for t in tables if not t.judging and t.name not in NO_LOSS]
     for q, (panel, title) in enumerate(zip(axes.flat, TITLES, strict=True)):
         panel.set(title=title, xscale="log", yscale="log")
         panel.grid(which="major", color="#e3e6e8", lw=0.6)

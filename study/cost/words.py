@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from study.cost.choose import NOT_CHOSEN, Choice, Combination, best_of, combinations
+from study.cost.choose import NO_LOSS, Choice, Combination, best_of, combinations
 from study.cost.errors import KnobErrors
 from study.cost.file import CostStudy
 from study.scene.difference import value_text
@@ -99,7 +99,7 @@ def _own(tables: Sequence[KnobErrors], base: float) -> str:
 
 def _need(table: KnobErrors) -> str:
     """Whether an effect is needed: what its cheapest level moves e_n by."""
-    if not table.name.startswith("effect: ") or table.name in NOT_CHOSEN or len(table.levels) < 2:
+    if not table.name.startswith("effect: ") or table.name in NO_LOSS or len(table.levels) < 2:
         return ""
     cheap, fine = table.levels[0], table.levels[-1]
     moved = cheap.worst[0]
