@@ -33,8 +33,8 @@ class AxisMatch:
 class Difference:
     """One quantity of both files over the common axes; NaN where a file has no result.
 
-    ``error`` is the sum of both discretisation errors; NaN where a file does not state them. ``stated`` tells of each
-    file whether it has a map of them.
+    ``error`` is the sum of both errors: half-widths of bands, or else errors of the mesh; NaN where a file does not
+    state them. ``stated`` tells of each file whether it has a map of them.
     """
 
     name: str
@@ -173,7 +173,9 @@ def _difference(
 
 
 def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[Any, ...]) -> FloatArray | None:
-    """Discretisation error of a quantity in its unit; None where the file has none, as for models but the curved."""
+    """Error of a quantity in its unit; None where the file has none, as for models but the curved."""
+    if model == "curved" and f"{name}_band" in {d.name for d in getattr(result.layout, "derived", ())}:
+        return result.derived(f"{name}_band")[block]
     there = {q.name: q for q in result.layout.quantities if q.group == "maps"}
     if f"{name}_error" not in there or (there[name].by_model and model != "curved"):
         return None

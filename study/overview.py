@@ -32,6 +32,7 @@ def scene_text(scene: Any, file: str) -> str:
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
         "target": _target(scene),
+        "bands": _bands(scene),
         "effects": ", ".join(levels),
         "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
@@ -56,6 +57,19 @@ def _target(scene: Any) -> str:
     from study.cost.target import expected
 
     return expected(scene)
+
+
+def _bands(scene: Any) -> str:
+    """What the bands are made of, and what they take; empty where none are asked for."""
+    own = scene.uncertainty
+    if not own.parts:
+        return ""
+    from study.uncertainty.probes import changes
+
+    more = len(changes(scene))
+    count = own.probes if isinstance(own.probes, int) else len(own.probes)
+    cost = f"{count} candidates are solved {more} more time{'s' * (more > 1)}" if more else "no further solves"
+    return f"of e_n and quality, from {', '.join(own.parts)}; {cost}"
 
 
 def has_wall(shape: Any) -> bool:

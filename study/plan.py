@@ -89,6 +89,7 @@ def has(scene: Any) -> tuple[str, ...]:
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
+    asked["two scores"] = scene.accuracy.meshes > 1
     return tuple(name for name, wanted in asked.items() if wanted)
 
 

@@ -185,7 +185,7 @@ MAPS = (
         "Difference of e_n (curved) between the mesh and one with half as many elements per direction, over its value.",
         needs="two meshes",
     ),
-    Quantity("quality_error", "", "relative error of quality", "As e_n_error.", needs="two meshes"),
+    Quantity("quality_error", "", "relative error of quality", "As e_n_error.", needs="two scores"),
     Quantity("f_x_max_error", "", "relative error of f_x_max", "As e_n_error.", needs="two meshes"),
     Quantity("f_y_max_error", "", "relative error of f_y_max", "As e_n_error.", needs="two meshes"),
     Quantity("tau_z_max_error", "", "relative error of tau_z_max", "As e_n_error.", needs="two meshes"),

@@ -7,7 +7,7 @@ from typing import Any
 
 MODELS = ("curved", "flat", "projected")
 FINGERS = 2
-NEEDS = ("two meshes", "six components", "mass", "wall", "graspit")
+NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
 
 
 @dataclass(frozen=True)

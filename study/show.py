@@ -11,9 +11,10 @@ import numpy as np
 
 from study.columns import DISPLAY, csv_text, with_unit
 from study.layout import DONE
-from study.ranking import BORNE, OF_FILE, borne_level, judged, ranking
+from study.ranking import BORNE, LOST, OF_FILE, borne_level, judged, ranking
 from study.show_text import WINDOW, Columns, alike
 from study.show_text import as_text as as_text
+from study.uncertainty.verdict import sure, verdict
 
 COLUMNS = (  # map, friction model ("" where it has none), unit
     ("quality", "curved", ""),
@@ -36,13 +37,15 @@ SOMETIMES = (  # columns of files that have the map
 class Table:
     """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
 
-    An error stands behind the quantity it belongs to, relative unless the column has a unit.
+    An error stands behind the quantity it belongs to, relative unless the column has a unit; a band is in the unit of
+    the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
     """
 
     title: str
     columns: Columns
     rows: tuple[tuple[Any, ...], ...]
     force: float
+    verdict: str = ""
 
 
 def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
@@ -54,7 +57,8 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
     forces, flags = result.axes[-1].values, judged(result)
     k, why = _level(result, flags, force)
     maps = {(name, units): found[..., k].ravel() for name, units, found in _maps(result)}
-    score = next(maps[c] for c in (("quality", ""), ("e_n", "m")) if c[0] == "e_n" or np.isfinite(maps[c]).any())
+    scored = next(c for c in (("quality", ""), ("e_n", "m")) if c[0] == "e_n" or np.isfinite(maps[c]).any())
+    score = maps[scored]
     done = np.flatnonzero(result.status[..., k].ravel() == DONE)
     flags = flags[..., k].ravel()
     order = done[ranking(score[done], flags[done])]
@@ -72,7 +76,10 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
-    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]))
+    holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
+    same = [tuple(np.delete(index, -1)) for index in np.ndindex(result.layout.shape[:-1])]
+    told = verdict(sure(result, scored[0], k), holding, same, scored[1])
+    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), told)
 
 
 def _level(result: Any, flags: np.ndarray, force: float | None) -> tuple[int, str]:
@@ -96,10 +103,15 @@ def _window(result: Any) -> dict[str, np.ndarray]:
 def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
     """Name, unit and values of the columns between the place and the flags."""
     there = {q.name: q for q in result.layout.quantities}
+    bands = {d.name for d in getattr(result.layout, "derived", ())}
     for name, model, units in (*COLUMNS, *(column for column in SOMETIMES if column[0] in there)):
         model = result.layout.planar if model == "planar" else model
         yield f"{name}_{model}" if model not in ("", "curved") else name, units, result.map(name, model or None)
-        if (error := there.get(f"{name}_error")) and model in ("", "curved"):
+        if model not in ("", "curved"):
+            continue
+        if f"{name}_band" in bands:
+            yield f"{name}_band", units, result.derived(f"{name}_band")
+        elif error := there.get(f"{name}_error"):
             yield error.name, error.units, result.map(error.name)
 
 
@@ -124,7 +136,8 @@ def as_json(table: Table) -> str:
     """One object with the title, the force [N], the units (SI) and a list of grasps; what is not there is null."""
     names = [name for name, _ in table.columns]
     rows = [dict(zip(names, map(_plain, row), strict=True)) for row in table.rows]
-    told = {"title": table.title, "force": table.force, "units": dict(table.columns), "grasps": rows}
+    told = {"title": table.title, "verdict": table.verdict, "force": table.force}
+    told |= {"units": dict(table.columns), "grasps": rows}
     return json.dumps(told, indent=2)
 
 

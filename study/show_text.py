@@ -23,6 +23,7 @@ HEADS = {"quality_fitted": "fitted", "safety_factor": "safety", "wall_stress": "
 LEAST = ("misfit", "f_x_max_error", "f_y_max_error", "tau_z_max_error", "quality_fitted", "e_n_flat", "e_n_projected",
          "f_y_max", "f_x_max", "wall_stress", "tau_z_max", "quality_error", "safety_factor", "dent")  # fmt: skip
 ERROR, ERROR_MEANS = "+-", "error of the column before it, from the coarser of two meshes"
+BAND_MEANS = "half-width of the band of the column before it; about 95 of 100 lie within. [uncertainty] says of what"
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
 FLAGS_WIDTH, LABEL_WIDTH = 18, 28
 
@@ -44,7 +45,8 @@ def as_text(table: Table, width: int = PAPER) -> str:
     left = [kept.index(len(names) - 1)] + [k for k, i in enumerate(kept) if names[i] == "label"]
     lines = aligned([[row[i] for i in kept] for row in rows], left)
     absent = ", ".join(names[i] for i in sorted(set(drop) - set(kept)))
-    return "\n".join([wrapped(table.title, width), *lines, *_legend(told, flags, absent, width)])
+    verdict = [wrapped(table.verdict, width, more="  ")] * bool(table.verdict)
+    return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(told, flags, absent, width)])
 
 
 def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
@@ -52,15 +54,16 @@ def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
     names = [name for name, _ in table.columns]
     told = [f"{word}: {meaning}" for mask, word, meaning in FLAGS if flags & mask]
     told += [f"window: {WINDOW_MEANS}"] * ("window" in names)
-    told += [f"{ERROR}: {ERROR_MEANS}" if any(name.endswith("_error") for name in names) else NO_ERRORS]
+    kinds = {"_band": BAND_MEANS, "_error": f"{ERROR_MEANS}{', in %' * any(n.endswith('_band') for n in names)}"}
+    told += [f"{ERROR}: {text}" for end, text in kinds.items() if any(n.endswith(end) for n in names)] or [NO_ERRORS]
     told += [f"not shown in {width} letters a line: {absent}; --csv and --json have all"] * bool(absent)
     return [wrapped(text, width, more="  ") for text in told]
 
 
 def _head(name: str, units: str) -> tuple[str, str]:
     """Both lines above a column."""
-    if name.endswith("_error"):
-        return two_lines(ERROR, DISPLAY.get(units, (units, 1.0))[0] or "%")
+    if name.endswith(("_error", "_band")):
+        return two_lines(ERROR, DISPLAY.get(units, (units, 1.0))[0] or "%" * name.endswith("_error"))
     return two_lines(HEADS.get(name, name), DISPLAY.get(units, (units, 1.0))[0])
 
 
@@ -159,6 +162,8 @@ def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
         return "-"
     if name.endswith("_error"):
         return f"{value * DISPLAY.get(units, (units, 1.0))[1] * (1 if units else 100):.2g}"
+    if name.endswith("_band"):
+        return f"{value * DISPLAY.get(units, (units, 1.0))[1]:.2g}"
     value *= DISPLAY.get(units, (units, 1.0))[1]
     if coordinate:
         return f"{value:.5g}"

@@ -9,6 +9,8 @@ from study.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
 from study.report.data import LIMITS, Data, number, shown
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
+from study.uncertainty.verdict import sure
+from study.uncertainty.verdict import verdict as judgement
 
 BEST = 6
 LEAST = 1e-4  # relative error below which only a bound is told
@@ -20,6 +22,10 @@ CAVEAT = (
 )
 ESTIMATED = "± is the difference to a mesh half as fine, in per cent of the value; the error is usually smaller."
 NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
+BANDED = (
+    "± is the half-width of the band within which about 95 of 100 cases lie, in per cent of the value; it has the parts"
+    " that [uncertainty] in the scene asks for."
+)
 VALUES = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 HEADS = {
     "quality": "quality", "quality_fitted": "quality, fitted", "e_n": "e_n [mm]", "f_x_max": "max f_x [N]",
@@ -81,7 +87,25 @@ def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list
         f"about its normal (curved model{friction}; weaker finger)."
     )
     wall = [text for text in (wall_sentence(data, best),) if text]
-    return [first, second, *_weight(data, best), *wall, *_planar(data, best), *_other_force(data, best)]
+    return [
+        first,
+        *_apart(data, best),
+        second,
+        *_weight(data, best),
+        *wall,
+        *_planar(data, best),
+        *_other_force(data, best),
+    ]
+
+
+def _apart(data: Data, best: tuple[int, ...]) -> list[str]:
+    """Whether the best grasp is better than those that follow beyond the errors."""
+    order = [i[:-1] for i in data.order(best[-1]) if not data.lost[i] and np.isfinite(data.at(data.score, i))]
+    places = [tuple(np.delete(index, -1)) for index in np.ndindex(data.shape[:-1])]
+    flat = [int(np.ravel_multi_index(index, data.shape[:-1])) for index in order]
+    units = "m" * (data.score == "e_n")
+    told = judgement(sure(data.result, data.score, best[-1]), flat, places, units).replace("+-", "±")
+    return [f"{told[0].upper()}{told[1:]}."] if told else []
 
 
 def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
@@ -95,7 +119,9 @@ def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
 
 def uncertainty(data: Data, name: str, index: tuple[int, ...]) -> str:
     """How far off a value may be, where the file knows: the one place that says so in verdict, tables and maps."""
-    error = data.at(f"{name}_error", index)
+    error, band = data.at(f"{name}_error", index), data.values(f"derived/{name}_band")
+    if band is not None:
+        error = band[tuple(index)] / abs(data.at(name, index))
     if not np.isfinite(error):
         return ""
     share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)
@@ -172,8 +198,14 @@ def _warnings(data: Data, best: tuple[int, ...]) -> str:
     if len(stations) > 2 and not data.by_poses and best[-3] in (int(stations.argmin()), int(stations.argmax())):
         found.append("The best station is the first or last one that was tried; a better one may lie beyond.")
     html = box(found, "warn") if found else ""
-    known = any(uncertainty(data, name, best) for name in VALUES)
-    return html + paragraph(ESTIMATED if known else NOT_ESTIMATED, "note")
+    return html + paragraph(_meaning(data, best), "note")
+
+
+def _meaning(data: Data, best: tuple[int, ...]) -> str:
+    """What the numbers behind ± are."""
+    if data.values("derived/quality_band") is not None:
+        return BANDED
+    return ESTIMATED if any(uncertainty(data, name, best) for name in VALUES) else NOT_ESTIMATED
 
 
 def _listed(words: list[str], most: int = 4) -> str:
