@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from study.build import check_object, shapes_of, warnings
@@ -157,6 +159,11 @@ def test_stations_in_metres_get_a_warning():
     assert not any("metres" in text for text in warnings(at([0.1], BOTTLE)))
 
 
+def unwrapped(text):
+    """Sentences that were broken to the terminal's width, each on one line."""
+    return re.sub(r"\n {2,}(?=\S)", " ", text)
+
+
 @pytest.mark.launches
 def test_plan_and_run_warn_as_check_does(once, shared_path, capsys):
     text = f"{BOX}[gripper]\nelements = [4, 4, 2]\n[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}"
@@ -171,7 +178,7 @@ def test_plan_and_run_warn_as_check_does(once, shared_path, capsys):
     said = []
     for code, output, errors in told():
         assert (code, errors) == (0, "")
-        said.append([line for line in output.splitlines() if line.startswith("warning: ")])
+        said.append([line for line in unwrapped(output).splitlines() if line.startswith("warning: ")])
     assert len(said[0]) == 1
     assert said[1:] == said[:1] * 2
 
@@ -180,6 +187,6 @@ def test_check_says_where_a_mesh_begins_and_ends(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(f"{FLASK}[candidates]\nstations_mm = [10]\n{LOAD}")
     assert main(["check", str(scene)]) == 0
-    text = capsys.readouterr().out
+    text = unwrapped(capsys.readouterr().out)
     assert "0 to 120 mm along its axis (the file's z, counted from the mesh's lowest point" in text
     assert "\nwarning: candidates: at 1 of 1 stations (10 mm) the pad" in text
