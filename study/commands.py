@@ -108,6 +108,8 @@ def plan(options: Namespace) -> int:
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
     lines = [plan_text(made, scene, path, options.ranks), *(f"warning: {text}" for text in warnings(scene))]
+    if scene.accuracy.e_n is not None:
+        lines.append("accuracy.e_n chooses mesh and effects when the run starts; this plan has those of the scene")
     _say(hanging("\n".join(lines), terminal_width()))
     return DONE
 
@@ -355,6 +357,9 @@ def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     from study.reach import check_poses
 
     _check_petsc(dict(scene.petsc))
+    if scene.accuracy.e_n is not None and choice is None:
+        text = f"accuracy.e_n: found {scene.accuracy.e_n:g} in a case of a catalogue, expected it in scenes only"
+        raise StudyError(USAGE, f"{text}; give the case its mesh, or run it as a scene of its own")
     given = [*options.overrides, *petsc_overrides(options.petsc), *overrides(choice)]
     plan = make_plan(scene, options.scene, given)
     check_poses(scene, [unit.scene for unit in plan.units])
