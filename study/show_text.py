@@ -24,7 +24,7 @@ LEAST = ("misfit", "f_x_max_error", "f_y_max_error", "tau_z_max_error", "quality
          "f_y_max", "f_x_max", "wall_stress", "tau_z_max", "quality_error", "safety_factor", "dent")  # fmt: skip
 ERROR, ERROR_MEANS = "+-", "error of the column before it, from the coarser of two meshes"
 BAND_MEANS = "half-width of the band of the column before it; about 95 of 100 lie within. [uncertainty] says of what"
-NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
+NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 FLAGS_WIDTH, LABEL_WIDTH = 18, 28
 
 

@@ -1,0 +1,227 @@
+"""Bands of e_n and quality: closed forms, what is carried from probes to other cases, and what is said of the best."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lsfit.ellipsoid import Ellipsoid
+from scoring.volume import volume_linf
+from study import sweep
+from study.candidates import axis_poses
+from study.layout import Layout
+from study.scene import parse_scene
+from study.scene.errors import SceneError
+from study.uncertainty import carrying, probing
+from study.uncertainty.rescoring import _volume
+from study.uncertainty.stored import derived
+from study.uncertainty.variations import by_formula, moved_poses, variations
+from study.uncertainty.verdict import Sure, sure, verdict
+from tests.study.formula_results import grid_axes
+
+BALL = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+[gripper]
+elements = [8, 4, 3]
+[candidates]
+stations_mm = [-10, 0, 20]
+angles_deg = [0, 90]
+[load]
+normal_force_n = [1, 2, 4]
+"""
+ALL = ("uncertainty.mesh=true", "uncertainty.mu=0.05", "uncertainty.shear_modulus_percent=10", "uncertainty.pose_mm=1")
+
+
+def scene(*overrides):
+    return parse_scene(BALL, "ball.toml", overrides)
+
+
+# --- closed forms ----------------------------------------------------------------------------------------------------
+
+
+def facing(distance):
+    """Two contacts that face each other, as `study.uncertainty.rescoring` reads them from a file."""
+    turned = np.diag([1.0, -1.0, -1.0])
+    return {
+        "frame_origin": np.zeros((2, 3)), "frame_axes": np.array([np.eye(3)] * 2),
+        "pose_rotation": np.array([np.eye(3), turned]), "pose_origin": np.array([[0, 0, 0], [0, 0, distance]]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.3])
+def test_the_quality_goes_with_the_fifth_power_of_mu_where_contacts_face_each_other(share):
+    axes, d = np.array([[0.8, 0.7, 0.01], [0.8, 0.6, 0.012]]), 0.05
+    volumes = [
+        volume_linf(*(x for a in axes * t for x in (Ellipsoid(a).volume, Ellipsoid(a).shadow_area)), d)
+        for t in (1.0, 1 + share, 1 - share)
+    ]
+    assert carrying.change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
+    stored = [_volume(facing(d), t * axes, 1.0, 1.0) for t in (1.0, 1 + share, 1 - share)]
+    assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(carrying.change_by_mu(share), rel=1e-6)
+    assert stored[0] == pytest.approx(volumes[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("power", [-1.0, 0.0, 0.7])
+def test_a_stiffer_pad_is_a_smaller_force(power):
+    force = np.array([1.0, 2.0, 3.0, 7.0])
+    changed = carrying.change_by_modulus(force, np.array([3 * force**power, np.full(4, np.nan)]), 0.05)
+    assert np.allclose(changed[0], -0.05 * power, atol=1e-14)
+    assert np.isnan(changed[1]).all()
+
+
+def test_moved_pads_still_face_each_other():
+    one, two = moved_poses(axis_poses(0.03, 0.4, 0.2), 0.002, 0.1)
+    before = axis_poses(0.03, 0.4, 0.2)
+    for pose, old in zip((one, two), before, strict=True):
+        assert np.allclose(pose.rotation[:, 2], old.rotation[:, 2], atol=1e-14)  # the same approach
+        assert pose.rotation[:, 0] @ old.rotation[:, 0] == pytest.approx(np.cos(0.1))
+        assert np.allclose(pose.origin - old.origin, 0.002 * old.rotation[:, 0], atol=1e-12)
+    assert np.allclose(one.rotation[:, 0], two.rotation[:, 0])
+    assert np.cross(before[0].rotation[:, 0], one.rotation[:, 0]) @ one.rotation[:, 2] == pytest.approx(np.sin(0.1))
+
+
+def test_a_mesh_error_falls_with_the_contact_area_and_a_probe_keeps_its_own():
+    change, area = np.array([[0.02, 0.01]]), np.array([[1.0, 2.0]])
+    assert np.allclose(carrying.carried(change, area, np.array([[1.0, 4.0]])), [[0.04, 0.01]])
+    values = np.array([[1.0, 2.0], [5.0, 6.0], [1.0, 2.0]])  # the third is an image of the first
+    share = carrying.at_least_own(np.full((3, 2), 0.01), np.array([[-0.3, np.nan]]), (0,), values)
+    assert share.tolist() == [[0.3, 0.01], [0.01, 0.01], [0.3, 0.01]]
+
+
+# --- the scene -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("more", "known", "solves"),
+    [
+        ((), ("mu", "modulus"), 3),
+        (("accuracy.meshes=2",), ("mesh", "mu", "modulus"), 2),
+        (("effects.sheet=elastic",), ("mu",), 4),
+        (("effects.friction_pressure_coupling=tangential",), ("modulus",), 4),
+        (("load.normal_force_n=[2]",), ("mu",), 4),
+        (("object.wall_mm=1", "object.open_top=true"), None, None),
+    ],
+)
+def test_what_needs_no_further_solves_gets_none(more, known, solves):
+    if known is None:
+        with pytest.raises(SceneError):
+            scene(*ALL, *more)  # a cylinder has no wall
+        return
+    asked = scene(*ALL, *more)
+    assert by_formula(asked) == known
+    assert len(variations(asked)) == solves
+    assert {v.part for v in variations(asked)}.isdisjoint(known)
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("uncertainty.mu=0.8", "less than friction.mu"),
+        ("uncertainty.wall_thickness_percent=5", "without a wall"),
+        ('uncertainty.probes=[0, "0 mm, 91 deg"]', "did you mean"),
+        ("uncertainty.probes=[6]", "0 to 5"),
+        ("uncertainty.probes=1", ">= 2"),
+    ],
+)
+def test_wrong_uncertainties_are_told_of(override, told):
+    with pytest.raises(SceneError, match=told):
+        scene(override)
+
+
+def test_bands_and_a_sweep_exclude_each_other():
+    text = BALL + '[sweep]\n"object.semi_axis_b_mm" = [15, 20]\n'
+    parse_scene(text, "ball.toml")
+    with pytest.raises(SceneError, match="without a sweep"):
+        parse_scene(text, "ball.toml", ALL[:1])
+
+
+def test_files_of_scenes_without_bands_keep_their_digest():
+    assert scene().digest == scene("uncertainty.probes=7").digest != scene(ALL[0]).digest
+    assert derived(scene("uncertainty.probes=7")) == []
+    names = [d.name for d in derived(scene(*ALL))]
+    assert names[:5] == ["e_n_band", "e_n_band_mesh", "e_n_change_mu", "e_n_change_modulus", "e_n_band_pose"]
+
+
+def test_named_probes_are_those_that_are_solved():
+    from study.uncertainty.probes import probe_candidates, with_probes
+
+    given = scene(*ALL, 'uncertainty.probes=["20 mm, 90 deg", 0]')
+    units = sweep.units(given, lambda point: point.axis_symmetry)
+    chosen = probe_candidates(given, units)
+    assert chosen == (0, 5)
+    marked = [unit for unit in with_probes(given, units, chosen) if unit.probe]
+    assert [unit.candidate.label for unit in marked] == ["-10 mm, 0 deg", "20 mm, 90 deg"]
+    assert [unit.cost for unit in marked] == [4 * units[0].cost, 4 * units[-1].cost]
+    spread = probe_candidates(scene(*ALL, "uncertainty.probes=2"), units)
+    assert len(spread) == 2
+    assert probe_candidates(scene(), units) == ()
+
+
+def test_values_of_probes_stand_at_their_places():
+    layout = Layout(grid_axes(), 0, patches=False, probes=(2, 7), variations=("a", "b", "c"))
+    keys = [c.key for c in layout.columns]
+    at = keys.index("probes/e_n")
+    assert layout.columns[at].shape == (3,)
+    forces = layout.shape[-1]
+    assert layout.places(7 * forces + 1)[at] == (1, 1)
+    assert layout.places(6 * forces + 1)[at] is None
+    found = {d.path: d.shape for d in layout.datasets}
+    assert found["/study/probes/quality"] == (2, forces, 3)
+    assert found["/study/probes/candidate"] == (2,)
+
+
+def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
+    def ladder(_unit, variation):
+        yield 1.0, 2.0
+        if variation.part == "mesh":
+            raise RuntimeError("no convergence")
+        yield 3.0, 4.0
+
+    monkeypatch.setattr(probing, "_ladder", ladder)
+    own = probing.Probing(SimpleNamespace(probe=True, scene=scene("uncertainty.mesh=true", "uncertainty.pose_mm=1")))
+    assert own.values()["probes/e_n"].tolist() == [1.0, 1.0, 1.0]
+    assert np.array_equal(own.values()["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
+    assert np.isnan(own.values()["probes/quality"]).all()
+    assert probing.Probing(SimpleNamespace(probe=False)).values() == {}
+
+
+# --- what is said ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "own", "common", "told"),
+    [
+        ([0.12, 0.10, 0.09], [0.002] * 3, {}, "the best grasp is better than the second beyond the errors"),
+        ([0.12, 0.11, 0.09], [0.01] * 3, {}, "the first 2 grasps cannot be told apart"),
+        ([0.12, 0.10, 0.11], [0.01] * 3, {}, "the first 2 grasps cannot be told apart"),
+        ([0.12, 0.11, 0.10], [0.002, 0.002, 0.05], {}, "the first 3 grasps cannot be told apart"),
+        ([0.12, 0.11, 0.10], [0.0] * 3, {"mu": [0.06, 0.055, 0.05]}, "better than the second"),  # 50 % of each
+        ([0.12, 0.11, 0.10], [0.0] * 3, {"modulus": [0.02, -0.02, 0.01]}, "the first 2 grasps"),
+        ([0.12, 0.11, 0.10], [0.002, np.nan, 0.002], {}, "not known"),
+        ([0.12], [0.002], {}, ""),
+    ],
+)
+def test_the_best_grasp_is_judged_by_the_errors_of_differences(value, own, common, told):
+    value = np.array(value)
+    found = Sure(value, np.array(own), {name: np.array(change) for name, change in common.items()})
+    order = np.argsort(-value)
+    text = verdict(found, order.tolist(), [(i,) for i in range(len(value))])
+    assert (told in text) if told else not text
+
+
+def test_images_of_the_best_grasp_are_no_rivals():
+    found = Sure(np.array([0.12, 0.12, 0.10]), np.full(3, 0.001), {})
+    assert "beyond the errors" in verdict(found, [0, 1, 2], [(0,), (0,), (1,)])
+    assert "the first 2 grasps" in verdict(found, [0, 1, 2], [(0,), (1,), (2,)])
+    assert verdict(None, [0, 1, 2], [(0,)] * 3) == ""
+
+
+def test_a_file_without_errors_knows_none():
+    layout = SimpleNamespace(quantities=(), derived=())
+    assert sure(SimpleNamespace(layout=layout, map=lambda *_: np.ones((2, 2, 1))), "quality", 0) is None
