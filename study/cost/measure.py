@@ -138,11 +138,10 @@ def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, FloatArray],
     return found, message
 
 
-def from_maps(values: dict[str, Any], model: int = 0, quality: str = "quality") -> FloatArray:
-    """`QUANTITIES` of a case for one friction model."""
-    e_n, f_x, f_y, tau_z, score = (
-        float(values[f"maps/{name}"][model]) for name in ("e_n", "f_x_max", "f_y_max", "tau_z_max", quality)
-    )
+def from_maps(values: dict[str, Any]) -> FloatArray:
+    """`QUANTITIES` of a case in the curved model."""
+    names = ("e_n", "f_x_max", "f_y_max", "tau_z_max", "quality")
+    e_n, f_x, f_y, tau_z, score = (float(values[f"maps/{name}"][0]) for name in names)
     return np.array([e_n, max(f_x, f_y), tau_z, score])
 
 

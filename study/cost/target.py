@@ -93,7 +93,18 @@ def refuse_other(path: Path, scene: Scene, measured: Scene) -> None:
     """Refuse a study of another object, pad or friction; meshes, candidates and forces may differ."""
     from study.scene.difference import changes
 
-    free = ("accuracy.", "candidates.", "load.", "effects.", "limit_surface.", "score.", "sweep.", "task.", "run.")
+    free = (
+        "accuracy.",
+        "candidates.",
+        "load.",
+        "effects.",
+        "limit_surface.",
+        "score.",
+        "sweep.",
+        "task.",
+        "run.",
+        "uncertainty.",
+    )
     differ = [
         f"{key} is {there} there and {here} here"
         for key, there, here in changes(measured.effective_toml(), scene.effective_toml())
