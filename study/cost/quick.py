@@ -130,7 +130,7 @@ def _told(study, kept, error, seconds, told, target, cases, failed) -> Choice:
     good = np.flatnonzero(error <= target)
     i = int(good[0]) if good.size else len(kept) - 1
     share = study.spent / (cases * seconds[i])
-    text = f"{told}; choosing took {share:.0%} of the {cases} cases' time on {len(study.candidates)} candidates"
+    text = f"{told}; choosing took {share:.0%} of the {cases} cases' time"
     if share > SHARE:
         text += f", more than {SHARE:.0%}, because so small a map does not pay for a smaller study"
     if failed:
