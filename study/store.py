@@ -233,9 +233,12 @@ def torn_rows(path: Path, layout: Layout) -> list[int]:
 
 def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
     """Every row that is done or failed: number, state, and values, or None where they do not match their checksum."""
+    expected = {d.path: d for d in layout.datasets}
     with h5py.File(path, "r") as file:
-        views = [_mapped(path, file[c.path], c.dtype) for c in layout.columns]
-        codes, crc = (file[f"{ROOT}/status/{name}"][()].ravel() for name in ("code", "crc"))
+        guarded = GuardedFile(path, file)
+        found = {at: guarded.checked(at, d.shape, d.dtype) for at, d in expected.items()}
+        views = [_mapped(path, found[c.path], c.dtype) for c in layout.columns]
+        codes, crc = (guarded.values(found[f"{ROOT}/status/{name}"]).ravel() for name in ("code", "crc"))
     for row in np.flatnonzero(codes != MISSING):
         pairs = zip(views, layout.places(row), strict=True)
         values = [None if place is None else view[place] for view, place in pairs]

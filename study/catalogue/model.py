@@ -12,10 +12,12 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from study.exits import USAGE, StudyError
 from study.quantities import quantities
 from study.quantity import NEEDS
+from study.scene.errors import SceneError
 from study.scene.loading import NAMES
 from study.scene.shape import Section
 from study.scene.text import parse_toml, read_text
 
+MOST_REPETITIONS, LONGEST = 3, 300  # in a regular expression
 COMPARED = ("travel", "e_n", "S")
 MAPS = {q.name: q for q in quantities(NEEDS) if q.group == "maps"}
 
@@ -68,6 +70,11 @@ class Case(Section):
     @field_validator("reason", "remark")
     @classmethod
     def _compiles(cls, pattern: str) -> str:
+        # groups that are repeated, and many repetitions, can take for ever to be found missing
+        repetitions = sum(map(pattern.count, "*+{"))
+        if re.search(r"\)[*+?{]", pattern) or repetitions > MOST_REPETITIONS or len(pattern) > LONGEST:
+            limits = f"no repeated group, at most {MOST_REPETITIONS} of * + {{ and {LONGEST} letters"
+            raise ValueError(f"a regular expression that may take for ever; expected {limits}")
         try:
             re.compile(pattern)
         except re.error as error:
@@ -117,7 +124,10 @@ def load_catalogue(path: Path) -> Catalogue:
     StudyError
         With the place and what is wrong there; scenes are not judged yet.
     """
-    data = parse_toml(read_text(path), str(path))
+    try:
+        data = parse_toml(read_text(path), str(path))
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
     cases = data.get("case", [])
     if isinstance(cases, list):
         data["case"] = [_with_sections(case) for case in cases]

@@ -25,8 +25,11 @@ def case_scene(catalogue: Catalogue, case: Case, path: Path, overrides: Sequence
         With everything wrong with it.
     """
     base = catalogue.base.get(case.base)
-    if base is None:
-        base = parse_toml(read_text(path.parent / case.base), case.base)
+    try:
+        if base is None:
+            base = parse_toml(read_text(path.parent / case.base), case.base)
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
     text = toml_text(merged(base, case.sections))
     try:
         return parse_scene(text, path.parent / f"{case.name}.toml", overrides)

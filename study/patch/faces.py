@@ -87,16 +87,17 @@ def corner_geometry(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
     """
     q = corners
     last = q.shape[1] - 1
-    vector = 0.5 * np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1])
-    area = np.linalg.norm(vector, axis=1)
-    triangle = (q[:, last] == q[:, 2]).all(axis=1)
-    centroid = np.where(triangle[:, None], q[:, :3].mean(axis=1), q.mean(axis=1))
-    return centroid, area, vector / np.where(area > 0, area, 1.0)[:, None]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later, with its place
+        vector = 0.5 * np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1])
+        area = np.linalg.norm(vector, axis=1)
+        triangle = (q[:, last] == q[:, 2]).all(axis=1)
+        centroid = np.where(triangle[:, None], q[:, :3].mean(axis=1), q.mean(axis=1))
+        return centroid, area, vector / np.where(area > 0, area, 1.0)[:, None]
 
 
 def checked(faces: Faces, flip: bool = False) -> ReadPatch:
     """The loaded faces as a contact patch; all that is wrong with them at once, by their places in the file."""
-    refuse([*_not_finite(faces), *_negative(faces)])
+    refuse([*_not_finite(faces), *_negative(faces), *_implausible(faces)])
     loaded = (faces.pressure > 0) & (faces.area > 0)
     refuse([*_no_load(faces, loaded), *_no_area(faces), *_no_normal(faces, loaded)])
     normal = -faces.normal if flip else faces.normal
@@ -104,6 +105,10 @@ def checked(faces: Faces, flip: bool = False) -> ReadPatch:
     patch = ContactPatch(faces.centroid[loaded], faces.area[loaded], normal[loaded], faces.pressure[loaded], corners)
     kept = np.flatnonzero(loaded).tolist()
     return ReadPatch(faces.file, patch, len(loaded), lambda i: faces.place(kept[i]), faces.notes)
+
+
+FARTHEST, LARGEST_AREA, HIGHEST, LONGEST_NORMAL = 1e3, 1e4, 1e12, 1e6  # m, m^2, Pa, -
+LEAST_LOAD = 1e-12  # N
 
 
 def _told(faces: Faces, wrong: NDArray[np.bool_], key: str, found: Callable[[int], str], rest: str) -> list[Problem]:
@@ -136,8 +141,24 @@ def _negative(faces: Faces) -> list[Problem]:
     ]  # fmt: skip
 
 
+def _implausible(faces: Faces) -> list[Problem]:
+    """Numbers of no contact on earth, which would overflow further on."""
+    far = (np.abs(faces.centroid) > FARTHEST).any(axis=1)
+    length = np.abs(faces.normal).max(axis=1)
+    astray = (length > LONGEST_NORMAL) | ((length > 0) & (length < 1 / LONGEST_NORMAL))
+    return [
+        *_told(faces, far, "centroid", lambda i: f"{np.abs(faces.centroid[i]).max():g} m",
+               f"coordinates within {FARTHEST:g} m; check the unit"),
+        *_told(faces, faces.area > LARGEST_AREA, "area", lambda i: f"{faces.area[i]:g} m^2",
+               f"at most {LARGEST_AREA:g} m^2; check the unit"),
+        *_told(faces, faces.pressure > HIGHEST, "pressure", lambda i: f"{faces.pressure[i]:g} Pa",
+               f"at most {HIGHEST:g} Pa; check the unit"),
+        *_told(faces, astray, "normal", lambda i: f"a length of about {length[i]:g}", "a length of 1; normalise it"),
+    ]  # fmt: skip
+
+
 def _no_load(faces: Faces, loaded: NDArray[np.bool_]) -> list[Problem]:
-    if loaded.any():
+    if loaded.any() and (faces.pressure * faces.area).sum() > LEAST_LOAD:
         return []
     found = f"{len(loaded)} faces and no load on any"
     expected = "a face with an area and a pressure above 0"

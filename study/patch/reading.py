@@ -8,6 +8,8 @@ from pathlib import Path
 from study.exits import OTHER_FILE, USAGE, StudyError
 
 ENDINGS = (".csv", ".vtu", ".vtp")
+LARGEST_FILE = 100 * 2**20  # bytes
+MOST_FACES = 500_000
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,13 @@ class Reading:
         return {"length": self.unit, "pressure": self.pressure_unit, "number": "-"}.get(kind)
 
 
+def check_count(file: str, count: int) -> None:
+    """Refuse more faces than a patch may have, before they are read."""
+    if count > MOST_FACES:
+        text = f"{file}: found {count} faces, expected at most {MOST_FACES}; export the contact surface alone"
+        raise StudyError(USAGE, text)
+
+
 def read_patch(file: str, reading: Reading):
     """The patch in a file, checked.
 
@@ -58,6 +67,12 @@ def read_patch(file: str, reading: Reading):
         raise StudyError(USAGE, f"{text}{', '.join(ENDINGS)}; export the patch as CSV, or as VTU or VTP from ParaView")
     try:
         path.open("rb").close()
+        size = path.stat().st_size
+        if not path.is_file():  # a device or a pipe may have no end
+            raise StudyError(OTHER_FILE, f"{file}: is no regular file; name the file of a patch")
+        if size > LARGEST_FILE:
+            text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
+            raise StudyError(USAGE, f"{text}; export the contact surface alone")
     except OSError as error:
         raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
     from study.patch.faces import checked

@@ -13,7 +13,7 @@ from friction.patch import FloatArray
 from study.exits import OTHER_FILE, StudyError
 from study.patch.columns import CENTRE, CORNERS, NORMAL, UNITS, Column, used_columns
 from study.patch.faces import Faces, corner_geometry, refuse
-from study.patch.reading import Reading
+from study.patch.reading import Reading, check_count
 from study.scene.errors import Problem, shown
 
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
@@ -69,7 +69,14 @@ def _lines(path: Path) -> Table:
         found, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
         refuse([Problem(str(path), None, "", found, expected, f"write {MINIMAL}")])
     marks = {mark: lines[0][1].count(mark) for mark in ",;\t"}
-    rows = list(csv.reader([line for _, line in lines], delimiter=max(marks, key=marks.__getitem__)))
+    check_count(str(path), len(lines) - 1)
+    rows = []
+    for number, line in lines:  # one by one: no quotation mark may swallow the lines behind it
+        try:
+            rows += csv.reader([line], delimiter=max(marks, key=marks.__getitem__), strict=True)
+        except csv.Error as error:
+            remedy = "write numbers with a decimal point, without quotation marks"
+            refuse([Problem(str(path), number, "", f"a line that is no table ({error})", "cells", remedy)])
     return Table(str(path), rows[0], [k for k, _ in lines[1:]], rows[1:])
 
 
@@ -150,7 +157,8 @@ def _numbers(table: Table, needed: list[Column], reading: Reading) -> dict[str, 
                 values[j, i] = float(cell)
     refuse(problems)
     factors = [UNITS[c.kind][c.unit or reading.unit_of(c.kind) or "-"] for c in needed]
-    return {c.name: factor * row for c, factor, row in zip(needed, factors, values, strict=True)}
+    with np.errstate(over="ignore"):  # what is not finite is told of with its place
+        return {c.name: factor * row for c, factor, row in zip(needed, factors, values, strict=True)}
 
 
 def _is_number(cell: str) -> bool:

@@ -14,8 +14,9 @@ from friction.patch import FloatArray
 from study.exits import OTHER_FILE, USAGE, StudyError
 from study.patch.columns import UNITS, split_header
 from study.patch.faces import Faces, corner_geometry
-from study.patch.reading import Reading
+from study.patch.reading import Reading, check_count
 from study.scene.errors import Problem, closest
+from study.trial import trouble
 
 READERS = {".vtu": vtkXMLUnstructuredGridReader, ".vtp": vtkXMLPolyDataReader}
 TRIANGLE, QUAD, POLYGON, PIXEL = 5, 9, 7, 8
@@ -28,6 +29,13 @@ def read_vtk(path: Path, reading: Reading) -> Faces:
     The pressure is a scalar array of the cells, or one of the points, whose mean over its corners a face takes.
     Normals are the cells' array ``Normals`` if there is one, and follow from the order of the corners otherwise.
     """
+    if why := trouble(lambda: _faces(path, reading)):
+        raise StudyError(OTHER_FILE, f"{path}: is damaged ({why}); write it again")
+    return _faces(path, reading)
+
+
+def _faces(path: Path, reading: Reading) -> Faces:
+    """As `read_vtk`, where VTK survives the file."""
     grid = _loaded(path)
     if reading.unit is None:
         _refuse(path, "coordinates", "no unit, which these files never tell", "a unit of length",
@@ -35,14 +43,19 @@ def read_vtk(path: Path, reading: Reading) -> Faces:
     ids = _corner_ids(path, grid)
     if ids.min() < 0 or ids.max() >= grid.GetNumberOfPoints():
         raise StudyError(OTHER_FILE, f"{path}: a cell refers to a point that does not exist; write the file again")
-    corners = UNITS["length"][reading.unit] * vtk_to_numpy(grid.GetPoints().GetData()).astype(float)[ids]
+    with np.errstate(all="ignore"):  # what is not finite is told of with its place
+        corners = UNITS["length"][reading.unit] * vtk_to_numpy(grid.GetPoints().GetData()).astype(float)[ids]
     name, at_points = _pressure_array(path, grid, reading)
     unit = (split_header(name, reading.pressure_name) or ("", None))[1] or reading.pressure_unit
     if unit is None:
         _refuse(path, name, "no unit", "a unit of pressure",
                 f"add --pressure-unit kpa, or name the array {name}_kpa: units are not guessed")  # fmt: skip
     data = grid.GetPointData() if at_points else grid.GetCellData()
-    pressure = UNITS["pressure"][unit] * vtk_to_numpy(data.GetArray(name)).astype(float)
+    with np.errstate(all="ignore"):
+        pressure = UNITS["pressure"][unit] * vtk_to_numpy(data.GetArray(name)).astype(float)
+    if len(pressure) != (grid.GetNumberOfPoints() if at_points else len(ids)):
+        text = f"'{name}' has {len(pressure)} values for {len(ids)} cells"
+        raise StudyError(OTHER_FILE, f"{path}: damaged ({text}); write it again")
     centroid, area, normal = corner_geometry(corners)
     notes: tuple[str, ...] = ()
     if at_points:
@@ -71,6 +84,7 @@ def _loaded(path: Path) -> Any:
     if not able or heard.GetOutput() or grid is None:
         what = path.suffix[1:].upper()
         raise StudyError(OTHER_FILE, f"{path}: is damaged or no {what} file; write it again, from ParaView as {what}")
+    check_count(str(path), grid.GetNumberOfCells())
     if grid.GetNumberOfCells() == 0:
         _refuse(path, "cells", "none", "triangles or quadrilaterals", "export the contact surface with its cells")
     return grid
@@ -80,7 +94,7 @@ def _corner_ids(path: Path, grid: Any) -> np.ndarray:
     """Point numbers around every cell ``(n, k)``, k = 3 or 4; triangles among quadrilaterals repeat the last."""
     kinds = np.array([grid.GetCellType(i) for i in range(grid.GetNumberOfCells())])
     sizes = np.array([grid.GetCell(i).GetNumberOfPoints() for i in range(len(kinds))])
-    flat = np.isin(kinds, (TRIANGLE, QUAD, PIXEL)) | ((kinds == POLYGON) & (sizes <= 4))
+    flat = np.isin(kinds, (TRIANGLE, QUAD, PIXEL)) | ((kinds == POLYGON) & (sizes >= 3) & (sizes <= 4))
     if not flat.all():
         i = int(np.argmin(flat))
         kind = grid.GetCell(i).GetClassName().removeprefix("vtk")
@@ -126,7 +140,8 @@ def _given_normals(grid: Any) -> FloatArray | None:
     data = grid.GetCellData()
     for k in range(data.GetNumberOfArrays()):
         array = data.GetArray(k)
-        if array is not None and data.GetArrayName(k).lower() in NORMALS and array.GetNumberOfComponents() == 3:
+        named = array is not None and (data.GetArrayName(k) or "").lower() in NORMALS
+        if named and (array.GetNumberOfComponents(), array.GetNumberOfTuples()) == (3, grid.GetNumberOfCells()):
             return vtk_to_numpy(array).astype(float)
     return None
 

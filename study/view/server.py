@@ -9,6 +9,15 @@ from study.exits import USAGE, StudyError
 LOOPBACK = "127.0.0.1"
 OWN_NAMES = (LOOPBACK, "localhost")
 
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+    "img-src data:; frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+
 
 def server(html: str, port: int = 0) -> ThreadingHTTPServer:
     """A server of one page at ``/``; port 0 takes a free one.
@@ -21,6 +30,9 @@ def server(html: str, port: int = 0) -> ThreadingHTTPServer:
     content = html.encode()
 
     class Handler(BaseHTTPRequestHandler):
+        timeout = 10.0  # s that a request may take to arrive
+        server_version, sys_version = "softjaw", ""
+
         def do_GET(self) -> None:  # the name that http.server looks for
             # a page from elsewhere must not read this one by a name of its own for this address
             known = self.headers.get("Host", "").rpartition(":")[0] in OWN_NAMES
@@ -28,7 +40,8 @@ def server(html: str, port: int = 0) -> ThreadingHTTPServer:
             self.send_response(status)
             self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(content) if status == 200 else 0))
-            self.send_header("Cache-Control", "no-store")
+            for name, value in HEADERS.items():
+                self.send_header(name, value)
             self.end_headers()
             if status == 200:
                 self.wfile.write(content)
