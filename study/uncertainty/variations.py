@@ -75,12 +75,11 @@ def variations(scene: Scene) -> tuple[Variation, ...]:
 
 def _coarser(scene: Scene) -> dict[str, Any]:
     elements = [max(n, FEWEST) for n in pad_shape(scene.gripper, coarser=True).elements]
-    found: dict[str, Any] = {"gripper.elements": elements}
+    # an odd number of elements has no symmetric halves
+    found: dict[str, Any] = {"gripper.elements": elements, "effects.model_size": "full"}
     if has_wall(scene.object):
         sizes = {key: getattr(scene.accuracy, key) for key in ("wall_around_mm", "wall_along_mm", "wall_coarse_mm")}
         found |= {f"accuracy.{key}": min(2 * size, COARSEST_WALL) for key, size in sizes.items()}
-    if scene.effects.model_size != "auto":  # an odd number of elements has fewer planes of symmetry
-        found["effects.model_size"] = "auto"
     return found
 
 

@@ -42,6 +42,11 @@ normal_force_n = [1, 3]
 
 [accuracy]
 meshes = 2
+
+[uncertainty]
+probes = ["30 mm, 5 deg"]
+mu = 0.05
+pose_mm = 1
 """
 CASES = 12
 # The same program with a pause before every case, so that there is time to interrupt it.

@@ -225,3 +225,63 @@ def test_images_of_the_best_grasp_are_no_rivals():
 def test_a_file_without_errors_knows_none():
     layout = SimpleNamespace(quantities=(), derived=())
     assert sure(SimpleNamespace(layout=layout, map=lambda *_: np.ones((2, 2, 1))), "quality", 0) is None
+
+
+# --- against solves --------------------------------------------------------------------------------------------------
+
+
+def solved(given, name):
+    """A map ``(units, forces)`` of a scene, NaN where a case fails, and the units."""
+    from study.pipeline import solve_unit
+    from study.result import CaseFailure
+
+    units = sweep.units(given, lambda point: point.axis_symmetry)
+    found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)
+    for i, unit in enumerate(units):
+        for k, case in solve_unit(unit):
+            if not isinstance(case, CaseFailure):
+                found[:, i, k] = [np.ravel(case.values[f"maps/{key}"])[0] for key in name]
+    return found, units
+
+
+@pytest.mark.long
+def test_the_state_depends_on_force_over_modulus_only():
+    soft = "candidates.stations_mm=[0]", "load.normal_force_n=[2]"
+    stiff = "candidates.stations_mm=[0]", "load.normal_force_n=[2.2]", "gripper.shear_modulus_kpa=44"
+    one, other = (solved(scene(*given), ("e_n", "quality"))[0] for given in (soft, stiff))
+    assert np.allclose(one, other, rtol=1e-7)
+
+
+@pytest.mark.long
+def test_the_change_by_the_modulus_is_that_of_further_solves():
+    """Half the difference between solves with the modulus 3 % up and down; the slope is that of a parabola."""
+    where = "candidates.stations_mm=[0]", "load.normal_force_n=[1.8, 2, 2.2]", "gripper.elements=[12, 6, 4]"
+    names, force = ("e_n", "quality"), np.array([1.8, 2.0, 2.2])
+    own, _ = solved(scene(*where), names)
+    up, down = (solved(scene(*where, f"gripper.shear_modulus_kpa={40 * t}"), names)[0] for t in (1.03, 0.97))
+    expected = ((up - down) / (2 * own))[..., 1]
+    assert np.allclose(carrying.change_by_modulus(force, own, 0.03)[..., 1], expected, rtol=2e-3, atol=0)
+
+
+@pytest.mark.long
+def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
+    from study.ranking import LOST
+    from study.scene import load_scene
+    from study.uncertainty.probes import probe_candidates
+
+    coarse = "gripper.elements=[12, 6, 4]", "candidates.stations=18", "candidates.angles_deg=[0]"
+    given = load_scene("jobs/bottle-rigid.toml", [*coarse, "uncertainty.mesh=true"])
+    both = load_scene("jobs/bottle-rigid.toml", [*coarse, "accuracy.meshes=2"])
+    found, units = solved(both, ("e_n_error", "quality_error", "contact_area", "flags", "e_n"))
+    error, area, flags = found[:2], found[2], np.nan_to_num(found[3]).astype(int)
+    probes = list(probe_candidates(given, units))
+    sound = (flags & LOST == 0) & np.isfinite(error).all(axis=0)
+    others = sound & ~np.isin(np.arange(len(area)), probes)[:, None]
+    one = next(unit for unit in sweep.units(given, lambda point: point.axis_symmetry) if unit.index == probes[2])
+    again = [e_n for e_n, _ in probing._ladder(one, variations(given)[0])]
+    assert np.allclose(np.abs(np.array(again) / found[4][probes[2]] - 1), error[0][probes[2]], rtol=1e-5)
+    for own in error:
+        change = np.where(sound[probes], own[probes], np.nan)
+        band = carrying.carried(change, area[probes], area)
+        assert np.mean(own[others] <= band[others]) >= 0.9
+        assert np.median(band[others]) < 6 * np.median(own[others])  # and it is no empty promise
