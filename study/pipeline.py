@@ -59,7 +59,9 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
                 values |= _quality_error(scene, obj, outcome, values)
             seconds = time.perf_counter() - start
             result = _result(values, outcome, seconds, effects_of(scene, fine, bounds, solving))
-            yield k, replace(result, values=result.values | probing.values())
+            more = probing.values()
+            told = "; ".join(text for text in (result.message, *probing.failures) if text)
+            yield k, replace(result, values=result.values | more, message=told)
     finally:
         probing.close()
         solving.destroy()

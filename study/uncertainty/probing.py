@@ -21,26 +21,32 @@ NAMES = ("e_n", "quality")
 class Probing:
     """The further solves of one probe, which climb its forces beside it.
 
-    What fails there leaves NaN from that force on, and never harms the case itself; so does a time limit.
+    What fails there leaves NaN from that force on, and never harms the case itself; so does a time limit. ``failures``
+    says what failed at the last force.
     """
 
     def __init__(self, unit: Any) -> None:
-        self._ladders = [_ladder(unit, variation) for variation in (variations(unit.scene) if unit.probe else ())]
+        self._solves = variations(unit.scene) if unit.probe else ()
+        self._ladders = [_ladder(unit, variation) for variation in self._solves]
+        self.failures: list[str] = []
 
     def values(self) -> dict[str, np.ndarray]:
         """Values ``(variations,)`` of the next force, keyed as in ``study.quantities``."""
         found = np.full((len(NAMES), len(self._ladders)), np.nan)
+        self.failures = []
         try:
-            for i, ladder in enumerate(self._ladders):
-                found[:, i] = self._next(ladder)
+            for i in range(len(self._ladders)):
+                found[:, i] = self._next(i)
         except TimeLimitError:
+            self.failures.append("probe: run.time_limit_s passed")
             self.close()
         return {f"probes/{name}": values for name, values in zip(NAMES, found, strict=True)} if self._ladders else {}
 
-    def _next(self, ladder: Iterator[tuple[float, float]]) -> tuple[float, float]:
+    def _next(self, i: int) -> tuple[float, float]:
         try:
-            return next(ladder, (np.nan, np.nan))
-        except (ArithmeticError, MemoryError, RuntimeError, ValueError, StudyError):
+            return next(self._ladders[i], (np.nan, np.nan))
+        except (ArithmeticError, MemoryError, RuntimeError, ValueError, StudyError) as error:
+            self.failures.append(f"probe, {self._solves[i].name}: {error}")
             return np.nan, np.nan
 
     def close(self) -> None:

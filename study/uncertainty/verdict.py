@@ -85,6 +85,8 @@ def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int,
     if len(grasps) < 2:
         return ""
     judged = [found.apart(grasps[0], other) for other in grasps[1:]]
+    if not np.isfinite(found.own[grasps]).any():
+        return "errors are not known: not all cases are solved yet, or the probes could not be solved again"
     if judged[0] is None:
         return "whether the best grasp is better than the second is not known: one of them has no error"
     alike = max((i for i, apart in enumerate(judged, start=1) if apart is False), default=0)

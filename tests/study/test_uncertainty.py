@@ -187,6 +187,7 @@ def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
     own = probing.Probing(SimpleNamespace(probe=True, scene=scene("uncertainty.mesh=true", "uncertainty.pose_mm=1")))
     assert own.values()["probes/e_n"].tolist() == [1.0, 1.0, 1.0]
     assert np.array_equal(own.values()["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
+    assert own.failures == ["probe, half as many elements per direction: no convergence"]
     assert np.isnan(own.values()["probes/quality"]).all()
     assert probing.Probing(SimpleNamespace(probe=False)).values() == {}
 
@@ -204,6 +205,7 @@ def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
         ([0.12, 0.11, 0.10], [0.0] * 3, {"mu": [0.06, 0.055, 0.05]}, "better than the second"),  # 50 % of each
         ([0.12, 0.11, 0.10], [0.0] * 3, {"modulus": [0.02, -0.02, 0.01]}, "the first 2 grasps"),
         ([0.12, 0.11, 0.10], [0.002, np.nan, 0.002], {}, "not known"),
+        ([0.12, 0.11], [np.nan, np.nan], {}, "not all cases are solved yet"),
         ([0.12], [0.002], {}, ""),
     ],
 )
