@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.closest import ellipse_gap
 from fem.pose import FloatArray
 from fem.revolution import Revolution
 from fem.shape import Analytic, Gap, GapFunction, GapObject, Surface, grid_triangles, in_plane, radial
@@ -105,6 +104,8 @@ class EllipticCylinder(Analytic):
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
+        from fem.closest import ellipse_gap  # with numba, which a scene that is only checked does not need
+
         g, n, H = ellipse_gap(np.asarray(x, dtype=float), float(self.a), float(self.b))
         return g, *in_plane(x, n, H)
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from fem.jet import Jet, log_of_size
 from fem.pose import FloatArray
@@ -128,6 +127,8 @@ class OuterSurface:
         k = crossing[0]
         if off[k] == 0.0 or off[k + 1] == 0.0:
             return float(s[k] if off[k] == 0.0 else s[k + 1])
+        from scipy.optimize import brentq
+
         return float(brentq(lambda p: self.curve.derivative(np.array([p]))[0, 0] - z, s[k], s[k + 1], xtol=1e-14))
 
 
@@ -183,7 +184,23 @@ def _by_height(z: Sequence[float], values: ArrayLike) -> Callable:
     if np.ptp(values) == 0:
         return lambda x, order=0: np.full(np.shape(x), values[0] if order == 0 else 0.0)
     far = np.ptp(z)
-    z = np.concatenate([[z[0] - far], z, [z[-1] + far]])
-    curve = PchipInterpolator(z, np.concatenate([values[:1], values, values[-1:]]))
-    derivatives = [curve, curve.derivative(1), curve.derivative(2)]
-    return lambda x, order=0: derivatives[order](np.clip(x, z[0], z[-1]))
+    z, values = np.concatenate([[z[0] - far], z, [z[-1] + far]]), np.concatenate([values[:1], values, values[-1:]])
+    h, slope = np.diff(z), _slopes(z, values)
+    d, m, n = np.diff(values) / h, slope[:-1], slope[1:]
+    c = np.stack([values[:-1], m, (3 * d - 2 * m - n) / h, (m + n - 2 * d) / h**2])  # powers of x - z on each piece
+
+    def derivative(x: FloatArray, order: int = 0) -> FloatArray:
+        x = np.clip(x, z[0], z[-1])
+        k = np.clip(np.searchsorted(z, x, side="right") - 1, 0, len(h) - 1)
+        return polyval(x - z[k], polyder(c[:, k], order), tensor=False)
+
+    return derivative
+
+
+def _slopes(z: FloatArray, values: FloatArray) -> FloatArray:
+    """Slopes of a monotone cubic, after Fritsch and Butland: weighted harmonic means, none at turning points."""
+    h = np.diff(z)
+    d, left, right = np.diff(values) / h, 2 * h[1:] + h[:-1], h[1:] + 2 * h[:-1]
+    slope, same = np.zeros(len(z)), np.flatnonzero(d[:-1] * d[1:] > 0)
+    slope[same + 1] = (left + right)[same] / (left[same] / d[same] + right[same] / d[same + 1])
+    return slope

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from fem.pose import FloatArray
 
@@ -102,18 +101,35 @@ def spline(points: FloatArray, start: End, end: End, s: FloatArray | None = None
     if s is None:
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     columns = [_component(points[:, c], s, start.conditions(c), end.conditions(c)) for c in (0, 1)]
-    breaks = np.unique(np.concatenate([column.t for column in columns]))
+    breaks = np.unique(np.concatenate([knots for knots, _ in columns]))
     c = np.empty((len(breaks) - 1, 2, 4))
     for k, factor in enumerate((1, 1, 2, 6)):
-        for i, column in enumerate(columns):
-            c[:, i, k] = column(breaks[:-1], nu=k) / factor
+        for i, (knots, weights) in enumerate(columns):
+            c[:, i, k] = b_splines(knots, breaks[:-1], k) @ weights / factor
     return Curve(breaks, c)
+
+
+def b_splines(t: FloatArray, x: FloatArray, order: int = 0) -> FloatArray:
+    """Derivatives of the cubic B-splines over the knots ``t`` at ``x (n,)``: ``(n, len(t) - 4)``.
+
+    By the recursion of Cox and de Boor; loading scipy's would take longer than an outline is worth.
+    """
+    piece = np.clip(np.searchsorted(t, x, side="right") - 1, 3, len(t) - 5)
+    B = (np.arange(len(t) - 1) == piece[:, None]).astype(float)
+    for degree in (1, 2, 3):
+        width = t[degree:] - t[:-degree]
+        share = B / np.where(width > 0, width, np.inf)
+        if degree > 3 - order:
+            B = degree * (share[:, :-1] - share[:, 1:])
+        else:
+            B = (x[:, None] - t[: -degree - 1]) * share[:, :-1] + (t[degree + 1 :] - x[:, None]) * share[:, 1:]
+    return B
 
 
 def _component(
     values: FloatArray, s: FloatArray, start: list[tuple[int, float]], end: list[tuple[int, float]]
-) -> BSpline:
-    """Spline of one coordinate."""
+) -> tuple[FloatArray, FloatArray]:
+    """Knots of the spline of one coordinate, and the weights of its B-splines."""
     n, knots = len(s), list(s[1:-1])
     if n < 4:
         start, end = start or [(2, 0.0)], end or [(2, 0.0)]
@@ -127,10 +143,10 @@ def _component(
     if len(end) == 2:
         knots.append(s[-1] - (s[-1] - s[-2]) / (3 if both else 2))
     t = np.concatenate([np.repeat(s[0], 4), sorted(knots), np.repeat(s[-1], 4)])
-    basis = BSpline(t, np.eye(len(t) - 4), 3)
-    rows = [basis(s), *(basis(s[:1], nu=order) for order, _ in start), *(basis(s[-1:], nu=order) for order, _ in end)]
+    rows = [b_splines(t, s)]
+    rows += [b_splines(t, place, order) for place, wanted in ((s[:1], start), (s[-1:], end)) for order, _ in wanted]
     right = np.concatenate([values, [value for _, value in start], [value for _, value in end]])
-    return BSpline(t, np.linalg.solve(np.concatenate(rows), right), 3)
+    return t, np.linalg.solve(np.concatenate(rows), right)
 
 
 def straight_runs(points: FloatArray) -> list[tuple[int, int, bool]]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from fem.closest import bounding_circles, profile_gap
 from fem.pose import FloatArray
 from fem.profile import Curve, straight_runs, through
 from fem.shape import Analytic, Gap, Surface, grid_triangles
@@ -58,16 +58,23 @@ class Revolution(Analytic):
             "overshoot": _overshoot(points, given),
             "_places": places,
             "_line": line,
-            "_blocks": bounding_circles(line, BLOCK),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
+        from fem.closest import profile_gap  # with numba, which a scene that is only checked does not need
+
         x = np.ascontiguousarray(x, dtype=float)
         curve = self.curve
         return profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places, self._blocks, BLOCK)
+
+    @cached_property
+    def _blocks(self) -> FloatArray:
+        from fem.closest import bounding_circles
+
+        return bounding_circles(self._line, BLOCK)
 
     @property
     def bounds(self) -> FloatArray:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.facing import FAR, Wall, face
-from fem.mesh_object import MeshObject
 from fem.outer_surface import OuterSurface
 from fem.pose import FloatArray, Pose
 from fem.shape import Gap, GapFunction, Surface, grid_triangles
-from fem.spline_surface import SplineSurface, spline_surface
+
+if TYPE_CHECKING:  # numba and scipy, which a scene that is only checked does not need
+    from fem.facing import Wall
+    from fem.mesh_object import MeshObject
+    from fem.spline_surface import SplineSurface
 
 NEAR = 0.004  # where the exact place on the wall is looked for [m]
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
@@ -53,6 +56,8 @@ class Stacked:
 
     def _gap(self, x: FloatArray, close: NDArray[np.bool_]) -> Gap:
         """Exact where points are ``close`` to the wall and face it, else from the triangles."""
+        from fem.facing import FAR, face
+
         g, normal, hessian = np.zeros(len(x)), np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         none = np.zeros((self._wall.nodes.max() + 1, 3))
         near = np.flatnonzero(close)
@@ -76,6 +81,8 @@ class Stacked:
 
     @cached_property
     def _triangles(self) -> MeshObject:
+        from fem.mesh_object import MeshObject
+
         return MeshObject(*self._sampled(AROUND, ALONG))
 
     def _sampled(self, around: int, along: int) -> Surface:
@@ -110,6 +117,8 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
 
     ``outer`` offers ``wall``, ``curve`` and ``jets`` as ``fem.outer_surface.OuterSurface`` does.
     """
+    from fem.spline_surface import spline_surface
+
     ends = outer.wall[0] if lower is None else lower, outer.wall[1] if upper is None else upper
     breaks = outer.curve.breaks
     breaks = breaks[(breaks > ends[0]) & (breaks < ends[1])]
@@ -124,6 +133,8 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
 
 def undeformed(surface: SplineSurface) -> Wall:
     """The surface's own grid as the mesh of a wall."""
+    from fem.facing import Wall
+
     m, k = len(surface.theta) - 1, len(surface.s)
     number = np.arange(m * k, dtype=np.int32).reshape(m, k)
     return Wall(surface, surface.theta, surface.s, np.vstack([number, number[:1]]), np.full(m * k, 1e-3))

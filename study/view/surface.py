@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
 
 from study.pictures import edges
 
@@ -105,14 +104,22 @@ def with_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     unit = normal / size[size > 0, None]
     span = np.ptp(x, axis=(0, 1)).max()
     _, corner = np.unique(np.round(x.reshape(-1, 3) / span, 7), axis=0, return_inverse=True)
-    face = np.repeat(np.arange(len(x)), 3)
-    meets = coo_array((np.ones(len(face)), (face, corner.ravel())), shape=(len(x), corner.max() + 1)).tocsr()
-    around = (meets[:, corner.ravel()].T).tocoo()  # rows: corners, columns: triangles that meet there
-    same = np.einsum("ki,ki->k", unit[face[around.row]], unit[around.col]) > CREASE
-    summed = np.zeros((len(face), 3))
-    np.add.at(summed, around.row[same], normal[around.col[same]])
+    here, there = _met(corner.ravel())
+    there = there // 3  # the triangle it belongs to
+    same = np.einsum("ki,ki->k", unit[here // 3], unit[there]) > CREASE
+    summed = np.zeros((3 * len(x), 3))
+    np.add.at(summed, here[same], normal[there[same]])
     smooth = summed / np.linalg.norm(summed, axis=1, keepdims=True)
     return np.concatenate([x, smooth.reshape(-1, 3, 3)], axis=-1)
+
+
+def _met(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs of corners at one place, itself included: numbers of the one and of the other ``(k,)``."""
+    many, order = np.bincount(place), np.argsort(place, kind="stable")
+    first, own = np.cumsum(many) - many, many[place]
+    here = np.repeat(np.arange(len(place)), own)
+    step = np.arange(len(here)) - np.repeat(np.cumsum(own) - own, own)
+    return here, order[first[place[here]] + step]
 
 
 def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:

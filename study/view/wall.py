@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from study.layout import DONE
 from study.report.data import Data
@@ -45,6 +44,8 @@ def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarr
 
 def wall_of(scene: Any, index: tuple[int, ...], points: np.ndarray) -> Wall | None:
     """Where points ``(n, 3)`` of the surface [m] lie on the wall; None for objects without one."""
+    from scipy.spatial import cKDTree
+
     grid = undeformed(scene, index, 0.0)
     if grid is None or not len(points):
         return None

@@ -169,7 +169,8 @@ def test_straight_runs_of_a_profile_stay_straight():
     x = np.column_stack([np.full(500, 33 * MM), np.zeros(500), z])
     g, _, H = SHAPES["bottle"].gap(x)
     assert np.abs(g).max() < 1e-16
-    assert np.abs(H[:, 2, 2]).max() == 0
+    assert np.abs(H[1:-1, 2, 2]).max() == 0
+    assert np.abs(H[[0, -1], 2, 2]).max() < 1e-11  # these places belong to the roundings beside the run, too
 
 
 def test_profile_passes_its_points_and_has_continuous_curvature():
