@@ -8,18 +8,28 @@ from typing import Any
 
 import numpy as np
 
+from study.coupling_level import coupling_level
 from study.limit_surface import dropped_share
 from study.quantities import EFFECTS, REASONS
 from study.scene import Scene
 from study.sheet_level import sheet_level
 
-ONLY, FORCED, BELOW, ABOVE, SYMMETRY, DEFAULT = range(6)  # of REASONS
+ONLY, FORCED, BELOW, ABOVE, SYMMETRY = range(5)  # of REASONS
+CHEAP, LEFT_OUT = (
+    REASONS.index(text)
+    for text in (
+        "never skipped, because it costs next to nothing",
+        "left out, though the indicator is above the target",
+    )
+)
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
     "full": "fitted ellipsoid",
     "quartic": "convex quartic",
 }
+# In 126 cases e_n was off by at most 0.35 times the dropped share where f_z, tau_x and tau_y had to vanish.
+SMALL_SHARE = 0.05
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
@@ -28,11 +38,8 @@ def effects_of(
 ) -> dict[str, tuple[str, float, int]]:
     """Level, indicator and reason of every effect of one case; keys and levels as in ``study.quantities.EFFECTS``.
 
-    The indicators are those that a choice between levels is made by: the dent that a linear wall would get at the
-    largest force, over the wall's thickness, for the object, the largest strain for the pad, the compliance of the
-    sheet over that of the pad for the sheet, the share of the normal force that the tilt of the loaded normals takes
-    away for the friction model, the mean share of the three dropped components for the wrench, the radial misfit for
-    the limit surface.
+    The indicators are those of ``study.quantities.INDICATORS``. Levels that change the solve are chosen before it, by
+    `study.wall`, `study.pad_level` and `study.sheet_level`; here they only get their names.
     """
     wanted = scene.effects
 
@@ -44,8 +51,6 @@ def effects_of(
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["curved"] for own in bounds]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
-    radial = float(np.max([b.misfit.Erad for b in curved]))
-    six = "3-D" if wanted.wrench == "auto" else wanted.wrench
     size = MODEL_SIZES[solving.planes]
     return {
         "object": _object(solving.level),
@@ -53,10 +58,10 @@ def effects_of(
         "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),
-        "friction": ("curved", 1.0 - F_N / S, only("friction")),
-        "wrench": (six, dropped, DEFAULT if wanted.wrench == "auto" else FORCED),
-        "limit_surface": (SURFACES[scene.limit_surface.model], radial, FORCED),
-        "friction_pressure_coupling": _coupling(wanted.friction_pressure_coupling),
+        "friction": ("curved", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),
+        "wrench": _wrench(wanted.wrench, dropped),
+        "limit_surface": _surface(scene, curved),
+        "friction_pressure_coupling": coupling_level(scene, contacts, bool(solving.level and solving.level.number)),
     }
 
 
@@ -69,10 +74,18 @@ def _object(level: Any) -> tuple[str, float, int]:
     return names[level.number], level.indicator, reason
 
 
-def _coupling(wanted: str) -> tuple[str, float, int]:
-    """Whether friction acted back on the pressure."""
-    names = EFFECTS["friction_pressure_coupling"]
-    return names[wanted == "tangential"], nan, DEFAULT if wanted == "auto" else FORCED
+def _wrench(wanted: str, dropped: float) -> tuple[str, float, int]:
+    """Only the scene asks for six components: nothing that is mapped is computed from them."""
+    if wanted != "auto":
+        return wanted, dropped, FORCED
+    return EFFECTS["wrench"][0], dropped, BELOW if dropped <= SMALL_SHARE else LEFT_OUT
+
+
+def _surface(scene: Scene, bounds: Sequence[Any]) -> tuple[str, float, int]:
+    """Form of the limit surface: an ellipsoid, whose quality is 7 to 12 % off, only where the scene asks for it."""
+    model = scene.limit_surface.model
+    costs_little = model == "quartic" and scene.effects.limit_surface == "auto"
+    return SURFACES[model], float(np.max([b.misfit.Erad for b in bounds])), CHEAP if costs_little else FORCED
 
 
 def _fingers(solving: Any, only: int) -> tuple[str, float, int]:

@@ -234,6 +234,8 @@ INDICATORS = {
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",
     "limit_surface": "radial misfit of the fitted limit surface, curved model, of the finger where it is larger",
+    "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
+    " finger where it is larger",
 }
 REASONS = (
     "the only level of this version",
@@ -243,6 +245,8 @@ REASONS = (
     "exact by symmetry",
     "the default level of this version",
     "the object has no wall",
+    "never skipped, because it costs next to nothing",
+    "left out, though the indicator is above the target",
 )
 
 

@@ -49,11 +49,13 @@ def thin_body(shape: Walled) -> ThinWalled:
 class Level:
     """How the object's compliance is simulated.
 
-    ``indicator`` is the dent that a linear wall would get at the largest force, over the wall's thickness.
+    ``indicator`` is the dent that a linear wall would get at the largest force, over the wall's thickness; ``share``
+    that dent over the travel of the pads on the rigid object.
     """
 
     number: int
     indicator: float
+    share: float
     forced: bool
 
 
@@ -66,10 +68,9 @@ def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
     body = thin_body(scene.object)
     dent, ratio = estimated_dent(body, held, scene, travel)
     if scene.effects.object != "auto":
-        return Level(names[scene.effects.object], ratio, forced=True)
-    if dent < STIFF * travel:
-        return Level(RIGID, ratio, forced=False)
-    return Level(LINEAR if ratio <= SMALL_DENT else NONLINEAR, ratio, forced=False)
+        return Level(names[scene.effects.object], ratio, dent / travel, forced=True)
+    number = RIGID if dent < STIFF * travel else LINEAR if ratio <= SMALL_DENT else NONLINEAR
+    return Level(number, ratio, dent / travel, forced=False)
 
 
 def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> tuple[float, float]:
