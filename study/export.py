@@ -72,15 +72,16 @@ def cases(result: Any, model: str = "curved") -> Iterator[dict[str, Any]]:
 
 
 def _units(result: Any) -> dict[str, str]:
-    """Name and unit of every map, and of what is derived for all forces of a candidate together."""
-    bounds = [d for d in result.layout.derived if len(d.axes) == len(result.axes) - 1 and not d.shape]
-    return {q.name: q.units for q in (*(q for q in result.layout.quantities if q.group == "maps"), *bounds)}
+    """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
+    derived = [d for d in result.layout.derived if len(d.axes) >= len(result.axes) - 1 and not d.shape]
+    return {q.name: q.units for q in (*(q for q in result.layout.quantities if q.group == "maps"), *derived)}
 
 
 def _map(result: Any, name: str, model: str) -> np.ndarray:
     q = next((q for q in result.layout.quantities if q.group == "maps" and q.name == name), None)
     if q is None:
-        return np.broadcast_to(result.derived(name)[..., None], result.layout.shape)
+        found = result.derived(name)
+        return found if found.shape == result.layout.shape else np.broadcast_to(found[..., None], result.layout.shape)
     return result.map(name, model if q.by_model else None)
 
 

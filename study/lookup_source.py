@@ -42,9 +42,11 @@ class Source:
         self._by_model = {q.name if q.group == "maps" else q.key: q.by_model for q in result.layout.quantities}
         self.maps = {q.name: (q.units, q.definition) for q in maps}
         for d in result.layout.derived:
-            if tuple(n.replace(".", "_") for n in d.axes) == result.layout.names[:-1] and not d.shape:
-                bound = result.derived(d.name)[self.index][..., None]
-                self._values[f"{d.name}/{d.name}"] = np.broadcast_to(bound, self.status.shape)
+            over = tuple(n.replace(".", "_") for n in d.axes)
+            if over in (result.layout.names, result.layout.names[:-1]) and not d.shape:
+                found = result.derived(d.name)[self.index]
+                found = found if over == result.layout.names else found[..., None]
+                self._values[f"{d.name}/{d.name}"] = np.broadcast_to(found, self.status.shape)
                 self.maps[d.name] = d.units, d.definition
 
     def read(self, name: str, model: str = "curved") -> np.ndarray:

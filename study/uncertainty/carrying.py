@@ -113,6 +113,6 @@ def change_by_mu(share: float) -> float:
     Half the difference between both sides.
 
     >>> round(change_by_mu(0.01), 6)
-    0.050001
+    0.05001
     """
     return ((1 + share) ** POWER - (1 - share) ** POWER) / 2

@@ -109,4 +109,5 @@ def _without_images(value: FloatArray, order: Sequence[int], place: Sequence[tup
 
 def _text(found: Sure, i: int, units: str) -> str:
     unit, factor = DISPLAY.get(units, (units, 1.0))
-    return f"{found.value[i] * factor:.4g} +- {found.half_width[i] * factor:.2g} {unit}".rstrip()
+    value = f"{found.value[i] * factor:#.4g}".rstrip(".")
+    return f"{value} +- {found.half_width[i] * factor:.2g} {unit}".rstrip()

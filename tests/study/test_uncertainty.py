@@ -11,15 +11,20 @@ from lsfit.ellipsoid import Ellipsoid
 from scoring.volume import volume_linf
 from study import sweep
 from study.candidates import axis_poses
-from study.layout import Layout
+from study.compare import compare
+from study.export import cases
+from study.layout import Derived, Layout
+from study.lookup import GraspMap
 from study.scene import parse_scene
 from study.scene.errors import SceneError
+from study.show import as_text, best
+from study.store import open_result
 from study.uncertainty import carrying, probing
 from study.uncertainty.rescoring import _volume
 from study.uncertainty.stored import derived
 from study.uncertainty.variations import by_formula, moved_poses, variations
 from study.uncertainty.verdict import Sure, sure, verdict
-from tests.study.formula_results import grid_axes
+from tests.study.formula_results import grid_axes, make
 
 BALL = """
 [object]
@@ -222,6 +227,30 @@ def test_images_of_the_best_grasp_are_no_rivals():
     assert "beyond the errors" in verdict(found, [0, 1, 2], [(0,), (0,), (1,)])
     assert "the first 2 grasps" in verdict(found, [0, 1, 2], [(0,), (1,), (2,)])
     assert verdict(None, [0, 1, 2], [(0,)] * 3) == ""
+
+
+def test_show_compare_export_and_lookup_take_bands_from_the_file(shared_path):
+    axes = grid_axes(angles=[0.0])
+    over = tuple(axis.name for axis in axes)
+    bands = [Derived(f"{name}_band", units, "band", "", over) for name, units in (("e_n", "m"), ("quality", ""))]
+    parts = [Derived(f"{name}_band_mesh", "", "part", "", over) for name in ("e_n", "quality")]
+    shape = tuple(len(axis.values) for axis in axes)
+    quality = np.broadcast_to(np.linspace(1.0, 2.0, shape[0])[:, None, None], shape)
+    given = {"derived__quality_band": 0.1 * quality, "derived__quality_band_mesh": np.full(shape, 0.1),
+             "derived__e_n_band": np.full(shape, 1e-3), "derived__e_n_band_mesh": np.full(shape, 0.01)}  # fmt: skip
+    path = make(shared_path / "b.hdf", axes=axes, derived=(*bands, *parts), quality__curved=quality, **given)
+    with open_result(path) as result, open_result(path) as other:
+        table = best(result)
+        text = as_text(table, 200)
+        assert compare(result, other).asked.error == pytest.approx(np.full(shape, 2e-3))
+        assert next(cases(result))["maps"]["e_n_band"] == 1e-3
+    names = [name for name, _ in table.columns]
+    assert table.rows[0][names.index("quality_band")] == pytest.approx(0.2)
+    assert (
+        "the first 2 grasps cannot be told apart (2.000 +- 0.2 to 1.750 +- 0.1" in text
+    )  # 0.25 < root(0.2^2 + 0.175^2)
+    assert "half-width" in text
+    assert GraspMap(path).at(station=0.01, angle=0, force=3).value("e_n_band") == pytest.approx(1e-3)
 
 
 def test_a_file_without_errors_knows_none():
