@@ -107,6 +107,28 @@ def change_by_modulus(force: FloatArray, values: FloatArray, share: float) -> Fl
     return -share * np.gradient(logarithm, np.log(force), axis=-1)
 
 
+def change_along(station: FloatArray, values: FloatArray, shift: float) -> FloatArray:
+    """Relative change of a map for a shift along its stations, as its own slope tells, without sign.
+
+    Parameters
+    ----------
+    station : (s,) array
+        At least two [m].
+    values : (s, ...) array
+        Positive; NaN where there is none.
+    shift : float
+        [m].
+
+    Examples
+    --------
+    >>> change_along(np.array([0.0, 1.0, 2.0]), np.exp([0.0, 3.0, 6.0]), 0.1).round(12).tolist()
+    [0.3, 0.3, 0.3]
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithm = np.log(np.where(values > 0, values, np.nan))
+    return np.abs(shift * np.gradient(logarithm, station, axis=0))
+
+
 def change_by_mu(share: float) -> float:
     """Relative change of the quality of contacts that face each other for a mu larger by ``share``.
 

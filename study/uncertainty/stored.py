@@ -31,6 +31,8 @@ RULES = {
           " half-width, which goes with mu^5 where the contacts face each other and is scored again elsewhere.",
     "modulus": "In closed form: the state depends on force over modulus only, so it is minus the slope of ln(value)"
                " over ln(force) times the half-width.",
+    "pose": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
+            " larger); at least the map's own slope along the stations times the shift, where the pads lie along it.",
     "probes": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
               " larger).",
 }  # fmt: skip
@@ -77,7 +79,7 @@ def _by_formula(scene: Scene) -> tuple[str, ...]:
 def _rule(of: str, known: tuple[str, ...]) -> str:
     if of == "mesh":
         return "map" if of in known else "mesh"
-    return of if of in known else "probes"
+    return of if of in known or of == "pose" else "probes"
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
@@ -140,7 +142,17 @@ def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArr
         share = carrying.carried(sound, area[at], area)
     else:
         share = carrying.carried_by_force(sound, flat.shape)
+    if of == "pose":
+        share = np.fmax(share, _slope(scene, values).reshape(flat.shape))
     return carrying.at_least_own(share, change, layout.probes, flat).reshape(values.shape)
+
+
+def _slope(scene: Scene, values: FloatArray) -> FloatArray:
+    """Change by the shift that neighbouring stations show; 0 where there are none in the direction of the shift."""
+    where = scene.candidates
+    if where.poses or where.roll or len(where.station_values) < 2:
+        return np.zeros(values.shape)
+    return carrying.change_along(np.array(where.station_values), values, scene.uncertainty.pose)
 
 
 def _sound(writer: ResultWriter, at: list[int], change: FloatArray) -> FloatArray:
