@@ -13,7 +13,7 @@ from study.columns import DISPLAY
 
 FloatArray = NDArray[np.float64]
 TIE = 1e-6  # relative difference of scores that is none: images of one grasp
-MOVES = {"mu": "mu", "modulus": "the shear modulus"}
+MOVES = {"mu": "mu", "modulus": "the shear modulus", "wall": "the wall's thickness"}  # all grasps at once
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,14 @@ class Sure:
         Half-width of what is each grasp's own, or whose sign is not known; NaN where nothing is.
     common : dict of (n,) arrays
         Changes by inputs that move all grasps at once, each with its sign.
+    unsigned : tuple of str
+        Inputs that do so too, but with a sign that is known at the probes only, so they are part of ``own``.
     """
 
     value: FloatArray
     own: FloatArray
     common: dict[str, FloatArray]
+    unsigned: tuple[str, ...] = ()
 
     @property
     def half_width(self) -> FloatArray:
@@ -60,7 +63,8 @@ def sure(result: Any, name: str, k: int) -> Sure | None:
                 common[of] = change
             else:
                 own = own + change**2
-        return Sure(values, np.sqrt(own), common)
+        unsigned = tuple(of for of in MOVES if f"{name}_band_{of}" in shares)
+        return Sure(values, np.sqrt(own), common, unsigned)
     if any(q.name == f"{name}_error" for q in result.layout.quantities):
         return Sure(values, np.abs(result.map(f"{name}_error")[..., k].ravel() * values), common)
     return None
@@ -91,12 +95,20 @@ def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int,
         return "whether the best grasp is better than the second is not known: one of them has no error"
     alike = max((i for i, apart in enumerate(judged, start=1) if apart is False), default=0)
     one, other = (_text(found, i, units) for i in (grasps[0], grasps[alike or 1]))
-    moved = " and ".join(MOVES.get(of, of) for of, change in found.common.items() if np.any(change))
-    also = f"; {moved} move{'s' * (' and ' not in moved)} all grasps at once" if moved else ""
+    also = _moved(found)
     if not alike:
         return f"the best grasp is better than the second beyond the errors ({one} against {other}){also}"
     between = "" if all(apart is False for apart in judged[:alike]) else ", though some between them can"
     return f"the first {alike + 1} grasps cannot be told apart ({one} to {other}){between}{also}"
+
+
+def _moved(found: Sure) -> str:
+    """What is said of inputs that move all grasps at once."""
+    both = [of for of, change in found.common.items() if np.any(change)]
+    words = [" and ".join(MOVES[of] for of in names) for names in (both, found.unsigned)]
+    text = f"; {words[0]} move{'s' * (len(both) == 1)} all grasps at once" if both else ""
+    count = "counts" if len(found.unsigned) == 1 else "count"
+    return text + (f"; {words[1]} {count} for each grasp by itself, which is cautious" if found.unsigned else "")
 
 
 def _without_images(value: FloatArray, order: Sequence[int], place: Sequence[tuple[int, ...]]) -> list[int]:
