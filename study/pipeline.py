@@ -59,12 +59,20 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
                 values |= _quality_error(scene, obj, outcome, values)
             seconds = time.perf_counter() - start
             result = _result(values, outcome, seconds, effects_of(scene, fine, bounds, solving))
-            more = probing.values()
-            told = "; ".join(text for text in (result.message, *probing.failures) if text)
-            yield k, replace(result, values=result.values | more, message=told)
+            yield k, _probed(result, probing)
     finally:
         probing.close()
         solving.destroy()
+
+
+def _probed(result: CaseResult, probing: Probing) -> CaseResult:
+    """The result with what the further solves of a probe give, and their time."""
+    start = time.perf_counter()
+    values = result.values | probing.values()
+    for name in ("rest", "total"):
+        values[f"work/seconds_{name}"] += time.perf_counter() - start
+    told = "; ".join(text for text in (result.message, *probing.failures) if text)
+    return replace(result, values=values, message=told)
 
 
 def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
