@@ -15,3 +15,9 @@ def printable(text: str) -> str:
     a\u001b[2Jb
     """
     return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def shortened(text: str, width: int = 80) -> str:
+    """A printable text of at most ``width`` letters."""
+    text = printable(text)
+    return text if len(text) <= width else text[: width - 4] + " ..."

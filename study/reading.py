@@ -11,6 +11,8 @@ from study.exits import OTHER_FILE, StudyError
 from study.guarded import text_of
 from study.layout import FAILED, LABEL, PROGRAM, READABLE, ROOT, SESSION, SESSIONS, layout_from_options
 
+BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
+
 
 class StoredAxis(NamedTuple):
     """One axis of the maps, as read from a file."""
@@ -46,12 +48,25 @@ class Result:
         self._known = {d.path: d for d in self.layout.datasets}
 
     def __enter__(self) -> Result:
-        """Nothing to do: the file is open."""
+        """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
+        self._quiet = np.errstate(all="ignore")
+        self._quiet.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Close the file."""
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        """Close the file; where its values led to an error, say so if they are not those that were written."""
+        self._quiet.__exit__(kind, error, trace)
         self.close()
+        if isinstance(error, ArithmeticError | ValueError | LookupError | TypeError):
+            from study.scene.errors import SceneError
+            from study.store import torn_rows
+
+            if torn := torn_rows(self.path, self.layout):
+                text = f"{self.path}: damaged ({len(torn)} cases do not match their checksums)"
+                raise StudyError(OTHER_FILE, f"{text}; 'softjaw repair {self.path}' says what is good") from error
+            if isinstance(error, SceneError):
+                text = f"{self.path}: the scene in it cannot be used ({error.problems[0]})"
+                raise StudyError(OTHER_FILE, f"{text}; restore the file from a copy") from error
 
     def close(self) -> None:
         """Close the file."""
@@ -59,7 +74,11 @@ class Result:
 
     def read(self, path: str) -> np.ndarray:
         """A dataset of the layout below ``/study``, for example ``checks/tension`` or ``e_n/flat``."""
-        return self.file.values(self._checked(path))
+        found = self.file.values(self._checked(path))
+        if found.dtype.kind == "f" and (np.isfinite(found) & (np.abs(found) > BEYOND)).any():
+            text = f"{path} has values beyond {BEYOND:g}"
+            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
+        return found
 
     def map(self, name: str, model: str | None = None) -> np.ndarray:
         """One map over all axes; ``model`` where there is one value for each friction model."""
@@ -158,7 +177,7 @@ class Result:
             raise ValueError(f"axis '{name}' is no list of numbers")
         units = str(attributes.get("units", ""))
         values = self.file.values(found)
-        if not np.isfinite(values).all():
+        if not (np.abs(values) < BEYOND).all():
             raise ValueError(f"axis '{name}' has values that are no numbers")
         return StoredAxis(name, values, units, str(attributes.get("long_name", name)).removesuffix(f" [{units}]"))
 

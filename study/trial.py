@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import resource
 import signal
@@ -44,6 +45,7 @@ def trouble(attempt: Callable[[], object]) -> str:
 
 def _limit() -> None:
     """Let this process be quiet, short and small."""
+    faulthandler.disable()
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     os.dup2(silent, 2)

@@ -66,10 +66,10 @@ def read_patch(file: str, reading: Reading):
         text = f"{file}: found {f'the ending {path.suffix}' if path.suffix else 'no ending'}, expected one of "
         raise StudyError(USAGE, f"{text}{', '.join(ENDINGS)}; export the patch as CSV, or as VTU or VTP from ParaView")
     try:
-        path.open("rb").close()
         size = path.stat().st_size
         if not path.is_file():  # a device or a pipe may have no end
             raise StudyError(OTHER_FILE, f"{file}: is no regular file; name the file of a patch")
+        path.open("rb").close()
         if size > LARGEST_FILE:
             text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
             raise StudyError(USAGE, f"{text}; export the contact surface alone")

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from study.printable import printable
 
 KeyPath = tuple[str | int, ...]
+MOST_TOLD = 50  # problems in one message
 
 
 class Finding(NamedTuple):
@@ -45,7 +46,9 @@ class SceneError(ValueError):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
-        super().__init__("\n".join(map(str, self.problems)))
+        more = len(self.problems) - MOST_TOLD
+        rest = [f"{self.problems[0].file}: and {more} more problems"] if more > 0 else []
+        super().__init__("\n".join([*map(str, self.problems[:MOST_TOLD]), *rest]))
 
 
 def key_text(path: KeyPath) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from study.printable import UNPRINTABLE
+from study.printable import UNPRINTABLE, shortened
 from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, closest, shown
 from study.scene.score_sections import LimitSurface, Score, Task
@@ -120,7 +120,7 @@ def with_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[K
         try:
             _merge(data, _override(text), text, given)
         except OverrideError as error:
-            problems.append(Problem(f"--set {text}", None, "", *error.args))
+            problems.append(Problem(f"--set {shortened(text)}", None, "", *error.args))
     return problems
 
 
@@ -137,6 +137,8 @@ def _override(text: str) -> dict[str, Any]:
         raise OverrideError(f"the key {key} without its section", expected, f"write --set {section}.{text}")
     try:
         return tomllib.loads(f"{key} = {value}")
+    except RecursionError:
+        raise OverrideError("a value nested too deeply", "a value as in TOML", "flatten it") from None
     except ValueError:
         if re.fullmatch(r"[A-Za-z_./][\w./ -]*|[36]-D", value):  # shells take the quotes away
             return tomllib.loads(f'{key} = "{value}"')

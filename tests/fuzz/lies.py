@@ -1,0 +1,212 @@
+"""Result files that lie: sound HDF5 whose contents are not what they seem. Each function spoils an open file."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+
+EVIL = "\x1b]0;owned\x07</script><script>alert(1)</script>\u2028=1+1"
+
+
+def put(file, path, data):
+    """Other data in the place of a dataset."""
+    attributes = dict(file[path].attrs) if path in file else {}
+    del file[path]
+    made = file.create_dataset(path, data=data)
+    for name, value in attributes.items():
+        if name not in ("DIMENSION_LIST", "REFERENCE_LIST", "CLASS"):
+            made.attrs[name] = value
+
+
+def options(**changed):
+    """The layout's options with some of them changed."""
+
+    def spoil(file):
+        told = json.loads(file["study"].attrs["options"])
+        file["study"].attrs["options"] = json.dumps(told | changed)
+
+    return spoil
+
+
+def attribute(path, name, value):
+    def spoil(file):
+        file[path].attrs[name] = value
+
+    return spoil
+
+
+def data(path, value):
+    return lambda file: put(file, path, value)
+
+
+def values(path, value):
+    """Other values in the same dataset."""
+
+    def spoil(file):
+        file[path][...] = value
+
+    return spoil
+
+
+def linked(path, link):
+    def spoil(file):
+        del file[path]
+        file[path] = link
+
+    return spoil
+
+
+def external(file):
+    """Data that stand in another file."""
+    shape = file["study/e_n/curved"].shape
+    del file["study/e_n/curved"]
+    file["study/e_n"].create_dataset("curved", shape, "<f8", external=[("/etc/passwd", 0, 8 * int(np.prod(shape)))])
+
+
+def virtual(file):
+    shape = file["study/e_n/curved"].shape
+    del file["study/e_n/curved"]
+    layout = h5py.VirtualLayout(shape, "<f8")
+    layout[...] = h5py.VirtualSource("other.h5", "d", shape=shape)
+    file["study/e_n"].create_virtual_dataset("curved", layout)
+
+
+def enormous(path):
+    """72 TiB that are only declared."""
+
+    def spoil(file):
+        del file[path]
+        file.create_dataset(path, (10**13,), "<f8", chunks=(10**5,))
+
+    return spoil
+
+
+def all_maps(value):
+    def spoil(file):
+        for group in file["study"].values():
+            for node in group.values() if isinstance(group, h5py.Group) else ():
+                if isinstance(node, h5py.Dataset) and node.dtype.kind == "f" and "CLASS" not in node.attrs:
+                    node[...] = value
+
+    return spoil
+
+
+def loop(file):
+    """A group that holds itself."""
+    file["study/e_n/again"] = file["study"]
+
+
+def text(name, content):
+    def spoil(file):
+        raw = content.encode("utf-8", "surrogatepass")
+        put(file, f"study/{name}", np.array(raw, h5py.string_dtype("utf-8", max(len(raw), 1))))
+
+    return spoil
+
+
+def words(file):
+    """What is printed and shown, with a terminal's orders and a page's scripts."""
+    file["study"].attrs["title"] = EVIL
+    file["study/candidates/label"][...] = EVIL.encode()[:80]
+    file["study/status/message"][...] = EVIL.encode()[:200]
+    file["study/status/code"][0, 0, 0] = 2
+    sessions = file["study/provenance/sessions"]
+    row = sessions[0]
+    for name in row.dtype.names:
+        if row.dtype[name].kind == "S":
+            row[name] = EVIL.encode()[: row.dtype[name].itemsize]
+    sessions[0] = row
+    for axis in file["study/axes"].values():
+        axis.attrs["long_name"] = EVIL
+
+
+SCENE = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
+DERIVED = {"name": "x", "units": "", "long_name": "", "definition": "", "axes": [], "shape": []}
+DEEP = "[" * 100_000
+LIES = {
+    "external link": linked("study/e_n/curved", h5py.ExternalLink("/etc/hosts", "/x")),
+    "soft link": linked("study/e_n/curved", h5py.SoftLink("/study/e_n/flat")),
+    "soft link to nothing": linked("study/e_n/curved", h5py.SoftLink("/nowhere")),
+    "soft link to itself": linked("study/e_n/curved", h5py.SoftLink("/study/e_n/curved")),
+    "external group": linked("study/fingers", h5py.ExternalLink("other.h5", "/")),
+    "external data": external,
+    "virtual data": virtual,
+    "enormous map": enormous("study/e_n/curved"),
+    "enormous axis": enormous("study/axes/station"),
+    "enormous scene": enormous("study/scene"),
+    "enormous states": enormous("study/status/code"),
+    "recursive group": loop,
+    "a map of texts": data("study/e_n/curved", np.array(["a", "b"], object)),
+    "a map of integers": data("study/e_n/curved", np.zeros((5, 6, 4), int)),
+    "a map of records": data("study/e_n/curved", np.zeros((5, 6, 4), [("a", "f8")])),
+    "a map of another shape": data("study/e_n/curved", np.zeros((5, 6, 5))),
+    "a map without shape": data("study/e_n/curved", h5py.Empty("f8")),
+    "a group for a map": lambda file: (file["study/e_n"].pop("curved"), file.create_group("study/e_n/curved")),
+    "a dataset for a group": data("study/fingers", np.zeros(3)),
+    "no maps": lambda file: file["study"].pop("e_n"),
+    "no status": lambda file: file["study"].pop("status"),
+    "no study": lambda file: file.pop("study"),
+    "no fingers": lambda file: file["study"].pop("fingers"),
+    "no scene": lambda file: file["study"].pop("scene"),
+    "NaN axis": values("study/axes/station", np.nan),
+    "infinite axis": values("study/axes/normal_force", np.inf),
+    "enormous axis values": values("study/axes/normal_force", 1e308),
+    "zero axis": values("study/axes/normal_force", 0.0),
+    "empty axis": data("study/axes/station", np.zeros(0)),
+    "axis of texts": data("study/axes/station", np.array([b"a"] * 5)),
+    "axis of two dimensions": data("study/axes/station", np.zeros((5, 1))),
+    "axes that are a number": attribute("study", "axes", 3),
+    "axes that are one text": attribute("study", "axes", "station"),
+    "axes that do not exist": attribute("study", "axes", np.array(["a", "b", "c"], object)),
+    "axes elsewhere": attribute("study", "axes", np.array(["../../x", "..", "/"], object)),
+    "two axes": attribute("study", "axes", np.array(["angle", "normal_force"], object)),
+    "units that are a list": attribute("study/axes/station", "units", [1, 2, 3]),
+    "units that are words": attribute("study/axes/station", "units", "furlong"),
+    "title that is a list": attribute("study", "title", [1.0, 2.0]),
+    "digest that is a list": attribute("study/scene", "digest", [1.0, 2.0]),
+    "overrides that are a list": attribute("study/scene", "overrides", [1.0, 2.0]),
+    "program that is another": attribute("/", "program", EVIL),
+    "version of the future": attribute("/", "layout_version", EVIL),
+    "options that are no JSON": attribute("study", "options", "{"),
+    "options that are a list": attribute("study", "options", "[]"),
+    "options that are deep": attribute("study", "options", "[" * 60_000),
+    "options without faces": attribute("study", "options", "{}"),
+    "infinite faces": attribute("study", "options", '{"derived": [], "faces": 1e999, "meshes": 1}'),
+    "negative faces": options(faces=-1),
+    "many faces": options(faces=10**9),
+    "patches that are not there": options(patches=True, faces=10**6),
+    "samples": options(samples=10**5, sampled=[0, 1]),
+    "samples of nothing": options(samples=10**5, sampled=[-1]),
+    "a grid": options(surface=[10**7, 10**7], front=[100, 100]),
+    "derived of no axis": options(derived=[{**DERIVED, "axes": ["q"]}]),
+    "derived of great shape": options(derived=[{**DERIVED, "shape": [10**9, 10**9, 10**9]}]),
+    "derived elsewhere": options(derived=[{**DERIVED, "name": "../../x", "units": 3, "long_name": [], "shape": [-1]}]),
+    "derived of a number": options(derived=[3]),
+    "unknown needs": options(has=["magic"]),
+    "needs of numbers": options(has=[[1]]),
+    "two meshes": options(meshes=2),
+    "an unknown model": options(planar="evil"),
+    "COR grid": options(cor_grid=1000),
+    "states that do not exist": values("study/status/code", 7),
+    "everything missing": values("study/status/code", 0),
+    "everything failed": values("study/status/code", 2),
+    "NaN everywhere": all_maps(np.nan),
+    "infinity everywhere": all_maps(np.inf),
+    "1e308 everywhere": all_maps(1e308),
+    "-1e308 everywhere": all_maps(-1e308),
+    "zeros everywhere": all_maps(0.0),
+    "-1 everywhere": all_maps(-1.0),
+    "scene that is no TOML": text("scene", "= ["),
+    "scene that is deep": text("scene", "a = " + DEEP),
+    "scene that is empty": text("scene", ""),
+    "scene of another study": text("scene", SCENE),
+    "scene with orders": text("scene", SCENE + '[output]\nfile = "../../x.hdf"\n'),
+    "scene with a name": text("scene", SCENE.replace("[object]", '[object]\nname = "\\u001b[2J</script>"')),
+    "scene of a mesh": text("scene", '[object]\nshape = "mesh"\nmesh = "/etc/passwd.stl"\nunit = "mm"\n' + SCENE[43:]),
+    "scene that is a list": data("study/scene", np.zeros(3)),
+    "scene of bytes": text("scene", "\ud800\x00\xff"),
+    "report that is a list": data("study/report", np.zeros(3)),
+    "words with orders": words,
+}  # fmt: skip

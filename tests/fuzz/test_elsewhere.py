@@ -1,0 +1,317 @@
+"""What a file from elsewhere must not do: reach other files, give orders to a terminal or page, end the program."""
+
+from __future__ import annotations
+
+import csv
+import http.client
+import io
+import os
+import shutil
+import signal
+import threading
+
+import h5py
+import numpy as np
+import pytest
+
+from fem.mesh_check import MeshError
+from fem.mesh_file import read_polygons
+from study.cli import main
+from study.columns import csv_text
+from study.commands import RANK
+from study.exits import OTHER_FILE, USAGE, StudyError
+from study.printable import UNPRINTABLE
+from study.scene import SceneError, load_scene, parse_scene
+from study.store import open_result
+from study.trial import trouble
+from study.view.server import server
+from tests.fuzz.lies import EVIL, LIES
+from tests.fuzz.readers import CATALOGUE, QUICK, SCENE, obj, ply, stl
+from tests.study.formula_results import make
+from tests.study.launching import ROOT
+from tests.study.patch_files import cylinder_mesh, vtk
+
+BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
+MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
+FAST = ("external link",)
+
+
+@pytest.fixture(autouse=True)
+def _speak_on_every_rank(monkeypatch):
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture
+def told(capsys):
+    """Run a command; its exit code and all that it says, which is fit for a terminal."""
+
+    def ask(*words):
+        code = main([str(word) for word in words])
+        said = capsys.readouterr()
+        assert not UNPRINTABLE.search(said.out + said.err)
+        assert code != 70, said.err
+        assert (code == 0) == (not said.err), said.err
+        assert all(line.startswith("error: ") for line in said.err.splitlines())
+        return code, said.out + said.err
+
+    return ask
+
+
+# --- meshes ---
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.obj", obj().replace(b"30", b"1" + b"0" * 400, 1), "where a number has to stand"),
+        ("b.obj", obj().replace(b"f 1/1", b"f 0"), "count from 1"),
+        ("c.obj", obj().replace(b"f 1/1 3 5", b"f 1 3"), "has 2 corners"),
+        ("d.obj", obj().replace(b"f 1/1", b"f 99999999999999999999"), "where a number has to stand"),
+        ("e.obj", obj() + b"f" + b" 1" * 300 + b"\n", "a face of 300 corners"),
+        ("f.obj", obj() + b"#" * 30_000, "a line of 30000 bytes"),
+        ("g.obj", obj().replace(b"f 1/1", b"f -99"), "refers to point -93"),
+        ("a.ply", ply(True).replace(b"face 8", b"face 9"), "cut short"),
+        ("b.ply", ply(True).replace(b"vertex 6", b"vertex 99999999999"), "cut short"),
+        ("c.ply", ply(True).replace(b"uchar int", b"int int"), "a list of"),
+        ("d.ply", ply(True).replace(b"float z", b"float y"), "no PLY file with a complete header"),
+        ("e.ply", ply(False).replace(b"3 0 2 4", b"900 0 2 4"), "said to have 900 corners"),
+        ("f.ply", ply(False).replace(b"30 0 0\n", b"30\n"), "fewer than 3 numbers"),
+        ("a.stl", stl(False).replace(b"vertex", b"vertec", 1), "23 corners"),
+        ("b.stl", stl(False)[:-40], "'endsolid'"),
+        ("c.stl", stl(True)[:80] + b"\xff" * 4, "header calls for 214748364834"),
+    ],
+)  # fmt: skip
+def test_meshes_that_ended_the_program_once_are_refused(tmp_path, name, content, words):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(MeshError, match=r"export it again|triangulate|export the mesh again") as refused:
+        read_polygons(path)
+    assert name in str(refused.value)
+    assert words in str(refused.value)
+
+
+def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
+    """It would be waited for without end."""
+    for name in ("a.stl", "a.csv", "a.hdf"):
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(MeshError, match="no regular file"):
+        read_polygons(tmp_path / "a.stl")
+    assert "no regular file" in told("patch", tmp_path / "a.csv")[1]
+    assert "no regular file" in told("status", tmp_path / "a.hdf")[1]
+
+
+@pytest.mark.long
+def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told):
+    inner = tmp_path / "scenes"
+    inner.mkdir()
+    (tmp_path / "body.stl").write_bytes(stl(True))
+    (inner / "scene.toml").write_text(MESH.replace("FILE", "../body.stl").replace("[0]", "[30]"))
+    said = "".join(told("check", inner / "scene.toml")[1].split())  # however the lines are broken
+    assert f"mesh{tmp_path / 'body.stl'}candidates" in said
+    assert f'mesh = "{tmp_path / "body.stl"}"' in load_scene(inner / "scene.toml").effective_toml()
+
+
+# --- scenes and catalogues ---
+
+
+@pytest.mark.parametrize("file", ["/tmp/x.hdf", "../x.hdf", "a/../../x.hdf", "C:/x.hdf"])
+def test_results_do_not_leave_the_working_directory_unless_asked_on_the_command_line(file):
+    with pytest.raises(SceneError, match="below the working directory"):
+        parse_scene(BALL + f'[output]\nfile = "{file}"\n')
+
+
+@pytest.mark.parametrize("name", ["\\u001b[2J", "\\u009b2J", "a\\nb", "\\u202e", "\\u2028"])
+def test_names_hold_no_orders_for_a_terminal(name):
+    with pytest.raises(SceneError, match="without control characters"):
+        parse_scene(BALL.replace("[object]", f'[object]\nname = "{name}"'))
+
+
+def test_nothing_of_a_scene_is_run():
+    for option in ("contact_snes_python_type", "contact_ksp_view", "options_file"):
+        with pytest.raises(SceneError):
+            parse_scene(BALL + f'[petsc]\n{option} = "python:os.system"\n')
+    with pytest.raises(SceneError, match="found"):
+        parse_scene(BALL.replace("30", "__import__('os')"))
+
+
+def test_problems_are_not_told_by_the_thousand(tmp_path):
+    with pytest.raises(SceneError) as refused:
+        parse_scene(BALL + "[[candidates.poses]]\n" * 500)
+    assert len(str(refused.value).splitlines()) < 60
+    assert len(refused.value.problems) > 500
+
+
+@pytest.mark.parametrize(
+    "pattern", ["(a+)+$", *(pytest.param(p, marks=pytest.mark.long) for p in ("(.|a){90}", ".*.*.*.*x", "a" * 400))]
+)
+def test_a_pattern_that_may_take_for_ever_is_no_reason(tmp_path, told, pattern):
+    path = tmp_path / "cases.toml"
+    path.write_bytes(CATALOGUE.replace(b"mu.*0", pattern.encode()))
+    assert "may take for ever" in told("check", path)[1]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("text", [b"[[case]]\na = [", b"[[case]]\na = " + b"[" * 9999, CATALOGUE + b'base = "x"'])
+def test_a_catalogue_that_is_no_toml_is_refused(tmp_path, told, text):
+    path = tmp_path / "cases.toml"
+    path.write_bytes(text)
+    assert told("check", path)[0] == USAGE
+
+
+# --- patches ---
+
+TABLE = QUICK["table"].content
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (b"\n1,0", b'\n"1,0', "a line that is no table"),
+        (b"\n1,0,0", b"\n1,0,99999999999", "coordinates within 1000 m"),
+        (b",7\n", b",1e300\n", "at most 1e+12 Pa"),
+        (b"1.25", b"1e300", "at most 10000 m^2"),
+        (b"0.1", b"1e300", "a length of 1"),
+        (b"0,0.1,1,7", b"1e-320,0,0,7", "a length of 1"),
+        (b"1.25", b"1e308", "area"),
+        (b"x_mm", b"x_mm\x1b[2J", "x_mm"),
+    ],
+)
+def test_tables_that_ended_the_program_once_are_refused(tmp_path, told, old, new, words):
+    path = tmp_path / "patch.csv"
+    path.write_bytes(TABLE.replace(old, new, 1))
+    code, text = told("patch", path, "--distance", "60")
+    assert (code, words in text) == (USAGE, True), text
+
+
+@pytest.mark.long
+def test_a_file_that_vtk_crashes_on_ends_a_child_process_only(tmp_path, told):
+    points, cells = cylinder_mesh()
+    path = vtk(tmp_path / "a.vtp", points, cells, [("pressure", np.ones(len(cells)))])
+    text = path.read_text()
+    head, _, tail = text.partition('Name="offsets"')
+    numbers, end, rest = tail.partition("</DataArray>")
+    first = numbers.split(">", 1)
+    path.write_text(head + 'Name="offsets"' + first[0] + ">" + first[1].replace("4", "900000", 3) + end + rest)
+    code, said = told("patch", path, "--unit", "mm", "--pressure-unit", "kpa")
+    assert code in (USAGE, OTHER_FILE)
+    assert str(path) in said
+
+
+def test_a_trial_survives_what_it_tries():
+    assert trouble(lambda: None) == ""
+    assert trouble(lambda: 1 / 0) == ""
+    assert "crashes" in trouble(lambda: os.kill(os.getpid(), signal.SIGSEGV))
+    assert "GiB" in trouble(lambda: np.ones(2**31))
+
+
+# --- result files ---
+
+
+def commands(path, other, page):
+    yield from (
+        (*words, path) for words in (("status",), ("show", "--csv"), ("export", "--csv"), ("repair",), ("scale",))
+    )
+    yield ("compare", path, other)
+    yield ("view", path, "--html", page)
+
+
+@pytest.mark.parametrize("lie", [n if n in FAST else pytest.param(n, marks=pytest.mark.long) for n in LIES])
+def test_a_result_file_that_lies_is_read_or_refused(tmp_path, told, lie):
+    path, other, page = make(tmp_path / "a.hdf"), tmp_path / "other.hdf", tmp_path / "page.html"
+    shutil.copy(path, other)
+    with h5py.File(path, "r+") as file:
+        LIES[lie](file)
+    for words in commands(path, other, page):
+        code, said = told(*words)
+        assert code == 0 or str(path) in said, said
+        assert "root:" not in said  # /etc/passwd
+    if page.exists():
+        assert "<script>alert" not in page.read_text()
+
+
+@pytest.mark.long
+def test_words_of_a_file_are_no_part_of_the_report(tmp_path, told):
+    path = make(tmp_path / "a.hdf")
+    with h5py.File(path, "r+") as file:
+        LIES["words with orders"](file)
+    assert told("report", path, "-o", tmp_path / "page.html")[0] == 0
+    text = (tmp_path / "page.html").read_text()
+    assert "<script>alert" not in text
+    assert "&lt;script&gt;alert" in text
+
+
+def test_a_file_that_hdf5_breaks_on_is_refused(tmp_path):
+    path = make(tmp_path / "a.hdf")
+    content = bytearray(path.read_bytes())
+    content[1000:3000] = b"\xff" * 2000
+    path.write_bytes(content)
+    with pytest.raises(StudyError, match=r"a\.hdf"):
+        open_result(path)
+
+
+def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
+    cells = ["=1+1", "+A1", "-A1", "@x", "\tx", "-3.5", "+2e-3", "at 0 mm", None]
+    (row,) = csv.reader(io.StringIO(csv_text([cells])))
+    assert row == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
+
+
+# --- the view's page ---
+
+
+@pytest.fixture
+def page():
+    with server("<p>page</p>") as running:
+        threading.Thread(target=running.serve_forever, daemon=True).start()
+        yield running.server_address
+        running.shutdown()
+
+
+def answer(address, method, path, host=None):
+    line = http.client.HTTPConnection(*address, timeout=5)
+    line.putrequest(method, path, skip_host=True)
+    line.putheader("Host", host or f"{address[0]}:{address[1]}")
+    line.endheaders()
+    found = line.getresponse()
+    return found.status, found.read().decode(), dict(found.getheaders())
+
+
+def test_the_server_has_one_page_for_this_machine_alone(page):
+    assert page[0] == "127.0.0.1"
+    status, text, headers = answer(page, "GET", "/")
+    assert (status, text) == (200, "<p>page</p>")
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert "Access-Control-Allow-Origin" not in headers
+    assert "Python" not in headers["Server"]
+    outside = ("/..", "/../../etc/passwd", "/%2e%2e/etc/passwd", "//etc/passwd", "/etc/passwd", "/?a", f"/{EVIL[:4]!a}")
+    for path in (*outside, "http://127.0.0.1/", "/" + "a" * 60_000):
+        assert answer(page, "GET", path)[:2] == (404, "")
+    assert answer(page, "GET", "/" + "a" * 70_000)[0] == 414
+    for host in ("evil.example", f"evil.example:{page[1]}", f"127.0.0.1.evil.example:{page[1]}", ""):
+        assert answer(page, "GET", "/", host or ":")[:2] == (404, "")
+    for method in ("POST", "PUT", "DELETE", "OPTIONS", "HEAD", "<script>"):
+        status, text, _ = answer(page, method, "/")
+        assert status == 501
+        assert "<script>" not in text
+
+
+def test_limits_are_stated_where_users_look():
+    from fem import file_limits
+    from study.patch import reading
+    from study.scene import text
+
+    told = (ROOT / "docs" / "files-from-elsewhere.md").read_text()
+    limits = [file_limits.MOST_TRIANGLES, file_limits.MOST_POINTS, file_limits.MOST_CORNERS, file_limits.MOST_LINES,
+              reading.MOST_FACES]  # fmt: skip
+    sizes = [
+        f"{file_limits.LARGEST_FILE >> 20} MiB",
+        f"{reading.LARGEST_FILE >> 20} MiB",
+        f"{text.LARGEST // 10**6} MB",
+    ]
+    for value in (*sizes, *(f"{n:,}" for n in limits)):
+        assert value in told
+
+
+def test_the_seed_of_these_tests_is_a_scene(tmp_path):
+    (tmp_path / "scene.toml").write_bytes(SCENE)
+    assert load_scene(tmp_path / "scene.toml").cases == 4

@@ -1,0 +1,119 @@
+"""Files that are nearly right: a reader takes them or says in one sentence what is wrong, and does nothing else."""
+
+from __future__ import annotations
+
+import os
+import resource
+import traceback
+import warnings
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from study.printable import UNPRINTABLE
+from tests.fuzz.edits import BINARY, edited, edits
+from tests.fuzz.readers import QUICK, slow_readers
+
+SECONDS, ROOM = 20, 3 * 2**29  # of CPU, and bytes beyond what the tests have already
+CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
+SLOW = ("catalogue", "VTU", "VTP", "result", "cost")
+
+
+def complaint(reader, path):
+    """What is wrong with the way a file was read or refused; empty if nothing is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            reader.read(path)
+        except reader.errors as error:
+            return wrong_words(str(error), path)
+        except BaseException:
+            return traceback.format_exc()
+    return ""
+
+
+def wrong_words(text, path):
+    lines = text.splitlines()
+    if not 0 < len(lines) <= 300 or max(map(len, lines)) > 1000 or UNPRINTABLE.search(text):
+        return f"no clear sentence: {text!r}"
+    named = path.name in text or path.stem in text or "--set" in text
+    return "" if named else f"the file is not named: {text!r}"
+
+
+def complaint_apart(reader, path):
+    """As `complaint`, in a child process with limits of time and memory."""
+    end, other = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(end)
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + ROOM, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+        os.write(other, b"." + complaint(reader, path).encode()[-4000:])
+        os._exit(0)
+    os.close(other)
+    with os.fdopen(end, "rb") as pipe:
+        told = pipe.read()
+    status = os.waitpid(child, 0)[1]
+    return told[1:].decode() if told else f"it ended by signal {os.WTERMSIG(status)}"
+
+
+@pytest.mark.parametrize("kind", QUICK)
+@settings(max_examples=6, derandomize=True, **CHECKS)
+@given(data=st.data())
+def test_a_spoilt_file_is_read_or_refused(tmp_path, kind, data):
+    reader = QUICK[kind]
+    path = tmp_path / reader.name
+    path.write_bytes(edited(reader.content, data.draw(edits(reader.kinds))))
+    wrong = complaint(reader, path)
+    assert not wrong, wrong
+
+
+@pytest.mark.parametrize("kind", QUICK)
+def test_the_file_that_is_spoilt_is_a_good_one(tmp_path, kind):
+    reader = QUICK[kind]
+    path = tmp_path / reader.name
+    path.write_bytes(reader.content)
+    reader.read(path)
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory):
+    return slow_readers(tmp_path_factory.mktemp("seeds"))
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("kind", [*QUICK, *SLOW])
+def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_path, slow, kind):
+    reader = {**QUICK, **slow}[kind]
+    path = tmp_path / reader.name
+    path.write_bytes(reader.content)
+    reader.read(path)  # and everything is imported
+
+    @settings(max_examples=120 if kind in SLOW else 300, derandomize=True, **CHECKS)
+    @given(found=edits(reader.kinds), early=st.booleans())
+    def judged(found, early):
+        # what HDF5 trusts stands in the first part of a large file
+        near = [(f, 0.02 * where, what) for f, where, what in found] if early and reader.kinds is BINARY else found
+        path.write_bytes(edited(reader.content, near))
+        wrong = complaint_apart(reader, path)
+        assert not wrong, wrong
+
+    judged()
+
+
+@pytest.mark.parametrize(
+    "text", ["=", "a=b=c", "\x1b[2J=1", "x.y=" + "[" * 3000, "load.normal_force_n=[1e999]", "." * 99]
+)
+def test_an_override_is_taken_or_refused(tmp_path, text):
+    from study.scene import load_scene
+    from study.scene.errors import SceneError
+
+    path = tmp_path / "scene.toml"
+    path.write_bytes(QUICK["scene"].content)
+    with pytest.raises(SceneError) as refused:
+        load_scene(path, [text])
+    assert not wrong_words(str(refused.value), path)
