@@ -75,6 +75,7 @@ def spoilt(*changes):
 
 
 # test_scene has the sentences of all keys; here they come out of the program, all at once.
+OFF, NOT_TOML = "off the object", "not toml"
 WRONG_SCENES = {
     "every key": (
         spoilt(
@@ -83,12 +84,12 @@ WRONG_SCENES = {
         ),
         ("object.colour", "object.radius_mm", "pad_thickness_mm", "stations_mm", "normal_force_n"),
     ),
-    "off the object": (spoilt(("stations_mm = [0]", "stations_mm = [31]")), ("-30 to 30 mm",)),
-    "not toml": (spoilt(("[load]", "[load")), ("scene.toml",)),
+    OFF: (spoilt(("stations_mm = [0]", "stations_mm = [31]")), ("-30 to 30 mm",)),
+    NOT_TOML: (spoilt(("[load]", "[load")), ("scene.toml",)),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", WRONG_SCENES)
+@pytest.mark.parametrize("what", ["every key", *(pytest.param(w, marks=pytest.mark.long) for w in (OFF, NOT_TOML))])
 def test_a_wrong_scene_starts_nothing(once, folder, what):
     text, words = WRONG_SCENES[what]
 
@@ -144,7 +145,8 @@ def test_a_mesh_that_is_no_object_is_found_by_check(once, folder, what, capsys):
     refused((code, told.out, told.err), folder, 2, *WRONG_MESHES[what][1])
 
 
-@pytest.mark.parametrize(("what", "ranks"), [("open", 0), pytest.param("a bottle of 200 m", 2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize(("what", "ranks"), [("open", 0), ("a bottle of 200 m", 2)])
 def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(once, folder, what, ranks):
     once(spoil_mesh, folder, what)
     refused(once(lambda: run(ranks, folder, scene="mesh.toml")), folder, 2, *WRONG_MESHES[what][1])
@@ -154,7 +156,9 @@ def test_options_of_another_solver_are_refused(once, folder):
     refused(once(run, 0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
 
 
+@pytest.mark.long
 def test_a_misspelt_option_of_the_solver_is_refused(once, folder):
+    """Through the whole program; test_refusals has the sentences."""
     refused(once(run, 0, folder, "--", "-contact_snes_typ", "vinewtonrsls"), folder, 2, "contact_snes_typ")
 
 
@@ -169,12 +173,16 @@ def every_rank(folder, *words):
     return [int(line[5:]) for line in done.stdout.splitlines() if line.startswith("code ")], done.stderr
 
 
-def test_all_ranks_leave_with_the_same_code(once, folder):
+@pytest.mark.long
+def test_all_ranks_leave_a_wrong_scene_with_the_same_code(once, folder):
     codes, errors = once(every_rank, folder, "--set", "friction.mu=-1")
     assert codes == [2, 2]
     assert errors.count("error: ") == 1
     assert "friction.mu" in errors
     assert not list(folder.glob("out.hdf*"))
+
+
+def test_all_ranks_leave_a_file_of_others_with_the_same_code(once, folder):
     once((folder / "out.hdf").write_text, "my notes")
     codes, errors = once(every_rank, folder)
     assert codes == [3, 3]

@@ -68,8 +68,9 @@ def quick(names, *chosen):
     return [name if name in chosen else pytest.param(name, marks=pytest.mark.long) for name in names]
 
 
+@pytest.mark.long
 @pytest.mark.launches
-@pytest.mark.parametrize("name", quick(ONE, "bottle-rigid"))
+@pytest.mark.parametrize("name", ONE)
 def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
     path = shared_path / f"{name}.hdf"
     overrides = [word for value in ONE[name] for word in ("--set", value)]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from argparse import Namespace
 
 import pytest
 
 from study.build import check_object, shapes_of, warnings
 from study.cli import main
-from study.commands import RANK
+from study.commands import RANK, petsc_overrides, prepare
 from study.exits import StudyError
-from study.scene import SceneError, parse_scene
+from study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
 
 LOAD = "\n[load]\nnormal_force_n = [1]\n"
@@ -91,10 +92,24 @@ def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
     assert not list(shared_path.glob("out.hdf*"))
 
 
-@pytest.mark.launches
 @pytest.mark.parametrize(
-    "options", ["-contact_snes_type foo", pytest.param("-contact_snes_rtol abc", marks=pytest.mark.long)]
+    ("options", "sentence"),
+    [
+        ("-contact_snes_type foo", "petsc: PETSc refuses the options -contact_snes_type foo: .*foo"),
+        ("-contact_snes_rtol abc", "petsc: PETSc refuses the options -contact_snes_rtol abc: .*abc"),
+        ("-contact_snes_typ newtonls", "petsc: no solver asks for the option contact_snes_typ; correct the spelling"),
+    ],
 )
+def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options, sentence):
+    scene = load_scene(ROOT / "jobs" / "smoke.toml", petsc_overrides(options.split()))
+    with pytest.raises(StudyError, match=f"^{sentence}") as refused:
+        prepare(scene, Namespace(scene="smoke.toml", overrides=[], petsc=options.split()))
+    assert refused.value.code == 2
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
 def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
     words = ("-o", shared_path / "out.hdf", "--", *options.split())
     code, output, errors = once(lambda: launch(0, "-m", "study", "run", ROOT / "jobs" / "smoke.toml", *words))
@@ -164,21 +179,21 @@ def unwrapped(text):
     return re.sub(r"\n {2,}(?=\S)", " ", text)
 
 
-@pytest.mark.launches
-def test_plan_and_run_warn_as_check_does(once, shared_path, capsys):
-    text = f"{BOX}[gripper]\nelements = [4, 4, 2]\n[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}"
-    scene = shared_path / "scene.toml"
-    once(scene.write_text, text)
+def test_plan_and_run_warn_as_check_does(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f"{BOX}[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}")
 
-    def told():
-        for command in ("check", "plan"):
-            yield main([command, str(scene)]), *capsys.readouterr()
-        yield once(lambda: launch(0, "-m", "study", "run", scene, "-o", shared_path / "out.hdf"))
+    def warned():
+        told = capsys.readouterr()
+        assert told.err == ""
+        return [line for line in unwrapped(told.out).splitlines() if line.startswith("warning: ")]
 
     said = []
-    for code, output, errors in told():
-        assert (code, errors) == (0, "")
-        said.append([line for line in unwrapped(output).splitlines() if line.startswith("warning: ")])
+    for command in ("check", "plan"):
+        assert main([command, str(scene)]) == 0
+        said.append(warned())
+    prepare(load_scene(scene), Namespace(scene=str(scene), overrides=[], petsc=[]))  # what a run begins with
+    said.append(warned())
     assert len(said[0]) == 1
     assert said[1:] == said[:1] * 2
 

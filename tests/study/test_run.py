@@ -45,7 +45,8 @@ def uninterrupted(whole):
     return contents(whole)
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long), 3])
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, uninterrupted, ranks):
     path = shared_path / "ranks.hdf"
     code, output, errors = once(study, ranks, path)
@@ -68,6 +69,8 @@ def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on
     assert f"resumed, {36 - done.sum()} of 36 cases" in output
     assert before != uninterrupted
     assert once(differing, path, uninterrupted) == []
+    assert not list(shared_path.glob("*.lock"))
+    assert not list(shared_path.glob("*.part"))
 
 
 @pytest.mark.long
@@ -128,8 +131,8 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
 @pytest.mark.parametrize(
     ("name", "ranks"),
     [
-        ("SIGUSR1", 2),
-        pytest.param("SIGTERM", 0, marks=pytest.mark.long),
+        pytest.param("SIGUSR1", 2, marks=pytest.mark.long),  # test_ranks stops a real run by it
+        ("SIGTERM", 0),
         pytest.param("SIGINT", 0, marks=pytest.mark.long),
     ],
 )
@@ -204,11 +207,12 @@ def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ran
     assert same
 
 
-def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, shared_path):
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
+def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, shared_path, ranks):
     path = shared_path / "busy.hdf"
 
     def second():
-        process = start(2, path, "--delay", 1.0)
+        process = start(ranks, path, "--delay", 1.0)
         wait_for(lambda: begun(path))
         told = subprocess.run(
             [sys.executable, "-m", "study", "status", str(path)], cwd=ROOT, capture_output=True, text=True
@@ -266,7 +270,8 @@ def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path
     assert not (shared_path / "x.hdf.part").exists()
 
 
-def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted):
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
+def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted, ranks):
     import h5py
 
     path = shared_path / "torn.hdf"
@@ -276,11 +281,11 @@ def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted):
         with h5py.File(path, "r+") as file:
             file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
             file["study/patch/normal"][30, 0, 3, 1] = 0.0
-        return study(2, path)
+        return study(ranks, path)
 
     code, output, _ = once(tear)
     assert code == 0
-    assert "2 of 36 cases to solve on 2 ranks, 2 torn results are solved again" in output
+    assert f"2 of 36 cases to solve on {'2 ranks' if ranks else '1 rank'}, 2 torn results are solved again" in output
     assert once(differing, path, uninterrupted) == []
 
 
