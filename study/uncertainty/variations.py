@@ -68,7 +68,7 @@ def variations(scene: Scene) -> tuple[Variation, ...]:
         "mu": [Variation("mu + half-width", "mu", {"friction.mu": scene.friction.mu + own.mu})],
         "modulus": [Variation("shear modulus + half-width", "modulus", _stiffer(scene))],
         "wall": [Variation("wall thickness + half-width", "wall", _thicker(scene))],
-        "pose": _moved(own.pose, own.pose_turn),
+        "pose": _moved(own.pose, own.pose_turn, "+" if _mirrored(scene) else "+-"),
     }
     return tuple(v for part in own.parts if part not in done for v in made[part])
 
@@ -105,10 +105,16 @@ def _thicker(scene: Scene) -> dict[str, Any]:
     return found
 
 
-def _moved(shift: float, turn: float) -> list[Variation]:
+def _mirrored(scene: Scene) -> bool:
+    """Whether a turn to one side is the mirror image of that to the other: with pads along or across a round object."""
+    where = scene.candidates
+    return scene.object.axis_symmetry == 0 and not where.poses and where.roll_deg % 90 == 0
+
+
+def _moved(shift: float, turn: float, ways: str) -> list[Variation]:
     """To both sides, for a grasp may stand where its quality is largest."""
     shifts = [Variation(f"gripper shifted by {s} half-width", "pose", shift=float(f"{s}1") * shift) for s in "+-"]
-    turns = [Variation(f"gripper turned by {s} half-width", "pose", turn=float(f"{s}1") * turn, pair=1) for s in "+-"]
+    turns = [Variation(f"gripper turned by {s} half-width", "pose", turn=float(f"{s}1") * turn, pair=1) for s in ways]
     return shifts * bool(shift) + turns * bool(turn)
 
 

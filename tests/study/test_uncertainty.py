@@ -110,6 +110,9 @@ def test_a_mesh_error_falls_with_the_contact_area_and_a_probe_keeps_its_own():
         (("effects.sheet=elastic",), ("mu",), 4),
         (("effects.friction_pressure_coupling=tangential",), ("modulus",), 4),
         (("load.normal_force_n=[2]",), ("mu",), 4),
+        (("uncertainty.pose_deg=2",), ("mu", "modulus"), 5),
+        (("uncertainty.pose_deg=2", "object.semi_axis_b_mm=25"), ("mu", "modulus"), 4),  # round: both turns are alike
+        (("uncertainty.pose_deg=2", "object.semi_axis_b_mm=25", "candidates.roll_deg=20"), ("mu", "modulus"), 5),
         (("object.wall_mm=1", "object.open_top=true"), None, None),
     ],
 )
