@@ -31,11 +31,12 @@ TWO = -n 2 --dist loadfile
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures test test-long bench lint doctor
+.PHONY: help setup map figures effects test test-long bench lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
 	@echo 'make figures    the figures of the paper, into $(FIGURES)'
+	@echo 'make effects    indicators of the effects against true errors, into results/effects.csv and .png'
 	@echo 'make test       the tests, first without MPI and then on $(RANKS) ranks'
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
@@ -59,6 +60,10 @@ map: setup
 
 figures: setup
 	$(MPIRUN) $(BIN)/softjaw figure all -o $(FIGURES) || [ $$? = $(SOME_FAILED) ]
+
+effects: setup
+	$(BIN)/python jobs/effects.py results/effects.csv
+	@$(BIN)/python jobs/effects.py results/effects.csv -o results/effects.png
 
 test: setup
 	$(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO)

@@ -15,21 +15,14 @@ from study.scene import Scene
 from study.sheet_level import sheet_level
 
 ONLY, FORCED, BELOW, ABOVE, SYMMETRY = range(5)  # of REASONS
-CHEAP, LEFT_OUT = (
-    REASONS.index(text)
-    for text in (
-        "never skipped, because it costs next to nothing",
-        "left out, though the indicator is above the target",
-    )
-)
+CHEAP = REASONS.index("never skipped, because it costs next to nothing")
+APART = REASONS.index("e_n and quality do not depend on it")
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
     "full": "fitted ellipsoid",
     "quartic": "convex quartic",
 }
-# In 126 cases e_n was off by at most 0.35 times the dropped share where f_z, tau_x and tau_y had to vanish.
-SMALL_SHARE = 0.05
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
@@ -59,7 +52,7 @@ def effects_of(
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),
         "friction": ("curved", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),
-        "wrench": _wrench(wanted.wrench, dropped),
+        "wrench": ("3-D", dropped, APART) if wanted.wrench == "auto" else (wanted.wrench, dropped, FORCED),
         "limit_surface": _surface(scene, curved),
         "friction_pressure_coupling": coupling_level(scene, contacts, bool(solving.level and solving.level.number)),
     }
@@ -72,13 +65,6 @@ def _object(level: Any) -> tuple[str, float, int]:
         return names[0], nan, REASONS.index("the object has no wall")
     reason = FORCED if level.forced else BELOW if level.number < len(names) - 1 else ABOVE
     return names[level.number], level.indicator, reason
-
-
-def _wrench(wanted: str, dropped: float) -> tuple[str, float, int]:
-    """Only the scene asks for six components: nothing that is mapped is computed from them."""
-    if wanted != "auto":
-        return wanted, dropped, FORCED
-    return EFFECTS["wrench"][0], dropped, BELOW if dropped <= SMALL_SHARE else LEFT_OUT
 
 
 def _surface(scene: Scene, bounds: Sequence[Any]) -> tuple[str, float, int]:

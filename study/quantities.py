@@ -247,6 +247,7 @@ REASONS = (
     "the object has no wall",
     "never skipped, because it costs next to nothing",
     "left out, though the indicator is above the target",
+    "e_n and quality do not depend on it",
 )
 
 

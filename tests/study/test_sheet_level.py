@@ -24,7 +24,7 @@ def level(*overrides):
 def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
     name, compliance, reason = level(*STEEL)
     assert (name, reason) == ("rigid", "indicator below the target")
-    assert compliance < 0.05 * STIFF
+    assert compliance < 0.1 * STIFF
     name, compliance, reason = level(*PLASTIC)
     assert (name, reason) == ("elastic plate", "indicator above the target")
     assert compliance > STIFF
