@@ -49,7 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of a pipe has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except Exception:
+    except Exception as error:
+        if damage := commands.damage(options, error):
+            return commands.complain(damage)
         traceback.print_exc()
         return BUG
 

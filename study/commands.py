@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
+from study.exits import BUG, CANNOT_WRITE, DONE, OTHER_FILE, USAGE, StudyError
 from study.printable import printable
 
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
@@ -32,6 +32,29 @@ def complain(error: StudyError) -> int:
 def _say(text: str) -> None:
     """Print what may hold texts of files from elsewhere."""
     print(printable(text))
+
+
+def damage(options: Namespace, error: Exception) -> StudyError | None:
+    """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
+    from study.scene.errors import SceneError
+
+    files = [*getattr(options, "files", []), getattr(options, "file", "")]
+    for file in (Path(name) for name in files if str(name).endswith(".hdf")):
+        from study.store import open_result, torn_rows
+
+        try:
+            with open_result(file) as result:
+                layout = result.layout
+            torn = torn_rows(file, layout)
+        except StudyError as found:
+            return found
+        if torn:
+            text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
+            return StudyError(OTHER_FILE, f"{text}; 'softjaw repair {file}' says what is good")
+        if isinstance(error, SceneError):
+            text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
+            return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")
+    return None
 
 
 def _scene(options: Namespace) -> Any:

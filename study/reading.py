@@ -53,20 +53,10 @@ class Result:
         self._quiet.__enter__()
         return self
 
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        """Close the file; where its values led to an error, say so if they are not those that were written."""
-        self._quiet.__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> None:
+        """Close the file."""
+        self._quiet.__exit__(*error)
         self.close()
-        if isinstance(error, ArithmeticError | ValueError | LookupError | TypeError):
-            from study.scene.errors import SceneError
-            from study.store import torn_rows
-
-            if torn := torn_rows(self.path, self.layout):
-                text = f"{self.path}: damaged ({len(torn)} cases do not match their checksums)"
-                raise StudyError(OTHER_FILE, f"{text}; 'softjaw repair {self.path}' says what is good") from error
-            if isinstance(error, SceneError):
-                text = f"{self.path}: the scene in it cannot be used ({error.problems[0]})"
-                raise StudyError(OTHER_FILE, f"{text}; restore the file from a copy") from error
 
     def close(self) -> None:
         """Close the file."""
