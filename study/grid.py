@@ -8,14 +8,12 @@ sweep it shows the first point. The space is reserved when the file is made; `st
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from study.datasets import MISSING, Dataset
 from study.grid_arrays import quads_of, shared_steps, topology
-from study.overview import has_wall
 from study.quantity import FINGERS
 
 PATH = "/VTKHDF"
@@ -39,21 +37,6 @@ class Surface(NamedTuple):
     def counts(self) -> tuple[int, int]:
         """Number of points and of triangles."""
         return len(self.points), len(self.triangles)
-
-
-def surface_of(scene: Any, axes: Any) -> Surface:
-    """The object of a scene, at the first point of its sweep, cut along the cells of its candidates."""
-    from study.report.data import Data
-    from study.view.model import View
-
-    asked = SimpleNamespace(
-        result=SimpleNamespace(scene=scene.effective_toml()), axes=axes, shape=tuple(len(a.values) for a in axes),
-        by_poses=not axes[-3].units, walled=has_wall(scene.object),
-        values=lambda _: None,  # nothing is solved yet: no marks where the fingers touch
-    )  # fmt: skip
-    corners, cell = View(cast(Data, asked), (0,) * (len(axes) - 3)).surface
-    points, inverse = np.unique(np.round(corners[..., :3].reshape(-1, 3), 9), axis=0, return_inverse=True)
-    return Surface(points, inverse.reshape(-1, 3), cell)
 
 
 def maps_of(layout: Any) -> dict[str, Any]:

@@ -7,8 +7,8 @@ import re
 import textwrap
 from typing import Any
 
+from study.data import Data
 from study.layout import DONE, FAILED
-from study.report.data import Data
 from study.report.words import CAVEAT, subtitle, verdict
 from study.show import best
 from study.show_text import as_text

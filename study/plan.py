@@ -45,7 +45,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     from study import sweep
     from study.build import check_object, pad_shape
     from study.derived import derived
-    from study.grid import surface_of
+    from study.grid_surface import surface_of
     from study.uncertainty.probes import changes, probe_candidates, with_probes
 
     check_object(scene)

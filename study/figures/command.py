@@ -98,8 +98,8 @@ def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
     import numpy as np
 
     from study import pictures
+    from study.data import Data
     from study.layout import DONE as SOLVED
-    from study.report.data import Data
     from study.store import open_result
 
     with ExitStack() as stack, pictures.style():

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.figures import WIDTH, rendering
-from study.report.data import Data, number
-from study.report.outline import read_scene
+from study.outline import read_scene
 from study.view.colours import FORCE, NEUTRAL, PAD, table
 from study.view.model import View
 from study.view.pads import Pad, pads

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.figures import WIDTH
+from study.outline import read_scene
 from study.quantity import MODELS
-from study.report.data import Data, number
-from study.report.outline import read_scene
 
 LOOKS = {
     "flat": {"ms": 6, "mfc": "none", "lw": 1.0},

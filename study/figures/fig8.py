@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import WIDE, Data, number
 from study.figures import WIDTH, rendering
-from study.report.data import WIDE, Data, number
-from study.report.outline import read_scene, shape_outline
+from study.outline import read_scene, shape_outline
 from study.view.colours import table
 from study.view.model import View
 from study.view.surface import NOBODY

@@ -13,7 +13,7 @@ from study.figures import fig4, fig5, fig6, fig7, fig8
 class Figure:
     """One figure: its number with its letters, the scenes it is drawn from, and what draws it.
 
-    ``draw`` takes a `study.report.data.Data` of each scene's result and gives the drawing, and a sentence of what was
+    ``draw`` takes a `study.data.Data` of each scene's result and gives the drawing, and a sentence of what was
     measured. ``gaps`` says whether it can be drawn where cases have failed.
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from study import pictures
-from study.report.data import Data, number
+from study.data import Data, number
 from study.report.maps import (
     HOW_TO_READ,
     MAPS,

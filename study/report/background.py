@@ -6,10 +6,10 @@ import re
 
 import numpy as np
 
+from study.data import Data, number
 from study.layout import DONE
 from study.progress import duration
 from study.quantities import EFFECTS, REASONS
-from study.report.data import Data, number
 from study.report.page import bullets, paragraph, table, text_block
 from study.status import PARTS
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from study.data import ABOVE, LIMITS, Data, number, passes
 from study.layout import DONE, FAILED, MISSING
 from study.ranking import FLAGS
-from study.report.data import ABOVE, LIMITS, Data, number, passes
 from study.report.page import details, paragraph, table
 from study.report.words import VALUES, head, value
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.layout import FAILED
-from study.report.data import Data, number
 from study.report.maps import elsewhere, main_axis, ticks
 from study.report.page import Picture
 from study.status import PARTS

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from study import pictures
+from study.data import Data, number, shown
 from study.layout import DONE
+from study.outline import swept_object
 from study.quantity import MODELS
-from study.report.data import Data, number, shown
-from study.report.outline import swept_object
 from study.report.page import Picture
 
 LINES = (

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, shown
 from study.quantity import MODELS
-from study.report.data import Data, shown
 from study.report.page import Picture
 
 # map, text of the panel, unit, factor from SI; "F" divides by the normal force

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.layout import FAILED
 from study.overview import RULE
 from study.quantities import EFFECTS, REASONS
-from study.report.data import Data, number
 from study.report.maps import elsewhere, main_axis, plane, ticks
 from study.report.page import Picture, paragraph
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number, shown
 from study.layout import FAILED
-from study.report.data import Data, number, shown
 from study.report.page import Picture
 from study.report.spots import Spot, spot
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.layout import FAILED, MISSING
-from study.report.data import Data, number
 from study.report.maps import MAPS, SHORT, extremes, scaled
 from study.report.page import Picture, paragraph, picture
+from study.view.model import View
 
 PATIENCE = 120.0  # seconds that drawing may take, also on a busy machine without a graphics card
 NO_RENDERER = (
@@ -24,8 +25,6 @@ Limits = Mapping[str, tuple[float, float]]
 
 def object_section(data: Data, index: tuple[int, ...]) -> str:
     """The picture, or a sentence that says why there is none; empty where nothing of the object is known."""
-    from study.view.model import View
-
     view = View(data, index[:-3])
     if not len(view.surface[0]):
         return paragraph(f"{view.note[:1].upper()}{view.note[1:]}.", "note") if view.note else ""

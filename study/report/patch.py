@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import QhullError, Voronoi
 
 from study import pictures
+from study.data import Data, number
 from study.layout import DONE
-from study.report.data import Data, number
 from study.report.page import Picture
 
 ALIKE = 1e-3  # difference of the fingers' pressures over the largest one that is not drawn twice

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data
 from study.layout import FAILED
-from study.report.data import Data
+from study.outline import outline, pad_extent, slice_polygon
 from study.report.maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
-from study.report.outline import outline, pad_extent, slice_polygon
 from study.report.page import Picture
 from study.report.spots import spot
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from study import pictures
-from study.report.data import Data, number
+from study.data import Data, number
 from study.report.page import Picture
 
 SNAPPED = 8192  # flag, as study.quantities says

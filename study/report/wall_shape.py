@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number
 from study.layout import DONE
-from study.report.data import Data, number
-from study.report.outline import swept_object
+from study.outline import undeformed
 from study.report.page import Picture
 from study.wall_quantities import ALONG, AROUND
 
@@ -96,26 +96,6 @@ def _stored(data: Data, places: np.ndarray | None, index: tuple[int, ...]) -> bo
 def _finger(data: Data, index: tuple[int, ...], finger: int = 0) -> tuple[np.ndarray, np.ndarray, float]:
     """Rotation, origin at first touch [m] and travel [m] of a pad."""
     return tuple(data.result.fingers(name)[index][finger] for name in ("pose_rotation", "pose_origin", "travel"))
-
-
-def undeformed(scene: Any, index: tuple[int, ...], angle: float) -> np.ndarray | None:
-    """Outer face ``(AROUND, ALONG, 3)`` before anything presses [m], at the places that a file stores.
-
-    ``angle`` is finger 1's about the axis [rad].
-    """
-    from study.build import outer_surface
-
-    shape = swept_object(scene, index) if scene else None
-    if shape is None:
-        return None
-    try:
-        surface = outer_surface(shape)[0]
-    except (AttributeError, OSError, ValueError):
-        return None
-    end = surface.wall[1] if shape.open_top else surface.end
-    around = angle + 2 * np.pi * np.arange(AROUND) / AROUND
-    theta, s = np.meshgrid(around, np.linspace(0.0, end, ALONG), indexing="ij")
-    return surface.jets(theta, s)[:, 0].reshape(AROUND, ALONG, 3)
 
 
 def _drawing(data: Data, scene: Any, index: tuple[int, ...], after: np.ndarray) -> tuple[dict[str, Any], ...] | None:

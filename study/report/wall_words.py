@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from study.data import Data, number
+from study.outline import swept_object
 from study.overview import wall_text
 from study.quantities import EFFECTS
-from study.report.data import Data, number
-from study.report.outline import swept_object
 from study.report.page import paragraph, table
 
 HEADS = {

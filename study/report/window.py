@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.data import Data, number, shown
 from study.layout import DONE
-from study.report.data import Data, number, shown
 from study.report.maps import chosen_angles, elsewhere, main_axis, ticks
 from study.report.page import Picture
 

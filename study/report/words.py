@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from study.data import LIMITS, Data, number, shown
 from study.layout import DONE, FAILED, MISSING
 from study.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
-from study.report.data import LIMITS, Data, number, shown
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 from study.uncertainty.verdict import sure

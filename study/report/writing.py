@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from study import pictures
+from study.data import Data
 from study.exits import CANNOT_WRITE, StudyError
+from study.outline import read_scene
 from study.report import (
     background,
     cases,
@@ -33,10 +35,9 @@ from study.report import patch as report_patch
 from study.report import side as report_side
 from study.report import surface as report_surface
 from study.report.angle_maps import angle_maps
-from study.report.data import Data
-from study.report.outline import read_scene
 from study.report.page import Picture, heading, page, paragraph, picture
 from study.store import open_result
+from study.view.model import view_of
 
 Sections = list[tuple[str, str, str]]
 Place = tuple[float | None, float | None]
@@ -66,8 +67,6 @@ def build(result: Any, candidate: int | None = None, place: Place = (None, None)
     """The page and the picture of an open result file."""
     data, scene = Data(result), read_scene(result.scene)
     if candidate is not None or place != (None, None):
-        from study.view.model import view_of  # the view shares the report's words
-
         data.chosen = view_of(data, candidate, place, None)[1]
     mu = scene.friction.mu if scene else None
     best = data.best or (*(0 for _ in data.shape[:-1]), data.k)

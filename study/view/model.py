@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from study.data import Data, number
 from study.exits import USAGE, StudyError
 from study.layout import DONE, FAILED
+from study.outline import read_scene, swept_object
 from study.ranking import FLAGS
-from study.report.data import Data, number
-from study.report.outline import read_scene, swept_object
 from study.view.surface import NOBODY, Cells, coloured, with_normals
 from study.view.wall import Wall, displacement, wall_of
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from study.data import Data
 from study.layout import DONE
-from study.report.data import Data
-from study.report.wall_shape import undeformed
+from study.outline import undeformed
 from study.wall_quantities import ALONG, AROUND
 
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]

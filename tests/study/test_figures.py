@@ -9,12 +9,12 @@ import pytest
 
 from study.cli import main
 from study.commands import RANK
+from study.data import Data
 from study.exits import OTHER_FILE, StudyError
 from study.figures import JOBS, fig5, fig6, fig7, fig8, rendering
 from study.figures.command import chosen, draw, targets, write
 from study.figures.table import FIGURES, Figure, find
 from study.layout import DONE
-from study.report.data import Data
 from study.store import open_result
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch

@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 
 from study import pictures
+from study.data import Data, number
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout
+from study.outline import read_scene, shape_outline, slice_polygon
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
 from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
-from study.report.data import Data, number
-from study.report.outline import read_scene, shape_outline, slice_polygon
 from study.report.patch import cells, friction_directions
 from study.report.writing import build, write_report
 from study.result import CaseResult

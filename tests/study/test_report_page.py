@@ -14,8 +14,8 @@ import pytest
 
 from study.cli import main
 from study.commands import RANK
+from study.data import Data
 from study.report import object_view
-from study.report.data import Data
 from study.store import open_result
 from study.view.model import View
 from tests.study import view_files

@@ -20,8 +20,8 @@ import pytest
 from fem.objects import Box, EllipticCylinder
 from study.cli import main
 from study.commands import RANK
+from study.data import Data
 from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
-from study.report.data import Data
 from study.store import open_result
 from study.view import colours, command, limits
 from study.view.model import quantity_of, view_of

@@ -12,16 +12,16 @@ import pytest
 
 from study import model, pictures, pipeline, wall, window
 from study.build import build_object
+from study.data import Data
 from study.layout import DONE
+from study.outline import read_scene, undeformed
 from study.overview import RULE, scene_text
 from study.plan import make_plan, memory, plan_text
 from study.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
 from study.record import blank, crc32, record
 from study.report import cases, wall_words, words, writing
-from study.report.data import Data
 from study.report.levels import level_picture, rule
-from study.report.outline import read_scene
-from study.report.wall_shape import Cut, shape_picture, undeformed
+from study.report.wall_shape import Cut, shape_picture
 from study.report.window import window_picture
 from study.scene import parse_scene
 from study.show import as_csv, as_json, best

@@ -14,9 +14,9 @@ from lsfit.form import exponents
 from lsfit.quartic import Quartic
 from lsfit.surface import LimitSurface
 from lsfit.tilted import TiltedEllipsoid
+from study.data import Data
 from study.layout import DONE
 from study.quantity import MODELS
-from study.report.data import Data
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface
 

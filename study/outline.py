@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from study.report.data import Data
+from study.data import Data
+from study.wall_quantities import ALONG, AROUND
 
 Outline = tuple[np.ndarray, np.ndarray, bool]
 
@@ -70,6 +71,26 @@ def _stacked_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
     place = surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)
     along = place[..., 0] * math.cos(angle) + place[..., 1] * math.sin(angle)
     return place[0, :, 2], 0.5 * np.ptp(along, axis=0)
+
+
+def undeformed(scene: Any, index: tuple[int, ...], angle: float) -> np.ndarray | None:
+    """Outer face ``(AROUND, ALONG, 3)`` before anything presses [m], at the places that a file stores.
+
+    ``angle`` is finger 1's about the axis [rad].
+    """
+    from study.build import outer_surface
+
+    shape = swept_object(scene, index) if scene else None
+    if shape is None:
+        return None
+    try:
+        surface = outer_surface(shape)[0]
+    except (AttributeError, OSError, ValueError):
+        return None
+    end = surface.wall[1] if shape.open_top else surface.end
+    around = angle + 2 * np.pi * np.arange(AROUND) / AROUND
+    theta, s = np.meshgrid(around, np.linspace(0.0, end, ALONG), indexing="ij")
+    return surface.jets(theta, s)[:, 0].reshape(AROUND, ALONG, 3)
 
 
 def _measured(data: Data, index: tuple[int, ...]) -> Outline | None:

@@ -1,4 +1,4 @@
-"""What a report needs from a result file: maps without values of unsolved cases, the order of grasps, their words."""
+"""What pages and pictures need of a result file: maps without unsolved cases, the order of grasps, their words."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 class Data:
-    """A result file as a report sees it; ``None`` stands for what the file does not have.
+    """A result file as reports, views and figures see it; ``None`` stands for what the file does not have.
 
     The states are read first: a case that is done then has its values, even while a run goes on writing. ``chosen`` is
     the index of a case that the reader asked for beside the best one.
