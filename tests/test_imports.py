@@ -28,7 +28,14 @@ PICTURES = {
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "shtab": {"study/completion.py"},
-    "h5py": {"study/store.py", "study/guarded.py", "study/vtkhdf.py", "study/cost/file.py"},
+    "h5py": {
+        "study/store.py",
+        "study/skeleton.py",
+        "study/result_writer.py",
+        "study/guarded.py",
+        "study/vtkhdf.py",
+        "study/cost/file.py",
+    },
     "pyvista": PICTURES,
     "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
 }
