@@ -10,6 +10,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not dep
 
 import pytest
 
+from study.commands import RANK
+
 LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK")
 
 
@@ -46,6 +48,13 @@ def pytest_collection_modifyitems(config, items):
     mine = single[world.rank :: world.size]
     config.hook.pytest_deselected(items=[item for k, item in enumerate(single) if k % world.size != world.rank])
     items[:] = mine + together
+
+
+@pytest.fixture
+def every_rank_speaks(monkeypatch):
+    """Under mpirun only the first rank prints; with this each rank can look at its own answers."""
+    for name in RANK:
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture(scope="session")

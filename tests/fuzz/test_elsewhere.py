@@ -18,7 +18,6 @@ from fem.mesh_check import MeshError
 from fem.mesh_file import read_polygons
 from study.cli import main
 from study.columns import csv_text
-from study.commands import RANK
 from study.exits import OTHER_FILE, USAGE, StudyError
 from study.printable import UNPRINTABLE
 from study.scene import SceneError, load_scene, parse_scene
@@ -31,15 +30,11 @@ from tests.study.formula_results import make
 from tests.study.launching import ROOT
 from tests.study.patch_files import cylinder_mesh, vtk
 
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
 FAST = ("external link",)
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture

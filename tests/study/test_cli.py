@@ -19,13 +19,15 @@ import pytest
 
 import study
 from study.cli import main, program
-from study.commands import RANK, petsc_overrides
+from study.commands import petsc_overrides
 from study.environment import launch_environment
 from study.exits import MEANING, StudyError
 from study.help import GROUPS
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
+
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
 COMMANDS = tuple(PARSERS)
@@ -52,13 +54,6 @@ angles_deg = [0, 90]
 [load]
 normal_force_n = [1, 2]
 """
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    """Each rank that runs these tests looks at its own answers."""
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture

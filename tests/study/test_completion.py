@@ -7,7 +7,6 @@ import subprocess
 import pytest
 
 from study.cli import main, program
-from study.commands import RANK
 from study.completion import SHELLS, script
 
 # What bash does at the tab key, without a terminal.
@@ -57,9 +56,8 @@ def test_bash_offers_what_fits(folder, words, offered):
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_every_shell_gets_every_command(shell, capsys, monkeypatch):
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
+@pytest.mark.usefixtures("every_rank_speaks")
+def test_every_shell_gets_every_command(shell, capsys):
     assert main(["completion", shell]) == 0
     text = capsys.readouterr().out
     commands = next(action for action in program()._actions if action.choices)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from study.data import Data
 from study.exits import OTHER_FILE, StudyError
 from study.figures import JOBS, fig5, fig6, fig7, fig8, rendering
@@ -19,14 +18,10 @@ from study.store import open_result
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
 PNG = b"\x89PNG\r\n\x1a\n"
 MOST = 250_000  # bytes of a picture on a page
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.name)

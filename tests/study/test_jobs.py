@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from study.layout import DONE
 from study.store import open_result
 from tests.study.launching import ROOT, launch
@@ -36,9 +35,8 @@ WALLED = {
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_every_shipped_scene_passes_check(name, capsys, monkeypatch):
-    for variable in RANK:
-        monkeypatch.delenv(variable, raising=False)
+@pytest.mark.usefixtures("every_rank_speaks")
+def test_every_shipped_scene_passes_check(name, capsys):
     assert main(["check", str(JOBS[name])]) == 0
     told = capsys.readouterr()
     assert "no errors" in told.out

@@ -13,7 +13,6 @@ import pytest
 
 from friction.patch import ContactPatch
 from study.cli import main
-from study.commands import RANK
 from study.patch.evaluate import SURFACES, judge
 from study.patch.faces import corner_geometry
 from study.patch.picture import PLANES, section
@@ -23,16 +22,11 @@ from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT
 from tests.study.patch_files import centres, corners, cylinder_mesh, vtk
 
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
 MU = 0.5
 EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
 SAME = {"rel": 1e-9, "abs": 1e-12}
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    """Each rank that runs these tests looks at its own answers."""
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture

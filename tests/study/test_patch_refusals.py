@@ -8,20 +8,14 @@ import numpy as np
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from tests.study.launching import ROOT
 from tests.study.patch_files import centres, cylinder_mesh, vtk
 from tests.study.test_patch import EXAMPLE, faceted
 
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
 HEAD = "x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa"
 FACE = "0,0,0,1,0,0,1,5"
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    """Each rank that runs these tests looks at its own answers."""
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture

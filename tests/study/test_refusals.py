@@ -9,10 +9,12 @@ import pytest
 
 from study.build import check_object, shapes_of, warnings
 from study.cli import main
-from study.commands import RANK, petsc_overrides, prepare
+from study.commands import petsc_overrides, prepare
 from study.exits import StudyError
 from study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
+
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
 LOAD = "\n[load]\nnormal_force_n = [1]\n"
 BOTTLE = '[object]\nshape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 29], [200, 20]]\n'
@@ -21,12 +23,6 @@ BOX = '[object]\nshape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6\n'
 FLASK = f'[object]\nshape = "mesh"\nmesh = "{ROOT}/jobs/objects/flask.stl"\nunit = "mm"\n'
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n'
 SWINGING = "[[0, 30], [50, 30], [50, 10], [100, 10]]"
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 def at(stations, body=BOTTLE, *overrides):

@@ -10,7 +10,6 @@ import pytest
 from friction.frame import FrameFlag
 from study import contact
 from study.cli import main
-from study.commands import RANK
 from study.layout import DONE, FAILED
 from study.quantities import MAPS, quantities
 from study.ranking import FLAGS
@@ -90,9 +89,8 @@ def test_explicit_poses_are_listed_by_their_labels():
 
 
 @pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
-def test_a_force_that_is_none_is_bad_usage(force, capsys, monkeypatch):
-    for name in RANK:  # only the first rank of an mpirun speaks
-        monkeypatch.delenv(name, raising=False)
+@pytest.mark.usefixtures("every_rank_speaks")
+def test_a_force_that_is_none_is_bad_usage(force, capsys):
     assert main(["show", "any.hdf", "--force", force]) == 2
     assert "--force" in capsys.readouterr().err
 

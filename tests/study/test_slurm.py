@@ -9,7 +9,6 @@ import subprocess
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from study.start import HERE
 from tests.study.launching import ROOT, wait_for
 
@@ -98,12 +97,11 @@ def test_a_scene_that_is_not_named_is_asked_for(tmp_path, slurm):
     assert not (tmp_path / "calls").exists()
 
 
+@pytest.mark.usefixtures("every_rank_speaks")
 def test_all_scripts_are_sound_and_share_what_they_do(tmp_path, slurm, monkeypatch, capsys):
     texts = [path.read_text() for path in (*SCRIPTS, HERE / "run.sbatch")]
     assert len(texts) == 4
     assert len({text.partition(SHARED)[2] for text in texts}) == 1
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
     monkeypatch.chdir(tmp_path)
     assert main(["init", "bottle"]) == 0
     for path in (*SCRIPTS, tmp_path / "bottle.sbatch"):

@@ -9,7 +9,6 @@ import tomllib
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from study.environment import launch_environment
 from study.exits import CANNOT_WRITE, USAGE
 from study.scene import load_scene
@@ -28,11 +27,9 @@ SMALL = {  # what makes a run of a second or two of each kind
 
 
 @pytest.fixture(autouse=True)
-def _here(tmp_path, monkeypatch):
+def _here(tmp_path, monkeypatch, every_rank_speaks):
     """Each test in a folder of its own, and every rank speaks."""
     monkeypatch.chdir(tmp_path)
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 def started(kind, *more):

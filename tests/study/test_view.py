@@ -19,7 +19,6 @@ import pytest
 
 from fem.objects import Box, EllipticCylinder
 from study.cli import main
-from study.commands import RANK
 from study.data import Data
 from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from study.store import open_result
@@ -33,6 +32,8 @@ from study.view.wall import Wall, between
 from study.wall_quantities import ALONG, AROUND
 from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
 
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
 CHROMIUM = shutil.which("chromium")
 
 
@@ -40,13 +41,6 @@ CHROMIUM = shutil.which("chromium")
 def file(tmp_path_factory, comm):
     path = make(tmp_path_factory.mktemp("view") / "thing.hdf") if comm.rank == 0 else None
     return comm.bcast(path)
-
-
-@pytest.fixture(autouse=True)
-def _speak_on_every_rank(monkeypatch):
-    """Each rank that runs these tests looks at its own answers."""
-    for name in RANK:
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture
