@@ -31,7 +31,7 @@ from study.solving import Solver, solver
 from study.sweep import units
 
 TARGET = 0.02  # relative error of e_n that a skip may have
-FLOOR, LEAST = 1e-6, 1e-5  # smaller errors and indicators are drawn there
+FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there
 HULL = 3000  # motions whose wrenches stand for the limit surface itself
 ROUND = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = {}\nsemi_axis_b_mm = {}\nlength_mm = 160'
 TURNED = 'shape = "revolution"\nprofile_mm = {}'
@@ -72,13 +72,16 @@ PANELS = {  # of an effect: threshold, and what the axis says
     "limit surface": (0.0, "radial misfit"),  # quality, not e_n; the quartic is never skipped
 }
 EXACT = "model size"
-SURFACES = ("three_motions", "full", "quartic")
-LEGEND = """filled: skipped by auto, open: simulated
+SURFACES = {"three_motions": "s", "full": "^", "quartic": "o"}  # and how they are drawn
+WORDS = {"friction": "could be skipped", "friction-pressure coupling": "not flagged"}  # auto always or never has these
+LEGEND = """filled: skipped by auto; open: simulated
 upright line: indicator up to which auto skips
 dashed line: target, 2 %
 shaded: wrong skips; nothing may lie there
-friction: errors of e_n of the planar model
-limit surface: of ellipsoids and the quartic"""
+friction: planar model (auto is always curved)
+coupling: open cases are flagged in the result
+limit surface: from three motions (squares),
+fitted ellipsoids (triangles), quartics (circles)"""
 Row = tuple[str, str, float, float]  # effect, case, indicator, error
 
 
@@ -209,18 +212,20 @@ def draw(rows: list[Row]) -> bytes:
         drawn, axes = pictures.figure(12, 6.4, 2, 4, gap=0.1)
         for panel, (effect, (limit, text)) in zip(axes.ravel(), PANELS.items(), strict=False):
             x, error = of_effect(rows, effect)
-            x, error = np.maximum(x, LEAST), np.maximum(error, FLOOR)
+            x, error = np.clip(x, LEAST, MOST), np.maximum(error, FLOOR)
             low, high, skipped = 0.5 * x.min(), 2.0 * max(x.max(), limit), x <= limit
             panel.axhline(TARGET, color="#566069", lw=0.9, ls="--")
             if limit:
                 panel.fill_between([low, limit], TARGET, 10, color="#c05a00", alpha=0.18, lw=0)
                 panel.axvline(limit, color="#566069", lw=0.9)
+            shape = np.array([SURFACES.get(row[1].split(", ")[-1], "o") for row in rows if row[0] == effect])
             for some, look in ((skipped, {"color": "#12436d"}), (~skipped, {"mec": "#12436d", "mfc": "none"})):
-                panel.plot(x[some], error[some], "o", ms=3.2, **look)
+                for marker in SURFACES.values():
+                    panel.plot(x[some & (shape == marker)], error[some & (shape == marker)], marker, ms=3.2, **look)
             wrong = np.count_nonzero(error[skipped] > TARGET)
-            told = f"{np.count_nonzero(skipped)} of {len(x)} skipped, {wrong} wrongly" if limit else "never skipped"
+            told = f"{np.count_nonzero(skipped)} of {len(x)} {WORDS.get(effect, 'skipped')}, {wrong} wrongly"
             panel.set(xscale="log", yscale="log", xlim=(low, high), ylim=(0.7 * FLOOR, 2), xlabel=text,
-                      title=f"{effect}\n{told}")  # fmt: skip
+                      title=f"{effect}\n{told if limit else 'never skipped'}")  # fmt: skip
         for panel in axes[:, 0]:
             panel.set(ylabel="relative error where skipped")
         axes[1, 2].set(ylabel="error of the quality")

@@ -11,8 +11,8 @@ from fem.press import Pressed
 from study.quantities import EFFECTS, REASONS
 from study.scene import Scene
 
-# In 80 cases friction that acts back moved e_n by at most 0.58 times the traction that it adds: this keeps it below
-# 1.8 %; see docs/effects.md.
+# In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
+# tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.
 SMALL = 0.03
 
 

@@ -68,7 +68,7 @@ def _object(level: Any) -> tuple[str, float, int]:
 
 
 def _surface(scene: Scene, bounds: Sequence[Any]) -> tuple[str, float, int]:
-    """Form of the limit surface: an ellipsoid, whose quality is 7 to 12 % off, only where the scene asks for it."""
+    """Form of the limit surface: an ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
     model = scene.limit_surface.model
     costs_little = model == "quartic" and scene.effects.limit_surface == "auto"
     return SURFACES[model], float(np.max([b.misfit.Erad for b in bounds])), CHEAP if costs_little else FORCED

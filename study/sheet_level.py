@@ -10,7 +10,7 @@ from study.build import pad_material, pad_shape, sheet
 from study.scene import Scene
 from study.scene.sections import Gripper
 
-# In 376 cases (pads, objects, supports, forces up to 13 N) a rigid sheet put e_n off by at most 3.5 times the relative
+# In 440 cases (pads, objects, supports, forces up to 13 N) a rigid sheet put e_n off by at most 3.5 times the relative
 # compliance of the sheet that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
 STIFF = 0.005
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from study import coupling_level, model
+from study import coupling_level, model, pipeline
+from study.build import build_object
 from study.coupling_level import neglected_traction
 from study.quantities import EFFECTS, REASONS
-from study.scene import parse_scene
+from study.result import CaseFailure
+from study.scene import load_scene, parse_scene
+from study.sweep import units
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -92,7 +96,7 @@ def wrong_skips(job, rows):
 def test_no_effect_of_rigid_objects_is_skipped_wrongly(job, monkeypatch):
     """Among the places one where a pad just reaches a waist's middle: there e_n changes most for least."""
     monkeypatch.chdir(ROOT)
-    kept = ("ball 15 mm", "cylinder 8 x 8 mm", "bottle")
+    kept = ("bottle", "cylinder 8 x 8 mm", "plane")
     monkeypatch.setattr(job, "RIGID", {name: job.RIGID[name] for name in kept})
     monkeypatch.setitem(job.RIGID, "bottle", ("jobs/bottle-rigid.toml", "[60, 85]"))
     rows = list(job.rigid_rows())
@@ -117,3 +121,46 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
         own = [row for row in rows if row[0] == effect]
         assert max(row[3] for row in own) > job.TARGET
         assert min(row[2] for row in own) <= job.PANELS[effect][0]
+
+
+CHOOSING = {"study.solving": ("choose_level", "choose_pad_level"), "study.pipeline": ("effects_of",)}
+
+
+def cpu_share_of_choosing(file, overrides, monkeypatch):
+    """CPU time of everything that chooses or evaluates levels, over that of the candidates as a whole."""
+    spent = []
+
+    def timed(work):
+        def measured(*arguments):
+            start = time.process_time()
+            try:
+                return work(*arguments)
+            finally:
+                spent.append(time.process_time() - start)
+
+        return measured
+
+    for module, names in CHOOSING.items():
+        owner = importlib.import_module(module)
+        for name in names:
+            monkeypatch.setattr(owner, name, timed(getattr(owner, name)))
+    scene, whole = load_scene(ROOT / file, overrides), 0.0
+    for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
+        start = time.process_time()
+        assert not [r for _, r in pipeline.solve_unit(unit) if isinstance(r, CaseFailure)]
+        whole += time.process_time() - start
+    return sum(spent) / whole
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("file", "overrides"), [
+    ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]")),
+    ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]",
+                                "load.normal_force_n=[0.05, 0.1, 0.2]")),
+    ("jobs/bottle.toml", ("candidates.stations_mm=[60, 112]",)),
+])  # fmt: skip
+def test_choosing_costs_at_most_five_per_cent(file, overrides, monkeypatch):
+    """Whatever the scene; the shares are printed with -s."""
+    share = cpu_share_of_choosing(file, overrides, monkeypatch)
+    print(f"\n{file} {overrides[-1]}: {share:.2%} of the CPU time for choosing")
+    assert share <= 0.05
