@@ -19,6 +19,7 @@ from study.figures.command import add_options as add_figure_options
 from study.file_options import add_repair_options, add_scale_options
 from study.help import Formatter, Parser, Program
 from study.patch.command import add_options as add_patch_options
+from study.speaking import complain
 from study.start import add_options as add_init_options
 from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
@@ -45,13 +46,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
         return options.command(options)
     except StudyError as error:
-        return commands.complain(error)
+        return complain(error)
     except BrokenPipeError:  # the reader of a pipe has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except Exception as error:
         if damage := commands.damage(options, error):
-            return commands.complain(damage)
+            return complain(damage)
         traceback.print_exc()
         return BUG
 

@@ -63,8 +63,8 @@ def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: 
     """Solve one case alone on this rank: its exit code, and why it was refused."""
     from mpi4py import MPI
 
-    from study.commands import petsc_overrides, prepare, work
     from study.run import run_study
+    from study.running import petsc_overrides, prepare, work
 
     overrides = [*options.overrides, *petsc_overrides(options.petsc)]
     own = Namespace(scene=str(path), overrides=overrides, petsc=[])

@@ -9,9 +9,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.commands import first_rank
 from study.exits import CANNOT_WRITE, DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
 from study.figures import JOBS
+from study.speaking import first_rank
 
 if TYPE_CHECKING:
     from study.figures.table import Figure

@@ -106,9 +106,9 @@ def main():
     options = parser.parse_args()
     from mpi4py import MPI
 
-    from study.commands import complain
     from study.exits import StudyError
     from study.run import Work, run_study
+    from study.speaking import complain
     from study.status import summary
 
     comm = MPI.COMM_WORLD

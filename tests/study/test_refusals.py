@@ -9,8 +9,8 @@ import pytest
 
 from study.build import check_object, shapes_of, warnings
 from study.cli import main
-from study.commands import petsc_overrides, prepare
 from study.exits import StudyError
+from study.running import petsc_overrides, prepare
 from study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from study.cli import main
-from study.commands import RANK
 from study.data import Data
 from study.report import object_view
+from study.speaking import RANK
 from study.store import open_result
 from study.view.model import View
 from tests.study import view_files
