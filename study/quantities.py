@@ -1,7 +1,7 @@
 """Every number a result file holds: name, unit, meaning and shape, in literal tables.
 
-A new quantity is one more line in `study.map_quantities`, `study.finger_quantities` or here; layout, store, ``show`` and the report follow from
-these tables.
+A new quantity is one more line in `study.map_quantities`, `study.finger_quantities` or here; layout, store, ``show``
+and the report follow from these tables.
 """
 
 from __future__ import annotations

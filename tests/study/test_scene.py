@@ -11,12 +11,13 @@ import pytest
 from pydantic import ValidationError
 
 from fem.units import LENGTHS
+from study.catalogue.model import is_catalogue
 from study.scene import Scene, SceneError, load_scene, parse_scene
 from study.scene.shapes import SHAPES, Mesh
 from study.scene.units import in_si
 
 ROOT = Path(__file__).parents[2]
-JOBS = sorted((ROOT / "jobs").glob("*.toml"))
+JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]
 BALL = """[object]
 shape = "sphere"
 radius_mm = 30
