@@ -96,12 +96,14 @@ def done(path):
         return int((result.status == DONE).sum())
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long), 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 2, pytest.param(3, marks=pytest.mark.long)])
 def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alone, ranks):
     path = shared_path / "ranks.hdf"
     code, output, errors = once(run, ranks, scene, path)
     assert code == 0, errors
     assert f"{CASES} of {CASES} cases to solve on {ranks} rank" in output
+    assert not list(shared_path.glob("*.lock"))
+    assert not list(shared_path.glob("*.part"))
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
     for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure", "status/crc",
