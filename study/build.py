@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.exits import USAGE, StudyError
 from study.scene.grasp_warnings import station_warnings
@@ -82,6 +82,11 @@ def _traced(shape: Walled) -> tuple[TracedSurface, TraceReport]:
     from fem.traced_surface import traced
 
     return traced(build_object(shape), shape.wall_heights)
+
+
+def has_wall(shape: Any) -> bool:
+    """Whether an object is hollow."""
+    return getattr(shape, "wall", None) is not None
 
 
 def shapes_of(scene: Scene) -> list[Shape]:

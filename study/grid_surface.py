@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from study.build import has_wall
 from study.data import Data
 from study.grid import Surface
-from study.overview import has_wall
 from study.view.model import View
 
 

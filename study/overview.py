@@ -8,7 +8,8 @@ from typing import Any
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
-    from study.build import warnings  # here and below: who only reads results must not load all that checks scenes
+    # here and below: who only reads results must not load all that checks scenes
+    from study.build import has_wall, warnings
 
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
@@ -72,13 +73,10 @@ def _bands(scene: Any) -> str:
     return f"of e_n and quality, from {', '.join(own.parts)}; {cost}"
 
 
-def has_wall(shape: Any) -> bool:
-    """Whether an object is hollow."""
-    return getattr(shape, "wall", None) is not None
-
-
 def wall_text(shape: Any) -> str:
     """Thickness, material and support of an object's wall; empty for a rigid object."""
+    from study.build import has_wall
+
     if not has_wall(shape):
         return ""
     from fem.wall_material import wall_material

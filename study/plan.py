@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from study.build import has_wall
 from study.layout import Header, Layout
-from study.overview import aligned, has_wall
+from study.overview import aligned
 from study.progress import duration
 from study.wall_cost import wall_size
 from study.wall_quantities import ALONG, AROUND

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from study.overview import has_wall
+from study.build import has_wall
 from study.quantities import EFFECTS
 from study.scene import Scene
 from study.scene.errors import SceneError

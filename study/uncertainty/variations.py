@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem.pose import Pose
-from study.build import pad_shape
-from study.overview import has_wall
+from study.build import has_wall, pad_shape
 from study.scene import Scene
 from study.sheet_level import sheet_level
 
