@@ -61,7 +61,7 @@ def test_nodes_take_positions_in_turn(once):
 
 
 @pytest.mark.launches
-@pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.parametrize("count", [pytest.param(0, marks=pytest.mark.long), 1])
 def test_more_ranks_than_work(once, count):
     taken, _ = once(lambda: claims(3, count=count))
     assert list(chain(*taken)) == list(range(count))
