@@ -178,7 +178,7 @@ def view_of(data: Data, candidate: int | None, place: tuple[float | None, float 
     Raises
     ------
     StudyError
-        For a candidate that the file does not have.
+        For a candidate that the file does not have, or a station far outside of the map.
     """
     k = data.k if force is None else int(np.abs(data.forces - force).argmin())
     best = next(iter(data.order(k)), (*(0 for _ in data.shape[:-1]), k))
@@ -193,8 +193,19 @@ def view_of(data: Data, candidate: int | None, place: tuple[float | None, float 
             raise StudyError(
                 USAGE, "--station, --angle: the candidates of this file are poses; choose with --candidate"
             )
+        _check_station(data, place[0])
         best = _nearest(data, best, place, k)
     return View(data, best[:-3]), best
+
+
+def _check_station(data: Data, station: float | None) -> None:
+    """Refuse a station [m] that lies farther off the map than the map's stations lie apart: it has another unit."""
+    places = np.sort(data.axes[-3].values)
+    beyond = 0.0 if station is None else max(places[0] - station, station - places[-1])
+    if beyond > max(np.diff(places), default=0.0) + 1e-9:
+        found, low, high = (f"{1e3 * value:.6g}" for value in (station, places[0], places[-1]))
+        expected = f"{low} to {high} mm, the stations of this file" if low != high else f"{low} mm, the only station"
+        raise StudyError(USAGE, f"--station: found {found} mm, expected {expected}")
 
 
 def _nearest(data: Data, best: tuple[int, ...], place: tuple[float | None, float | None], k: int) -> tuple[int, ...]:

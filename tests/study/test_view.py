@@ -325,10 +325,11 @@ def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsy
         (["--vtkhdf", file], USAGE),
         (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
         (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
+        (["--station", "500", "--html", tmp_path / "a.html"], USAGE),
     ):
         assert main(["view", str(file), *map(str, words)]) == code
     errors = capsys.readouterr().err.splitlines()
-    assert len(errors) == 4
+    assert len(errors) == 5
     assert all(line.startswith("error: ") for line in errors)
     assert main(["view", str(tmp_path / "no.hdf"), "--html", str(tmp_path / "a.html")]) == OTHER_FILE
     assert not list(tmp_path.iterdir())
