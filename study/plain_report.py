@@ -33,7 +33,8 @@ def plain_report(result: Any, mu: float | None) -> str:
     notes = "\n".join(line for state in (FAILED, DONE) for line in _notes(data, state))
     parts = [what, plain(verdict(data, mu)), *table, notes, READING, CAVEAT.replace("the scene below", "/study/scene")]
     lines = "\n\n".join(part for part in parts if part).splitlines()
-    return "\n".join(textwrap.fill(line, WIDTH) if len(line) > WIDTH else line for line in lines) + "\n"
+    text = "\n".join(textwrap.fill(line, WIDTH) if len(line) > WIDTH else line for line in lines) + "\n"
+    return text.replace("\N{DEGREE SIGN}", " deg").replace("\N{MULTIPLICATION SIGN}", "x")  # h5dump escapes them
 
 
 def _notes(data: Data, state: int) -> list[str]:

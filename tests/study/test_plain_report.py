@@ -14,11 +14,11 @@ def test_it_says_what_it_is_the_best_grasps_the_failures_and_how_to_read_them(tm
     with open_result(make(tmp_path / "thing.hdf")) as result:
         text = plain_report(result, 0.8)
     assert text.startswith(
-        "<b>thing</b>: 3 stations (-20 to 20 mm) × 2 angles (0 to 90°) × 2 normal forces (1 to 5 N)\n"
+        "<b>thing</b>: 3 stations (-20 to 20 mm) x 2 angles (0 to 90 deg) x 2 normal forces (1 to 5 N)\n"
     )
-    assert "Best grasp at 5 N per finger: station 0 mm, angle 0°, quality 2," in text
+    assert "Best grasp at 5 N per finger: station 0 mm, angle 0 deg, quality 2," in text
     assert "10 of 12 cases are solved, 1 failed, 1 are missing." in text
-    assert "failed 1 x no </script> convergence [station 20 mm, angle 90°, 5 N]" in text
+    assert "failed 1 x no </script> convergence [station 20 mm, angle 90 deg, 5 N]" in text
     assert "0 missing, 1 done, 2 failed" in text.partition("How to read the file")[2]
     assert str(tmp_path) not in text  # the same bits wherever it is solved
     assert max(map(len, text.splitlines())) <= 120
