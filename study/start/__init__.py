@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import re
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -60,13 +61,17 @@ def init(options: argparse.Namespace) -> str:
             CANNOT_WRITE, f"{' and '.join(there)}: there already; choose another name with -o, or add --force"
         )
     words = {"NAME": base.name, "SOFTJAW": _program()}
-    words |= _about_mesh(options, scene) if options.kind == "mesh" else {}
+    mesh = _about_mesh(options, scene) if options.kind == "mesh" else {}
+    words |= mesh
     _write({scene: _filled(f"{options.kind}.toml", words), batch: _filled("run.sbatch", words)})
+    unit = f"--unit {options.unit} --axis {options.axis}"
+    measured = [f"object:  {mesh['SIZE']} mm, the last along its axis, with {unit}"] if mesh else []
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
         f"written: {batch}  a Slurm job that goes on after its time limit",
-        f"next:    softjaw check {scene}",
-        f"         mpirun -n 2 softjaw run {scene}",
+        *measured,
+        f"next:    softjaw check {shlex.quote(str(scene))}",
+        f"         mpirun -n 2 softjaw run {shlex.quote(str(scene))}",
     ]
     return "\n".join(lines)
 

@@ -36,6 +36,13 @@ def started(kind, *more):
     return main(["init", kind, *(["--mesh", str(FLASK), "--unit", "mm"] if kind == "mesh" else []), *more])
 
 
+def test_what_to_do_next_can_be_pasted_and_tells_how_large_the_mesh_is(capsys):
+    assert started("mesh", "-o", "my scenes/mine") == 0
+    told = capsys.readouterr().out
+    assert "softjaw check 'my scenes/mine.toml'" in told
+    assert "71.5 x 49.74 x 120 mm, the last along its axis, with --unit mm --axis z" in told
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_written_passes_check(kind, tmp_path, capsys):
     assert started(kind, "-o", "mine") == 0
