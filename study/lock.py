@@ -8,7 +8,7 @@ import os
 import time
 from pathlib import Path
 
-from study.exits import IN_USE, StudyError
+from study.exits import CANNOT_WRITE, IN_USE, StudyError
 
 NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 BUSY = {errno.EWOULDBLOCK, errno.EACCES}
@@ -29,7 +29,7 @@ class Lock:
     def take_first(self) -> None:
         """On rank 0: raise `StudyError` if a rank of another run is alive."""
         for attempt in range(6):  # 'status' takes the lock for an instant to see whether a run is alive
-            self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            self._fd = self._opened()
             if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB) and self._still_named():
                 break
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
@@ -41,6 +41,14 @@ class Lock:
         os.ftruncate(self._fd, 0)
         os.pwrite(self._fd, self.owner.encode(), 0)
         self._flock(fcntl.LOCK_SH)
+
+    def _opened(self) -> int:
+        try:
+            return os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            remedy = "choose another place with -o"
+            text = f"{self.result}: cannot be written: {error.strerror} for {self.path.name} beside it; {remedy}"
+            raise StudyError(CANNOT_WRITE, text) from error
 
     def join(self) -> None:
         """On the other ranks, after `take_first`: hold the lock as well, until this process dies."""

@@ -68,8 +68,10 @@ def summary(result: Any) -> str:
     """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
     width = terminal_width()
     table = [as_text(best(result, whole_lines=True), width)] if np.any(result.status == DONE) else []
+    missing = int(np.sum(result.status == MISSING))
+    more = f"; {missing} cases are missing, the same command goes on" if missing else ""
     return "\n".join(
-        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}"]
+        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}{more}"]
     )
 
 

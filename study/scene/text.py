@@ -42,7 +42,8 @@ def read_text(path: Path) -> str:
         inside = sorted(p.name for p in path.glob("*.toml"))
         raise refuse("a directory", toml, f"name one of {', '.join(inside)}" if inside else "name a file in it")
     if not path.exists():
-        near = closest(path.name, [p.name for p in path.parent.glob("*.toml")]) if path.parent.is_dir() else None
+        scenes = [p.name for p in path.parent.glob("*.toml") if p.name != "pyproject.toml"]
+        near = closest(path.name, scenes)
         raise refuse("no such file", toml, f"did you mean `{path.with_name(near)}`?" if near else "check the path")
     try:
         with path.open("rb") as file:
