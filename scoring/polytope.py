@@ -37,10 +37,11 @@ def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
     Flat vertices give the volume 0, and vertices on a line through the shadow the area 0.
     """
     points = np.asarray(vertices, float)
-    return _hull(points), _hull(points[:, :2])
+    return hull_volume(points), hull_volume(points[:, :2])
 
 
-def _hull(points: FloatArray) -> float:
+def hull_volume(points: FloatArray) -> float:
+    """Volume of the hull of points ``(m, d)``; 0 where they are flat."""
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if extent[-1] <= 1e-12 * extent[0]:
         return 0.0

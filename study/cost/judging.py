@@ -16,6 +16,7 @@ from friction.wrench import friction_limits, friction_wrench
 from lsfit.ellipsoid import three_motion_ellipsoid
 from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
 from scoring.graspit import linearised_contacts
+from scoring.polytope import hull_volume
 from scoring.pose import pose_volume
 from scoring.score import score
 from study import model
@@ -85,7 +86,8 @@ def judge(found: Solved, knob: str, level: str) -> Measured:
         try:
             seconds, value, repeats = least_seconds(lambda pair=pair, force=force: work(pair, force))
         except Exception as error:  # whatever a case dies of is its result, as in a run
-            seconds, value, message = np.nan, np.full(len(QUANTITIES), np.nan), f"{type(error).__name__}: {error}"
+            reason = str(error).partition("\n")[0]  # Qhull prints its whole state
+            seconds, value, message = 0.0, np.full(len(QUANTITIES), np.nan), f"{type(error).__name__}: {reason}"
         values.append(value)
         own += seconds / len(forces)
     whole = own if level == WINKLER else own + found.seconds
@@ -131,7 +133,7 @@ def _score(found: Solved, level: str) -> Callable:
             load = np.hstack([np.ones((len(V), 1)), V]) @ contact.wrench_map(size.arms, size.torques, np.zeros(3)).T
             cones.append(np.vstack([np.zeros(6), load]))
         sums = (cones[0][:, None] + cones[1][None]).reshape(-1, 6)
-        return np.array([*_limits(contacts, "curved"), ConvexHull(sums, qhull_options="Qx").volume])
+        return np.array([*_limits(contacts, "curved"), hull_volume(sums)])
 
     return hull
 
