@@ -6,7 +6,7 @@ import numpy as np
 
 from study.data import LIMITS, Data, number, shown
 from study.layout import DONE, FAILED, MISSING
-from study.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
+from study.ranking import FLAGS, LOST, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 from study.uncertainty.verdict import sure
@@ -94,6 +94,7 @@ def _best_sentences(data: Data, best: tuple[int, ...], mu: float | None) -> list
         *_weight(data, best),
         *wall,
         *_planar(data, best),
+        *_passed_over(data, best),
         *_other_force(data, best),
     ]
 
@@ -161,6 +162,19 @@ def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
     unit = data.units(data.score)[1]
     what = "quality, a score per unit of normal force," if data.score == "quality" else data.score
     return [f"Over all forces {what} is largest at {data.place(top, force=True)}: {most} {unit}".rstrip() + "."]
+
+
+def _passed_over(data: Data, best: tuple[int, ...]) -> list[str]:
+    """Why the brightest place of the map is not the best grasp: those that cannot be used stand last."""
+    score = data.at(data.score, best)
+    better = [i for i in data.order(best[-1]) if data.lost[i] and data.at(data.score, i) > score * (1 + 1e-3)]
+    if data.lost[best] or not better:
+        return []
+    marks = int(np.bitwise_or.reduce([int(data.flags[i]) & LOST for i in better]))
+    why = " or ".join(name for bit, name, _ in FLAGS if marks & bit)
+    place, top = data.place(better[0]), number(data.at(data.score, better[0]) * data.units(data.score)[2])
+    count = "One grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
+    return [f"{count} higher at this force (the highest {top}, {place}) but cannot be used: {why}."]
 
 
 def chosen(data: Data) -> str:
