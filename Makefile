@@ -11,7 +11,7 @@ PICTURE = $(RESULT:.hdf=.png)
 FIGURES = results/figures
 BIN     = .venv/bin
 LIMIT   = timeout -k 30
-# Of the benchmark: any of kernels linearised element contact map; all if empty.
+# Of the benchmark: any of kernels linearised element contact factors map; all if empty.
 PARTS   =
 # Exit code of a finished study with failed cases; the report lists them with their reasons.
 SOME_FAILED = 6

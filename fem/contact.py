@@ -159,6 +159,7 @@ class ContactProblem:
             R[self._pressures] = self.kappa * weighted_gap
         else:
             pressed = self.area * x[self._pressures]
+            self._pressing = pressed - weighted_gap > 0.0
             R[self._pressures] = self.kappa * (pressed - np.maximum(0.0, pressed - weighted_gap))
         return R
 
@@ -172,13 +173,21 @@ class ContactProblem:
         if self.complementarity:
             by_displacement[:] = self.kappa * self._K_ul.ravel()
         else:
-            active = self._active(x, weighted_gap)
+            active = self._held = self._active(x, weighted_gap)
             by_displacement[:] = (self.kappa * active[self._face_pressures][:, :, None, None] * self._K_ul).ravel()
             own[1:] = np.where(active, 0.0, self.kappa * self.area)
-        if self.control.force is None:
+        self._by_force = self.control.force is not None
+        if not self._by_force:
             elements[self.foam.travel_entries] = 0.0
             own[0] = self.travel_stiffness
         return self._values
+
+    def keep(self, x: FloatArray, first: bool) -> bool:
+        """Whether the last tangent may serve once more (see ``fem.petsc.Problem``).
+
+        Not after a change of control or of the active set: it would leave pressures that are not quite zero.
+        """
+        return self._by_force == (self.control.force is not None) and np.array_equal(self._pressing, self._held)
 
     def front(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """What the front alone contributes at ``x``: valid until the next call.
@@ -213,5 +222,7 @@ class ContactProblem:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)
         pressure = self.kappa * x[self._pressures]
+        # rounding leaves an idle node up to 1e-16 of what it bore: that is no contact; tension is for the checks to see
+        pressure = np.where(self._active(x, weighted_gap), pressure, np.minimum(pressure, 0.0))
         load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
         return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, self._gap, load)

@@ -72,6 +72,10 @@ class CoupledProblem(ContactProblem):
         entries -= self.kappa * np.einsum("fq,qb,qa,fqi->fbia", weight, N, N, by_pressure, optimize=True).ravel()
         return values
 
+    def keep(self, x: FloatArray, first: bool) -> bool:
+        """As that of the frictionless problem, but every accepted state changes the tangent."""
+        return not first and super().keep(x, first)
+
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """As that of the frictionless problem, with the friction forces of the points."""
         pressure, gap, p = super().contact_state(x)

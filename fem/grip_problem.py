@@ -176,6 +176,7 @@ class GripProblem:
             contacts = self._contact(x, wall_force)
         except ArithmeticError:
             return np.full(self.size, np.nan)
+        self._pressing = np.concatenate([c.active for c in contacts])
         R[: self.model.size] = self.model.residual(x[: self.model.size], wall_force)
         for f, c in zip(self.fingers, contacts, strict=True):
             own, smallest = f.foam.force(x[f.own])
@@ -204,8 +205,9 @@ class GripProblem:
         """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
         q = x[: self.model.size].copy()
         wall = self.model.tangent(q, self._before)
-        self._before = q
+        self._before, self._by_force = q, self.control.force is not None
         contacts = self._contact(x, self._no_force())
+        self._held = np.concatenate([c.active for c in contacts])
         for f, values in zip(self.fingers, self._values, strict=True):
             f.foam.stiffness(x[f.own], values)
         while True:
@@ -213,6 +215,14 @@ class GripProblem:
             if all([self._add_contact(f, c) for f, c in zip(self.fingers, contacts, strict=True)]):
                 return self.pattern.values
             self._grow(contacts)
+
+    def keep(self, x: FloatArray, first: bool) -> bool:
+        """Whether the last tangent may serve once more, as in ``fem.contact``."""
+        if self._by_force != (self.control.force is not None) or not np.array_equal(self._pressing, self._held):
+            return False
+        if first:
+            self._before = x[: self.model.size].copy()  # the wall's next tangent counts its step from here
+        return True
 
     def _fill(self, wall: FloatArray, contacts: list[_Evaluated]) -> None:
         """Entries of wall, foam, idle pressures and control."""
@@ -283,8 +293,9 @@ class GripProblem:
         own, _ = f.points(x)
         normal = np.where(c.facing.gap[:, None] < FAR, c.facing.normal @ f.R, [0.0, 0.0, -1.0]).reshape(own.shape)
         gap = c.facing.gap.reshape(own.shape[:2])
-        load = np.where(gap < FAR, f.pad.face_area * (c.lam @ f.pad.face_N.T), 0.0)
-        return f.pressure(x), c.weighted / f.pad.node_area, ContactPoints(own, normal, gap, load)
+        pressure = np.where(c.active, f.pressure(x), np.minimum(f.pressure(x), 0.0))  # as in `fem.contact`
+        load = np.where(gap < FAR, f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T), 0.0)
+        return pressure, c.weighted / f.pad.node_area, ContactPoints(own, normal, gap, load)
 
     def _no_force(self) -> FloatArray:
         return np.zeros((len(self.model.first), 3))

@@ -2,7 +2,8 @@
 
 ``newtonls`` with full steps on the semismooth (primal-dual active set) form is the default; the option
 ``-contact_snes_type vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every
-linear system is factorised by MUMPS; its symbolic analysis is done once and kept: the pattern never changes.
+linear system is factorised by MUMPS; its symbolic analysis is kept as long as the pattern is. Steps that older factors
+are good enough for do without a factorisation of their own, see `NonlinearSolver`.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 
 
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
+NEAR, FAST = 1e5, 0.05  # see NonlinearSolver
+RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors
 PRINTING = re.compile("monitor|view|converged_reason")
 
 
@@ -58,7 +61,9 @@ class Problem(Protocol):
     """What a nonlinear problem tells the solver.
 
     A problem whose couplings change has an attribute ``pattern`` instead of ``rows`` and ``columns``; its ``tangent``
-    fills ``pattern.values``, after it has let the pattern grow where that is needed.
+    fills ``pattern.values``, after it has let the pattern grow where that is needed. A problem with a method ``keep(x,
+    first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it says whether the step from ``x``
+    may. ``first``: the factors are from the end of the solve before, whose solution is ``x``.
     """
 
     size: int
@@ -103,6 +108,12 @@ def factorisation_seconds() -> float:
 class NonlinearSolver:
     """Newton solver of one problem; the matrix pattern and its symbolic factorisation live as long as it does.
 
+    Where the problem allows it, two kinds of steps take the factors of the tangent before: the first one from the
+    solution of the solve before, where they are nearly exact; and the last ones, once the residual is within `NEAR`
+    tolerances of its goal and falls to less than a part `FAST` in every step. What comes of them is judged by the same
+    residual, so they cost steps but no accuracy. They do end just below the tolerance, where a Newton step would go far
+    beyond; so a caller whose tolerance is loose sets ``thrifty`` to False, which rules out the latter kind.
+
     Parameters
     ----------
     problem : Problem
@@ -117,12 +128,13 @@ class NonlinearSolver:
     def __post_init__(self) -> None:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
-        self.seconds = Seconds()
+        self.seconds, self.thrifty = Seconds(), True
         self._pattern, self._slots = getattr(self.problem, "pattern", None), None
         if self._pattern is None:
             self._pattern = Pattern(n, self.problem.rows, self.problem.columns)
             self._slots = self._pattern.slots(self.problem.rows, self.problem.columns)
         self._stored = self._pattern.start
+        self._norms, self._end = [], None  # residual norm of every step of this solve; solution of the one before
         self._matrix = PETSc.Mat().createAIJ(
             (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
         )
@@ -181,6 +193,7 @@ class NonlinearSolver:
         _, _, _, limit = snes.getTolerances()
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
+        self._norms, self._goal, self._limit = [], tolerance, iterations or limit
         try:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
@@ -191,6 +204,7 @@ class NonlinearSolver:
             ) from error
         finally:
             snes.setTolerances(max_it=limit)
+            self._end = None
             self.seconds.total += time.perf_counter() - start
             self.seconds.factorisation += factorisation_seconds() - factor
         reason, done = snes.getConvergedReason(), snes.getIterationNumber()
@@ -202,7 +216,8 @@ class NonlinearSolver:
                 f"the {self.prefix.rstrip('_')} solve stopped with {REASONS.get(reason, reason)} after {done} "
                 f"iterations at residual {snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
             )
-        return self._x.array.copy(), done
+        self._end = self._x.array.copy()
+        return self._end.copy(), done
 
     def _out_of_memory(self) -> bool:
         factors = self._snes.getKSP().getPC()
@@ -233,6 +248,10 @@ class NonlinearSolver:
         f.array[:] = self._timed(lambda: self.problem.residual(x.array_r))
 
     def _on_tangent(self, _snes, x, matrix, _preconditioner) -> None:
+        self._norms.append(self._snes.getFunctionNorm())
+        if self._keeps(x.array_r):
+            return  # a matrix that nobody touches is not factorised again
+
         def fill() -> None:
             values = self.problem.tangent(x.array_r)
             if self._slots is not None:
@@ -240,10 +259,20 @@ class NonlinearSolver:
                 add_up(self._slots, values, self._pattern.values)
             if self._pattern.start is not self._stored:
                 self._grow()
-            matrix.setValuesCSR(self._pattern.start, self._pattern.column, self._pattern.values)
-            matrix.assemble()
+            _set_values(matrix, self._pattern.values)
 
         self._timed(fill)
+
+    def _keeps(self, x: FloatArray) -> bool:
+        """Whether the step from ``x`` is made with the factors at hand."""
+        keep, norms = getattr(self.problem, "keep", None), self._norms
+        if keep is None or self.problem.complementarity:
+            return False
+        if len(norms) == 1:
+            return self._end is not None and np.array_equal(x, self._end) and keep(x, True)
+        if not self.thrifty or len(norms) > self._limit - RESERVED:
+            return False
+        return norms[-1] <= min(FAST * norms[-2], NEAR * self._goal) and keep(x, False)
 
     def _grow(self) -> None:
         """Give the matrix the pattern's new rows; its factors are analysed anew."""
@@ -256,6 +285,19 @@ class NonlinearSolver:
         if factor < 1.0:
             y.scale(factor)
         return factor < 1.0
+
+
+def _set_values(matrix: PETSc.Mat, values: FloatArray) -> None:
+    """Copy all ``values`` of compressed rows into a matrix that was made with them.
+
+    petsc4py goes through ``MatSetValues``, which looks for the place of every single one.
+    """
+    lib, stored = ctypes.CDLL(PETSc.__file__), ctypes.POINTER(ctypes.c_double)()
+    handle = ctypes.c_void_p(matrix.handle)
+    lib.MatSeqAIJGetArray(handle, ctypes.byref(stored))
+    np.ctypeslib.as_array(stored, values.shape)[:] = values
+    lib.MatSeqAIJRestoreArray(handle, ctypes.byref(stored))
+    matrix.assemble()
 
 
 class Factors:

@@ -25,7 +25,7 @@ from fem.pose import Pose
 from fem.press import Press
 from study.environment import launch_environment, mpirun
 from study.model import approach
-from tests.benchmark import kernels
+from tests.benchmark import factors, kernels
 from tests.benchmark.table import fastest, line, title
 
 ROOT = Path(__file__).parents[2]
@@ -144,6 +144,7 @@ def main() -> None:
         "linearised": lambda: kernels.linearised(options.points),
         "element": element_routine,
         "contact": contact_solve,
+        "factors": lambda: factors.kept_factors(ROOT / "jobs"),
         "map": lambda: whole_map(options.scene),
     }
     parser = argparse.ArgumentParser(description=__doc__)
