@@ -22,6 +22,7 @@ from study.data import Data, number
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from study.layout import Derived, Header, Layout
 from study.outline import read_scene, shape_outline, slice_polygon
+from study.ranking import TOO_STRONG
 from study.reading import StoredAxis
 from study.record import blank, crc32, record
 from study.report import cases, object_view, words
@@ -330,6 +331,18 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
     with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
         assert expected in words.verdict(Data(result), 0.8)
+
+
+def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
+    with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0, patches=False))) as result:
+        data = Data(result)
+        worse, better = sorted(data.order(0), key=lambda i: data.at("quality", i))
+        assert "but cannot be used" not in words.verdict(data, 0.8)
+        data = Data(result)
+        data.flags[better] = TOO_STRONG
+        assert data.best == worse
+        assert "One grasp scores higher at this force" in (told := words.verdict(data, 0.8))
+        assert "but cannot be used: too strong." in told
 
 
 def test_the_same_file_gives_the_same_bytes(tmp_path):
