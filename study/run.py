@@ -76,7 +76,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
     StudyError
         On every rank: the file is in use, belongs to another scene or cannot be written.
     """
-    owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} ranks"
+    owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
     lock = Lock(path, owner)
     try:
         on_rank0(comm, _take, lock, path)
