@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -116,8 +117,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
         if "unable to lock file" in str(error):
             text = f"{path}: another program holds it open for writing; close it there"
             raise StudyError(IN_USE, text) from error
-        text = f"{path}: not a readable {kind} ({reason(error)}); move it away or restore it"
-        raise StudyError(OTHER_FILE, text) from error
+        raise StudyError(OTHER_FILE, f"{path}: {_why_not(path, kind, error)}") from error
     try:
         return make(file)
     except BROKEN as error:
@@ -127,6 +127,15 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
     except StudyError:
         file.close()
         raise
+
+
+def _why_not(path: Path, kind: str, error: Exception) -> str:
+    """What to say of a file that HDF5 does not open."""
+    if not os.access(path, os.R_OK):
+        return "permission denied; ask its owner to let you read it"
+    if path.suffix == ".toml":
+        return f"is a scene, not a {kind}; 'softjaw run {path}' solves it"
+    return f"not a readable {kind} ({reason(error)}); move it away or restore it"
 
 
 def reason(error: Exception) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from study.columns import DISPLAY, csv_text, with_unit
 from study.layout import DONE
-from study.ranking import BORNE, LOST, OF_FILE, borne_level, judged, ranking
+from study.ranking import BORNE, FLAGS, LOST, OF_FILE, borne_level, judged, ranking
 from study.show_text import WINDOW, Columns, alike
 from study.show_text import as_text as as_text
 from study.uncertainty.verdict import sure, verdict
@@ -76,10 +76,34 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
+    if not rows:
+        why += _solved_elsewhere(result)
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(result.layout.shape[:-1])]
     told = verdict(sure(result, scored[0], k), holding, same, scored[1])
+    told = " ".join(filter(None, [told, _passed_over(score, flags, order)]))
     return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), told)
+
+
+def _solved_elsewhere(result: Any) -> str:
+    """Which other forces have solved cases."""
+    solved = np.any(result.status == DONE, axis=tuple(range(result.status.ndim - 1)))
+    if not solved.any():
+        return ", nor at any other force"
+    return f"; --force takes {', '.join(f'{f:g}' for f in result.axes[-1].values[solved])}"
+
+
+def _passed_over(score: np.ndarray, flags: np.ndarray, order: np.ndarray) -> str:
+    """That grasps of a higher score than the best one stand last, and why."""
+    if not len(order) or flags[order[0]] & LOST or not np.isfinite(score[order[0]]):
+        return ""
+    better = [int(i) for i in order if flags[i] & LOST and score[i] > score[order[0]] * (1 + 1e-3)]
+    if not better:
+        return ""
+    marks = int(np.bitwise_or.reduce([int(flags[i]) & LOST for i in better]))
+    why = " or ".join(name for bit, name, _ in FLAGS if marks & bit)
+    count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
+    return f"{count} higher but cannot be used and stand last: {why}"
 
 
 def _level(result: Any, flags: np.ndarray, force: float | None) -> tuple[int, str]:

@@ -35,8 +35,11 @@ def effects(data: Data) -> str:
 def _texts(codes: np.ndarray | None, meaning: tuple[str, ...]) -> str:
     if codes is None:
         return ""
-    known = sorted({int(c) for c in codes[np.isfinite(codes)]} & set(range(len(meaning))))
-    return ", ".join(meaning[c] for c in known)
+    known = codes[np.isfinite(codes)].astype(int)
+    counts = {c: int(np.sum(known == c)) for c in sorted(set(known.tolist()) & set(range(len(meaning))))}
+    if len(counts) == 1:
+        return meaning[next(iter(counts))]
+    return "; ".join(f"{meaning[c]} ({n} of {known.size} cases)" for c, n in counts.items())
 
 
 def definitions(data: Data) -> str:
