@@ -21,14 +21,15 @@ from fem.linear_pad import departure
 from friction.motion import fibonacci_twists
 from friction.wrench import friction_wrench
 from scoring.polytope import polytope_volume
-from study import coupling_level, model, pad_level, pictures, sheet_level, wall
-from study.build import build_object, pad_material
-from study.contact import Contact
-from study.limit_surface import Bound, bound
+from study import pictures
+from study.case import coupling_level, model, pad_level, sheet_level, wall
+from study.case.build import build_object, pad_material
+from study.case.contact import Contact
+from study.case.limit_surface import Bound, bound
+from study.case.solving import Solver, solver
+from study.case.sweep import units
 from study.scene import Scene, load_scene, parse_scene
 from study.scene.score_sections import LimitSurface
-from study.solving import Solver, solver
-from study.sweep import units
 
 TARGET = 0.02  # relative error of e_n that a skip may have
 FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there

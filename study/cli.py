@@ -21,9 +21,9 @@ from study.help import Formatter, Parser, Program
 from study.patch.command import add_options as add_patch_options
 from study.speaking import complain
 from study.start import add_options as add_init_options
+from study.tables.watch import add_options as add_watch_options
 from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
-from study.watch import add_options as add_watch_options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,8 +9,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from study.execution.running import prepare, scene_of, target, with_target_met, work
 from study.exits import BUG, CANNOT_WRITE, DONE, OTHER_FILE, USAGE, StudyError
-from study.running import prepare, scene_of, target, with_target_met, work
 from study.speaking import complain, say
 
 
@@ -20,7 +20,7 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
 
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):
-        from study.store import open_result, torn_rows
+        from study.storage.store import open_result, torn_rows
 
         try:
             with open_result(file) as result:
@@ -53,9 +53,9 @@ def _catalogue(options: Namespace) -> bool:
 
 def check(options: Namespace) -> int:
     """Find every error of a scene or of a catalogue, or say what would be run."""
-    from study.build import check_object
-    from study.columns import hanging, terminal_width
-    from study.overview import scene_text
+    from study.case.build import check_object
+    from study.tables.columns import hanging, terminal_width
+    from study.tables.overview import scene_text
 
     if _catalogue(options):
         from study.catalogue.run import check_text
@@ -70,9 +70,9 @@ def check(options: Namespace) -> int:
 
 def plan(options: Namespace) -> int:
     """Say what a run will take."""
-    from study.build import warnings
-    from study.columns import hanging, terminal_width
-    from study.plan import make_plan, plan_text
+    from study.case.build import warnings
+    from study.execution.plan import make_plan, plan_text
+    from study.tables.columns import hanging, terminal_width
 
     if _catalogue(options):
         text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
@@ -89,9 +89,9 @@ def plan(options: Namespace) -> int:
 
 def status(options: Namespace) -> int:
     """Say what a result file holds so far."""
-    from study.columns import terminal_width
-    from study.status import status_csv, status_json, status_text
-    from study.store import open_result
+    from study.storage.store import open_result
+    from study.tables.columns import terminal_width
+    from study.tables.status import status_csv, status_json, status_text
 
     forms = {"json": status_json, "csv": status_csv}
     with open_result(options.file) as result:
@@ -101,14 +101,14 @@ def status(options: Namespace) -> int:
 
 def watch(options: Namespace) -> int:
     """Show how a run goes on until it ends."""
-    from study.watch import watch
+    from study.tables.watch import watch
 
     return watch(Path(options.file), options.every)
 
 
 def repair(options: Namespace) -> int:
     """Say what of a damaged file is good, and make it usable."""
-    from study.repair import repair
+    from study.storage.repair import repair
 
     say(repair(Path(options.file), options.write, options.in_place))
     return DONE
@@ -116,7 +116,7 @@ def repair(options: Namespace) -> int:
 
 def scale(options: Namespace) -> int:
     """Replay a finished study on many ranks."""
-    from study.scaling import scaling_text
+    from study.execution.scaling import scaling_text
 
     say(scaling_text(Path(options.file), options))
     return DONE
@@ -124,9 +124,9 @@ def scale(options: Namespace) -> int:
 
 def show(options: Namespace) -> int:
     """Print the best grasps."""
-    from study.columns import terminal_width
-    from study.show import as_csv, as_json, as_text, best
-    from study.store import open_result
+    from study.storage.store import open_result
+    from study.tables.columns import terminal_width
+    from study.tables.show import as_csv, as_json, as_text, best
 
     with open_result(options.file) as result:
         table = best(result, options.force, options.top, whole_lines=options.form is None)
@@ -137,10 +137,10 @@ def show(options: Namespace) -> int:
 
 def compare(options: Namespace) -> int:
     """Print two maps side by side."""
-    from study.columns import terminal_width
-    from study.compare import compare
-    from study.compare_text import comparison_csv, comparison_json, comparison_text
-    from study.store import open_result
+    from study.storage.store import open_result
+    from study.tables.columns import terminal_width
+    from study.tables.compare import compare
+    from study.tables.compare_text import comparison_csv, comparison_json, comparison_text
 
     with open_result(options.files[0]) as one, open_result(options.files[1]) as other:
         found = compare(one, other, options.quantity, options.model)
@@ -152,8 +152,8 @@ def compare(options: Namespace) -> int:
 
 def export(options: Namespace) -> int:
     """Write every case for planners."""
-    from study.export import as_csv, as_json
-    from study.store import open_result
+    from study.storage.store import open_result
+    from study.tables.export import as_csv, as_json
 
     with open_result(options.file) as result:
         text = {"json": as_json, "csv": as_csv}[options.form](result, options.model)
@@ -241,7 +241,7 @@ def run(options: Namespace) -> int:
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     from mpi4py import MPI
 
-    from study.progress import Unbreakable
+    from study.execution.progress import Unbreakable
 
     comm = MPI.COMM_WORLD
     sys.stdout = Unbreakable(sys.stdout)
@@ -258,7 +258,7 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from study.run import on_rank0, run_study
+    from study.execution.run import on_rank0, run_study
 
     if on_rank0(comm, _catalogue, options):
         from study.catalogue.run import run_catalogue

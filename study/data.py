@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from study.layout import DONE, FAILED, MISSING, ROOT
-from study.ranking import BORNE, LOST, borne_level, judged, ranking
+from study.storage.layout import DONE, FAILED, MISSING, ROOT
+from study.tables.ranking import BORNE, LOST, borne_level, judged, ranking
 
 SHOWN = {
     "m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "Pa": ("kPa", 1e-3), "m^2": ("mm²", 1e6), "N m": ("N mm", 1e3),
@@ -137,7 +137,7 @@ class Data:
 
     @cached_property
     def flags(self) -> np.ndarray:
-        """Flags of all cases as `study.ranking.judged` gives them."""
+        """Flags of all cases as `study.tables.ranking.judged` gives them."""
         return judged(self.result)
 
     @property

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from study.data import Data
-from study.wall_quantities import ALONG, AROUND
+from study.storage.wall_quantities import ALONG, AROUND
 
 Outline = tuple[np.ndarray, np.ndarray, bool]
 
@@ -64,7 +64,7 @@ def shape_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray] | N
 
 def _stacked_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
     """Heights and half widths of stacked sections along their wall."""
-    from study.build import outer_surface
+    from study.case.build import outer_surface
 
     surface = outer_surface(shape)[0]
     theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, 73), np.linspace(*surface.wall, 161), indexing="ij")
@@ -78,7 +78,7 @@ def undeformed(scene: Any, index: tuple[int, ...], angle: float) -> np.ndarray |
 
     ``angle`` is finger 1's about the axis [rad].
     """
-    from study.build import outer_surface
+    from study.case.build import outer_surface
 
     shape = swept_object(scene, index) if scene else None
     if shape is None:

@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from fem.errors import CheckError, ConvergenceError
 from friction.motion import cor_grid
 from friction.wrench import friction_wrench
-from study import model
-from study.build import build_object
-from study.contact import Contact, angles, flags, remark
-from study.effects import effects_of
-from study.grasp import grasp_values, quality
-from study.limit_surface import Bound, bound, fit_flag, surface_values
-from study.quantity import MODELS
-from study.result import CaseFailure, CaseResult
+from study.case import model
+from study.case.build import build_object
+from study.case.contact import Contact, angles, flags, remark
+from study.case.effects import effects_of
+from study.case.grasp import grasp_values, quality
+from study.case.limit_surface import Bound, bound, fit_flag, surface_values
+from study.case.solving import Solved, Solver, solver
+from study.case.wall import wall_flags
+from study.case.weight import safety_factors
 from study.scene import Scene
-from study.solving import Solved, Solver, solver
+from study.storage.quantity import MODELS
+from study.storage.result import CaseFailure, CaseResult
 from study.uncertainty.probing import Probing
-from study.wall import wall_flags
-from study.weight import safety_factors
 
 FloatArray = NDArray[np.float64]
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
@@ -110,7 +110,7 @@ def _bounds(scene: Scene, contact: Contact) -> dict[str, Bound]:
 
 
 def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, Bound]]) -> dict[str, Any]:
-    """Maps and per-finger values of one case, keyed as in ``study.quantities``."""
+    """Maps and per-finger values of one case, keyed as in ``study.storage.quantities``."""
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")

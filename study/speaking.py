@@ -6,7 +6,7 @@ import os
 import sys
 
 from study.exits import StudyError
-from study.printable import printable
+from study.tables.printable import printable
 
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 

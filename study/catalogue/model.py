@@ -10,12 +10,12 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from study.exits import USAGE, StudyError
-from study.quantities import quantities
-from study.quantity import NEEDS
 from study.scene.errors import SceneError
 from study.scene.loading import NAMES
 from study.scene.shape import Section
 from study.scene.text import parse_toml, read_text
+from study.storage.quantities import quantities
+from study.storage.quantity import NEEDS
 
 MOST_REPETITIONS, LONGEST = 3, 300  # in a regular expression
 COMPARED = ("travel", "e_n", "S")

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from study.catalogue.model import MAPS
-from study.layout import DONE, FAILED
-from study.store import open_result
+from study.storage.layout import DONE, FAILED
+from study.storage.store import open_result
 
 CHECKS = {"force_balance": max, "tension": max, "penetration": max, "min_det_f": min, "acoustic": min}
 

@@ -28,8 +28,8 @@ def run_catalogue(options: Namespace, comm: Any) -> int:
 
     A case is solved by one rank, so none waits for another. Whatever a case dies of is its outcome.
     """
-    from study.run import on_rank0
-    from study.schedule import Claims
+    from study.execution.run import on_rank0
+    from study.execution.schedule import Claims
 
     path, folder = Path(options.scene), folder_of(options)
     catalogue = on_rank0(comm, load_catalogue, path)
@@ -63,8 +63,8 @@ def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: 
     """Solve one case alone on this rank: its exit code, and why it was refused."""
     from mpi4py import MPI
 
-    from study.run import run_study
-    from study.running import petsc_overrides, prepare, work
+    from study.execution.run import run_study
+    from study.execution.running import petsc_overrides, prepare, work
 
     overrides = [*options.overrides, *petsc_overrides(options.petsc)]
     own = Namespace(scene=str(path), overrides=overrides, petsc=[])
@@ -118,7 +118,7 @@ def check_text(path: Path, overrides: Sequence[str]) -> str:
 
 def _refusal(catalogue: Catalogue, case: Case, path: Path, overrides: Sequence[str]) -> str:
     """Why a scene of the catalogue is refused, or nothing."""
-    from study.build import check_object
+    from study.case.build import check_object
 
     try:
         check_object(case_scene(catalogue, case, path, overrides))

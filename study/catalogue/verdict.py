@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem import checks
+from study.case.contact import REMARKS, UNSTABLE
 from study.catalogue.model import Case
 from study.catalogue.outcome import Outcome
-from study.contact import REMARKS, UNSTABLE
 
 FINITE = ("travel", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
 LIMITS = {

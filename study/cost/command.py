@@ -34,7 +34,7 @@ def run(options: Namespace, scene: Any) -> None:
     path = Path(options.output or f"results/{Path(options.scene).stem}-cost.hdf")
     if path.suffix != ".hdf":
         raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in .hdf; write -o {path}.hdf")
-    from study.build import check_object
+    from study.case.build import check_object
     from study.cost.file import load
     from study.cost.probes import probes
     from study.cost.study import Measuring, costs, new_study

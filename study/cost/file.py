@@ -14,7 +14,7 @@ import numpy as np
 from study.cost.knobs import Skipped
 from study.cost.measure import QUANTITIES, UNITS, Measured
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.guarded import GuardedFile, opened
+from study.storage.guarded import GuardedFile, opened
 
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
 TEXT = h5py.string_dtype("utf-8")

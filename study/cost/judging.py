@@ -19,18 +19,18 @@ from scoring.graspit import linearised_contacts
 from scoring.polytope import hull_volume
 from scoring.pose import pose_volume
 from scoring.score import score
-from study import model
-from study.build import build_object
-from study.contact import X_OF_PAD, Contact
+from study.case import model
+from study.case.build import build_object
+from study.case.contact import X_OF_PAD, Contact
+from study.case.grasp import grasp_values, lengths
+from study.case.limit_surface import bound
+from study.case.solving import solver
 from study.cost.levels import HULL, POINTS, SURFACES, WINKLER
 from study.cost.measure import QUANTITIES, Measured, cpu_seconds, least_seconds
 from study.cost.probes import Probe
 from study.cost.winkler import winkler_pad
-from study.grasp import grasp_values, lengths
-from study.limit_surface import bound
-from study.quantity import MODELS
 from study.scene import Scene
-from study.solving import solver
+from study.storage.quantity import MODELS
 
 FloatArray = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from study.build import has_wall
-from study.quantities import EFFECTS
+from study.case.build import has_wall
 from study.scene import Scene
 from study.scene.errors import SceneError
 from study.scene.sections import Effects, WallSize
+from study.storage.quantities import EFFECTS
 
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
 HEX27 = (0.3, 0.5, 0.7, 1.0)
@@ -109,7 +109,7 @@ def refusal(scene: Scene, level: Level) -> str:
 
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall."""
-    from study.wall_cost import wall_size
+    from study.execution.wall_cost import wall_size
 
     if has_wall(scene.object) and scene.effects.object != "rigid" and (wall := wall_size(scene)):
         return float(wall.pad + wall.shell) ** WEIGHT_POWER
@@ -195,7 +195,7 @@ def _collocation(scene: Scene) -> Knob:
 
 
 def _effects(scene: Scene) -> Iterable[Knob]:
-    """One knob for every effect with levels to choose from, in the order of `study.quantities.EFFECTS`."""
+    """One knob for every effect with levels to choose from, in the order of `study.storage.quantities.EFFECTS`."""
     for name, field in Effects.model_fields.items():
         levels = [level for level in get_args(field.annotation) if level != "auto"]
         if name in OWN or len(levels) < 2 or (name == "object" and not has_wall(scene.object)):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.cost.knobs import EACH_ALONE, Level, with_level
-from study.result import CaseFailure
+from study.storage.result import CaseFailure
 
 if TYPE_CHECKING:
     from study.cost.probes import Probe

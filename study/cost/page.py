@@ -13,7 +13,7 @@ from study.cost.file import CostStudy
 from study.cost.measure import QUANTITIES
 from study.cost.picture import work_precision
 from study.cost.words import BELOW, percent, seconds_text, sentences, settings_text
-from study.progress import duration
+from study.execution.progress import duration
 from study.report.page import box, bullets, heading, page, paragraph, picture, table, text_block
 
 MOST_SHOWN = 12

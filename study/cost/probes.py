@@ -10,8 +10,8 @@ import numpy as np
 
 from fem.shape import GapObject
 from friction.patch import NoContactError
-from study import model, sweep
-from study.build import build_object
+from study.case import model, sweep
+from study.case.build import build_object
 from study.cost.winkler import winkler_pad
 from study.exits import USAGE, StudyError
 from study.scene import Scene

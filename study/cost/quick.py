@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study import sweep
+from study.case import sweep
 from study.cost.choose import Choice, allowed, explicit
 from study.cost.extrapolate import limit
 from study.cost.file import CostStudy

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from study.layout import Derived
 from study.scene import Scene
+from study.storage.layout import Derived
 
 if TYPE_CHECKING:
     from study.cost.choose import Choice

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.errors import CheckError, ConvergenceError
-from study import provenance
 from study.cost.errors import KnobErrors, tables
 from study.cost.file import CostStudy, save
 from study.cost.knobs import EACH_ALONE, Knob, Level, Skipped, contact_knobs, weight, with_level
 from study.cost.levels import expected_seconds, judging_knobs
 from study.cost.measure import calibration_seconds, measure, warm_up
-from study.progress import duration
+from study.execution.progress import duration
 from study.scene import Scene
+from study.storage import provenance
 
 if TYPE_CHECKING:
     from study.cost.probes import Probe

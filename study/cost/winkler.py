@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from friction.patch import ContactPatch
-from study.model import Finger
+from study.case.model import Finger
 from study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]

@@ -99,8 +99,8 @@ def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
 
     from study import pictures
     from study.data import Data
-    from study.layout import DONE as SOLVED
-    from study.store import open_result
+    from study.storage.layout import DONE as SOLVED
+    from study.storage.store import open_result
 
     with ExitStack() as stack, pictures.style():
         opened = [stack.enter_context(open_result(results[scene])) for scene in one.scenes]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.case.stored_surface import StoredSurface, circle, stored_surface
 from study.data import Data, number
 from study.figures import JOBS, WIDTH, rendering
 from study.outline import read_scene, shape_outline
-from study.stored_surface import StoredSurface, circle, stored_surface
 from study.view.colours import FORCE, NEUTRAL, PAD, table
 from study.view.model import View
 from study.view.pads import Pad, pads

@@ -8,9 +8,9 @@ import numpy as np
 
 from friction.motion import fibonacci_twists
 from study import pictures
+from study.case.stored_surface import StoredSurface, stored_surface
 from study.data import Data, number
 from study.figures import WIDTH, rendering
-from study.stored_surface import StoredSurface, stored_surface
 
 MOTIONS = 250  # slip motions whose wrenches are drawn, and their opposites
 SUPPORTS = 8000  # planes that bound the exact body

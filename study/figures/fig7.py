@@ -10,7 +10,7 @@ from study import pictures
 from study.data import Data, number
 from study.figures import WIDTH
 from study.outline import read_scene
-from study.quantity import MODELS
+from study.storage.quantity import MODELS
 
 LOOKS = {
     "flat": {"ms": 6, "mfc": "none", "lw": 1.0},

@@ -12,7 +12,7 @@ import numpy as np
 from friction.frame import FrameFlag
 from study.patch.evaluate import SPACE, Judged
 from study.patch.grasp import ANTIPODAL, Grasp
-from study.quantity import MODELS
+from study.storage.quantity import MODELS
 
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",

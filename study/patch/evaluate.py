@@ -17,11 +17,11 @@ from lsfit.body import ExactSurface
 from lsfit.ellipsoid import three_motion_ellipsoid
 from lsfit.misfit import Misfit, misfit
 from lsfit.samples import normalised_samples, sample_rank
+from study.case.limit_surface import STANDS_IN, fitted, judging_twists
 from study.exits import USAGE, StudyError
-from study.limit_surface import STANDS_IN, fitted, judging_twists
 from study.patch.faces import ReadPatch, refuse
-from study.quantity import MODELS
 from study.scene.errors import Problem
+from study.storage.quantity import MODELS
 
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")  # as a scene names them
 FITTED_ON = 500  # Fibonacci motions; a fit is judged on others

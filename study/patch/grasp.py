@@ -14,7 +14,7 @@ from scoring.epsilon_search import EpsilonBound, epsilon
 from scoring.grasp import grasp_score
 from study.exits import USAGE, StudyError
 from study.patch.evaluate import Judged
-from study.quantity import MODELS
+from study.storage.quantity import MODELS
 
 ANTIPODAL = np.radians(5.0)  # beyond this the study flags a grasp
 FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands

@@ -16,7 +16,7 @@ from study.patch.columns import UNITS, split_header
 from study.patch.faces import Faces, corner_geometry
 from study.patch.reading import Reading, check_count
 from study.scene.errors import Problem, closest
-from study.trial import trouble
+from study.storage.trial import trouble
 
 READERS = {".vtu": vtkXMLUnstructuredGridReader, ".vtp": vtkXMLPolyDataReader}
 TRIANGLE, QUAD, POLYGON, PIXEL = 5, 9, 7, 8

@@ -7,11 +7,11 @@ import re
 import numpy as np
 
 from study.data import Data, number
-from study.layout import DONE
-from study.progress import duration
-from study.quantities import EFFECTS, REASONS
+from study.execution.progress import duration
 from study.report.page import bullets, paragraph, table, text_block
-from study.status import PARTS
+from study.storage.layout import DONE
+from study.storage.quantities import EFFECTS, REASONS
+from study.tables.status import PARTS
 
 
 def effects(data: Data) -> str:

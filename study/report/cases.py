@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from study.data import ABOVE, LIMITS, Data, number, passes
-from study.layout import DONE, FAILED, MISSING
-from study.ranking import FLAGS
 from study.report.page import details, paragraph, table
 from study.report.words import VALUES, head, value
+from study.storage.layout import DONE, FAILED, MISSING
+from study.tables.ranking import FLAGS
 
 MOST_REASONS, MOST_PLACES = 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy

@@ -8,10 +8,10 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
-from study.layout import FAILED
 from study.report.maps import elsewhere, main_axis, ticks
 from study.report.page import Picture
-from study.status import PARTS
+from study.storage.layout import FAILED
+from study.tables.status import PARTS
 
 GREYS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS; they differ in lightness too
 HATCHES = ("", "", "////", "")

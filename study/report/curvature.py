@@ -10,10 +10,10 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number, shown
-from study.layout import DONE
 from study.outline import swept_object
-from study.quantity import MODELS
 from study.report.page import Picture
+from study.storage.layout import DONE
+from study.storage.quantity import MODELS
 
 LINES = (
     {"color": "#12436d", "linestyle": "-", "marker": "o"},

@@ -8,8 +8,8 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, shown
-from study.quantity import MODELS
 from study.report.page import Picture
+from study.storage.quantity import MODELS
 
 # map, text of the panel, unit, factor from SI; "F" divides by the normal force
 PANELS = (

@@ -6,11 +6,11 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
-from study.layout import FAILED
-from study.overview import RULE
-from study.quantities import EFFECTS, REASONS
 from study.report.maps import elsewhere, main_axis, plane, ticks
 from study.report.page import Picture, paragraph
+from study.storage.layout import FAILED
+from study.storage.quantities import EFFECTS, REASONS
+from study.tables.overview import RULE
 
 GREYS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 MOST = 16  # cells in a row that have room for a number

@@ -10,9 +10,9 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number, shown
-from study.layout import FAILED
 from study.report.page import Picture
 from study.report.spots import Spot, spot
+from study.storage.layout import FAILED
 
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
 SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]", "dent": "dent [mm]", "wall_stress": "wall stress [MPa]"}

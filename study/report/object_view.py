@@ -10,9 +10,9 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
-from study.layout import FAILED, MISSING
 from study.report.maps import MAPS, SHORT, extremes, scaled
 from study.report.page import Picture, paragraph, picture
+from study.storage.layout import FAILED, MISSING
 from study.view.model import View
 
 PATIENCE = 120.0  # seconds that drawing may take, also on a busy machine without a graphics card

@@ -9,8 +9,8 @@ from scipy.spatial import QhullError, Voronoi
 
 from study import pictures
 from study.data import Data, number
-from study.layout import DONE
 from study.report.page import Picture
+from study.storage.layout import DONE
 
 ALIKE = 1e-3  # difference of the fingers' pressures over the largest one that is not drawn twice
 MOTIONS = ("x", "turn")

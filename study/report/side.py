@@ -10,11 +10,11 @@ import numpy as np
 
 from study import pictures
 from study.data import Data
-from study.layout import FAILED
 from study.outline import outline, pad_extent, slice_polygon
 from study.report.maps import HOW_TO_READ, MAPS, SHORT, elsewhere, extremes, scaled
 from study.report.page import Picture
 from study.report.spots import spot
+from study.storage.layout import FAILED
 
 MOST_STATIONS = 80  # more ticks than that would be a bar
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from study import pictures
+from study.case.stored_surface import StoredSurface, shadow_outline, stored_surface
 from study.data import Data, number, shown
 from study.report.page import Picture
-from study.stored_surface import StoredSurface, shadow_outline, stored_surface
 
 COMPONENTS = (("f_x", "N", 1.0), ("f_y", "N", 1.0), ("tau_z", "N mm", 1e3))
 PLANES = ((0, 1), (0, 2), (1, 2))

@@ -10,7 +10,7 @@ from study import pictures
 from study.data import Data, number
 from study.report.page import Picture
 
-SNAPPED = 8192  # flag, as study.quantities says
+SNAPPED = 8192  # flag, as study.storage.quantities says
 MOST_LINES = 40
 
 

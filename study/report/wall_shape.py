@@ -9,10 +9,10 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
-from study.layout import DONE
 from study.outline import undeformed
 from study.report.page import Picture
-from study.wall_quantities import ALONG, AROUND
+from study.storage.layout import DONE
+from study.storage.wall_quantities import ALONG, AROUND
 
 LEVEL = 0.05  # of an approach along the object's axis, beyond which sections would not show both fingers
 FINE = 180  # points of a ring
@@ -143,7 +143,7 @@ def _pad(data: Data, scene: Any, index: tuple[int, ...], finger: int, cut: Cut) 
 
 def _front(data: Data, scene: Any, index: tuple[int, ...], finger: int, axis: int) -> np.ndarray:
     """Line of a pad's front along one of its axes, through the faces beside its middle ``(n, 3)`` [m]."""
-    from study.build import pad_shape
+    from study.case.build import pad_shape
 
     ends = np.zeros((2, 3))
     ends[:, axis] = np.array([-0.5, 0.5]) * scene.gripper.pad_size[axis]

@@ -8,9 +8,9 @@ import numpy as np
 
 from study.data import Data, number
 from study.outline import swept_object
-from study.overview import wall_text
-from study.quantities import EFFECTS
 from study.report.page import paragraph, table
+from study.storage.quantities import EFFECTS
+from study.tables.overview import wall_text
 
 HEADS = {
     "dent": "dent [mm]", "wall_stress": "wall stress [MPa]", "wall_strain": "largest strain [%]",

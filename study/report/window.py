@@ -9,9 +9,9 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number, shown
-from study.layout import DONE
 from study.report.maps import chosen_angles, elsewhere, main_axis, ticks
 from study.report.page import Picture
+from study.storage.layout import DONE
 
 SAFE, NONE = "#2a8c82", "#c9ced2"
 

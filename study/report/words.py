@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from study.data import LIMITS, Data, number, shown
-from study.layout import DONE, FAILED, MISSING
-from study.ranking import FLAGS, LOST, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
+from study.storage.layout import DONE, FAILED, MISSING
+from study.tables.ranking import FLAGS, LOST, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
 from study.uncertainty.verdict import sure
 from study.uncertainty.verdict import verdict as judgement
 

@@ -36,7 +36,7 @@ from study.report import side as report_side
 from study.report import surface as report_surface
 from study.report.angle_maps import angle_maps
 from study.report.page import Picture, heading, page, paragraph, picture
-from study.store import open_result
+from study.storage.store import open_result
 from study.view.model import view_of
 
 Sections = list[tuple[str, str, str]]

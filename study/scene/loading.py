@@ -9,7 +9,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from study.printable import UNPRINTABLE, shortened
 from study.scene import checks as scene_checks
 from study.scene.errors import Finding, KeyPath, Problem, closest, shown
 from study.scene.score_sections import LimitSurface, Score, Task
@@ -17,6 +16,7 @@ from study.scene.sections import Accuracy, Candidates, Effects, Friction, Grippe
 from study.scene.sentences import model_findings
 from study.scene.shapes import SHAPES, Section
 from study.scene.uncertainty_section import Uncertainty
+from study.tables.printable import UNPRINTABLE, shortened
 
 SECTIONS: dict[str, type[Section]] = {
     "gripper": Gripper,

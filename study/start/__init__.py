@@ -133,7 +133,7 @@ def _about_mesh(options: argparse.Namespace, scene: Path) -> dict[str, str]:
 
 def _size(options: argparse.Namespace) -> tuple[tuple[float, float], float]:
     """Extents across and along the axis [mm] of a mesh that a study can take."""
-    from study.build import build_object
+    from study.case.build import build_object
     from study.scene.shapes import Mesh
 
     shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from study import model
-from study.build import build_object
+from study.case import model
+from study.case.build import build_object
+from study.case.grasp import quality
+from study.case.solving import solver
+from study.execution.stopping import TimeLimitError
 from study.exits import StudyError
-from study.grasp import quality
-from study.solving import solver
-from study.stopping import TimeLimitError
 from study.uncertainty.variations import Variation, moved_poses, variations
 
 NAMES = ("e_n", "quality")
@@ -31,7 +31,7 @@ class Probing:
         self.failures: list[str] = []
 
     def values(self) -> dict[str, np.ndarray]:
-        """Values ``(variations,)`` of the next force, keyed as in ``study.quantities``."""
+        """Values ``(variations,)`` of the next force, keyed as in ``study.storage.quantities``."""
         found = np.full((len(NAMES), len(self._ladders)), np.nan)
         self.failures = []
         try:

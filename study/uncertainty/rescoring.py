@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lsfit.ellipsoid import Ellipsoid
 from scoring.contact import SoftContact
 from scoring.pose import pose_volume
-from study.build import build_object
-from study.grasp import FACING
+from study.case.build import build_object
+from study.case.grasp import FACING
 from study.scene import Scene
 from study.uncertainty import carrying
 

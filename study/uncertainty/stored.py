@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study.layout import DONE, Derived
-from study.ranking import LOST
+from study.case.sweep import axes
 from study.scene import Scene
-from study.sweep import axes
+from study.storage.layout import DONE, Derived
+from study.tables.ranking import LOST
 from study.uncertainty import carrying
 
 if TYPE_CHECKING:
-    from study.store import ResultWriter
+    from study.storage.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 NAMES = {"e_n": "m", "quality": ""}

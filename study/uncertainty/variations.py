@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from fem.pose import Pose
-from study.build import has_wall, pad_shape
+from study.case.build import has_wall, pad_shape
+from study.case.sheet_level import sheet_level
 from study.scene import Scene
-from study.sheet_level import sheet_level
 
 COARSEST_WALL, FEWEST = 50.0, 2  # mm, and elements along a side, as scenes allow
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study.columns import DISPLAY
+from study.tables.columns import DISPLAY
 
 FloatArray = NDArray[np.float64]
 TIE = 1e-6  # relative difference of scores that is none: images of one grasp

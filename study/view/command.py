@@ -54,7 +54,7 @@ def view(options: Namespace) -> None:
     """Write what was asked for; or else open a window, or without a screen show the page until Ctrl-C."""
     paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
     from study.data import Data
-    from study.store import open_result
+    from study.storage.store import open_result
     from study.view.model import quantity_of, view_of
 
     with open_result(options.file) as result:

@@ -9,8 +9,8 @@ import numpy as np
 import pyvista as pv
 
 from study.data import Data
-from study.layout import DONE, FAILED
 from study.pictures import span
+from study.storage.layout import DONE, FAILED
 from study.view import limits
 from study.view.colours import CROSS, CROSSED, FORCE, NEUTRAL, OPEN, PAD, table
 from study.view.model import View

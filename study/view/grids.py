@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from study.exits import OTHER_FILE, StudyError
-from study.layout import DONE
+from study.storage.layout import DONE
+from study.storage.vtkhdf import write_grid
 from study.view.model import View
 from study.view.pads import Pad, pads
 from study.view.surface import NOBODY
-from study.vtkhdf import write_grid
 
 
 def write_grids(view: View, index: tuple[int, ...], path: Path) -> list[Path]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.case.stored_surface import stored_surface
 from study.data import Data
-from study.stored_surface import stored_surface
 
 ROWS, COLUMNS = 17, 32  # directions from pole to pole, and round
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from study.data import Data, number
 from study.exits import USAGE, StudyError
-from study.layout import DONE, FAILED
 from study.outline import read_scene, swept_object
-from study.ranking import FLAGS
+from study.storage.layout import DONE, FAILED
+from study.tables.ranking import FLAGS
 from study.view.surface import NOBODY, Cells, coloured, with_normals
 from study.view.wall import Wall, displacement, wall_of
 
@@ -63,7 +63,7 @@ class View:
     @cached_property
     def object(self) -> Any:
         """The object of this point of the sweep, as `fem` knows it; None with a note where it cannot be had."""
-        from study.build import build_object
+        from study.case.build import build_object
 
         shape = swept_object(self.scene, (*self.point, 0, 0, 0)) if self.scene else None
         if shape is None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from study.data import Data
-from study.layout import DONE
+from study.storage.layout import DONE
 
 LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]
 LOADED = 1e-9  # share of the largest pressure below which a face counts as free

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from study.layout import DONE, FAILED
 from study.pictures import span
-from study.ranking import FLAGS
+from study.storage.layout import DONE, FAILED
+from study.tables.ranking import FLAGS
 from study.view import limits
 from study.view.colours import CROSS, CROSSED, FORCE, NEUTRAL, OPEN, PAD, stops
 from study.view.model import View

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from study.data import Data
-from study.layout import DONE
 from study.outline import undeformed
-from study.wall_quantities import ALONG, AROUND
+from study.storage.layout import DONE
+from study.storage.wall_quantities import ALONG, AROUND
 
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]
 FINER = 6  # places between those of the file among which the nearest is searched

@@ -12,7 +12,7 @@ from fem.contact import ContactProblem
 from fem.grip_problem import GripProblem
 from fem.petsc import PETSc
 from study import pipeline
-from study.plan import make_plan
+from study.execution.plan import make_plan
 from study.scene import load_scene
 from tests.benchmark.table import line, title
 

@@ -23,8 +23,8 @@ from fem.objects import EllipticCylinder
 from fem.pad import Pad, PadShape
 from fem.pose import Pose
 from fem.press import Press
+from study.case.model import approach
 from study.environment import launch_environment, mpirun
-from study.model import approach
 from tests.benchmark import factors, kernels
 from tests.benchmark.table import fastest, line, title
 
@@ -110,9 +110,11 @@ def writing_share(scene: Path, folder: Path) -> float:
     """Share of a one-rank run that goes into creating and writing the file."""
     from mpi4py import MPI
 
-    from study import pipeline, run, store
-    from study.plan import make_plan
+    from study import pipeline
+    from study.execution import run
+    from study.execution.plan import make_plan
     from study.scene import load_scene
+    from study.storage import store
 
     spent = [0.0]
 

@@ -142,7 +142,7 @@ def e_n(state):
     ids=["Blatz-Ko", "neo-Hookean", "alpha 8", "alpha 20", "alpha -4"],
 )
 def test_error_of_e_n_stays_below_six_tenths_of_the_departure(law):
-    """What `study.pad_level` chooses by: 7 objects, 4 forces each."""
+    """What `study.case.pad_level` chooses by: 7 objects, 4 forces each."""
     pad = Pad(PadShape(SIZE, (16, 8, 5)), law, (True, True))
     front = CondensedPad(linearised(pad))
     gaps = [reference.placed(EllipticCylinder(0.025, b, 0.1), reference.facing(0.025)) for b in (0.01, 0.02, 0.06)]

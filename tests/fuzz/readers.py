@@ -125,10 +125,10 @@ def _mesh(path):
 
 
 def _result(path):
-    from study.export import as_csv
-    from study.show import as_json, best
-    from study.status import status_text
-    from study.store import open_result
+    from study.storage.store import open_result
+    from study.tables.export import as_csv
+    from study.tables.show import as_json, best
+    from study.tables.status import status_text
 
     with open_result(path) as result:
         return as_csv(result), as_json(best(result, None, 3, whole_lines=False)), status_text(result, 80)

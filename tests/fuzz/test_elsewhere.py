@@ -17,12 +17,12 @@ import pytest
 from fem.mesh_check import MeshError
 from fem.mesh_file import read_polygons
 from study.cli import main
-from study.columns import csv_text
 from study.exits import OTHER_FILE, USAGE, StudyError
-from study.printable import UNPRINTABLE
 from study.scene import SceneError, load_scene, parse_scene
-from study.store import open_result
-from study.trial import trouble
+from study.storage.store import open_result
+from study.storage.trial import trouble
+from study.tables.columns import csv_text
+from study.tables.printable import UNPRINTABLE
 from study.view.server import server
 from tests.fuzz.lies import EVIL, LIES
 from tests.fuzz.readers import CATALOGUE, QUICK, SCENE, obj, ply, stl

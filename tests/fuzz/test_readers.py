@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.printable import UNPRINTABLE
+from study.tables.printable import UNPRINTABLE
 from tests.fuzz.edits import BINARY, edited, edits
 from tests.fuzz.readers import QUICK, slow_readers
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from study.layout import Derived, Header, Layout
-from study.reading import StoredAxis
-from study.store import create
+from study.storage.layout import Derived, Header, Layout
+from study.storage.reading import StoredAxis
+from study.storage.store import create
 
 SCENE = """
 [object]

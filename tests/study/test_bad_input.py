@@ -13,7 +13,7 @@ import pytest
 
 from study.cli import main
 from study.environment import launch_environment
-from study.store import open_result
+from study.storage.store import open_result
 from tests.study.launching import ROOT, launch
 
 pytestmark = pytest.mark.launches

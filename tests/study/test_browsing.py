@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from study.store import open_result
+from study.storage.store import open_result
 from tests.study.launching import ROOT, launch
 from tests.study.test_vtkhdf import steps_of
 

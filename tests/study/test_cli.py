@@ -20,9 +20,9 @@ import pytest
 import study
 from study.cli import main, program
 from study.environment import launch_environment
+from study.execution.running import petsc_overrides
 from study.exits import MEANING, StudyError
 from study.help import GROUPS
-from study.running import petsc_overrides
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake

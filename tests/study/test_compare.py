@@ -11,14 +11,14 @@ import pytest
 
 from friction.motion import fibonacci_twists
 from study.cli import main
-from study.compare import compare
-from study.compare_text import comparison_csv, comparison_json, comparison_text
 from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
-from study.export import FINGER, MEANING, as_csv, as_json, cases
 from study.lookup import GraspMap
-from study.reading import StoredAxis
 from study.speaking import RANK
-from study.store import open_result
+from study.storage.reading import StoredAxis
+from study.storage.store import open_result
+from study.tables.compare import compare
+from study.tables.compare_text import comparison_csv, comparison_json, comparison_text
+from study.tables.export import FINGER, MEANING, as_csv, as_json, cases
 from tests.study.formula_results import (
     FORCES,
     SCENE,

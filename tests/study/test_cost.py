@@ -103,8 +103,8 @@ def test_the_front_is_what_nothing_beats():
 
 
 def finger_on(obj, gripper):
-    from study import model
-    from study.candidates import axis_poses
+    from study.case import model
+    from study.case.candidates import axis_poses
 
     return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
 
@@ -435,7 +435,7 @@ def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
 @pytest.mark.launches
 def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, once):
     from study.exits import DONE
-    from study.store import open_result
+    from study.storage.store import open_result
     from tests.study.launching import launch
 
     file, out = tmp_path / "small.toml", tmp_path / "small.hdf"

@@ -13,8 +13,8 @@ from study.exits import OTHER_FILE, StudyError
 from study.figures import JOBS, fig5, fig6, fig7, fig8, rendering
 from study.figures.command import chosen, draw, targets, write
 from study.figures.table import FIGURES, Figure, find
-from study.layout import DONE
-from study.store import open_result
+from study.storage.layout import DONE
+from study.storage.store import open_result
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study.cli import main
-from study.layout import DONE
-from study.store import open_result
+from study.storage.layout import DONE
+from study.storage.store import open_result
 from tests.study.launching import ROOT, launch
 
 JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}

@@ -15,9 +15,9 @@ import h5py
 import pytest
 
 from study.environment import launch_environment
-from study.layout import DONE, MISSING
-from study.lock import holder
-from study.store import open_result, rows_of
+from study.execution.lock import holder
+from study.storage.layout import DONE, MISSING
+from study.storage.store import open_result, rows_of
 from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]

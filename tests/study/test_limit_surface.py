@@ -13,9 +13,9 @@ from lsfit.form import exponents, monomials
 from lsfit.quartic import Quartic
 from scoring.contact import EllipsoidBody, SoftContact
 from scoring.pose import pose_volume
-from study import limit_surface
-from study.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, NO_FIT, PROGRAMME, STANDS_IN
-from study.quantity import MODELS
+from study.case import limit_surface
+from study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, NO_FIT, PROGRAMME, STANDS_IN
+from study.storage.quantity import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
 WEIGHT = 9.80665

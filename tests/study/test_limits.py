@@ -15,13 +15,13 @@ import pytest
 import scipy.sparse as sp
 
 from fem.petsc import NonlinearSolver
-from study import memory
+from study.execution import memory
+from study.execution.memory import available, limited_memory
+from study.execution.standing import Standing
+from study.execution.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
 from study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
-from study.layout import DONE, FAILED, MISSING
-from study.memory import available, limited_memory
-from study.standing import Standing
-from study.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
-from study.store import open_result
+from study.storage.layout import DONE, FAILED, MISSING
+from study.storage.store import open_result
 from tests.study.launching import contents, differing, start, study, wait_for
 
 
@@ -44,7 +44,7 @@ def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
 
 
 def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
-    monkeypatch.setattr("study.stopping.AGAIN", 0.05)
+    monkeypatch.setattr("study.execution.stopping.AGAIN", 0.05)
 
     def deaf():
         with contextlib.suppress(TimeLimitError):  # as what is raised inside a finaliser is

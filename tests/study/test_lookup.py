@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from study.lookup import GraspMap
-from study.lookup_point import INSIDE, NO_RESULT, OUTSIDE, SNAP
-from study.reading import StoredAxis
+from study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
+from study.storage.reading import StoredAxis
 from tests.study.formula_results import (
     ANGLES,
     FORCES,

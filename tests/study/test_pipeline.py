@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import pipeline, solving
-from study.build import build_object
-from study.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
+from study import pipeline
+from study.case import solving
+from study.case.build import build_object
+from study.case.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
+from study.case.sweep import units
 from study.environment import launch_environment
-from study.quantity import MODELS
-from study.result import CaseFailure
 from study.scene import parse_scene
-from study.sweep import units
+from study.storage.quantity import MODELS
+from study.storage.result import CaseFailure
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))
 MU = 0.8

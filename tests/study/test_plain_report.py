@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import h5py
 
-from study.layout import REPORT
-from study.plain_report import plain, plain_report
-from study.store import open_result
+from study.storage.layout import REPORT
+from study.storage.plain_report import plain, plain_report
+from study.storage.store import open_result
 from tests.study.view_files import make
 
 

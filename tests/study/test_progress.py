@@ -7,8 +7,8 @@ import io
 import numpy as np
 import pytest
 
-from study.layout import DONE, MISSING
-from study.progress import Progress
+from study.execution.progress import Progress
+from study.storage.layout import DONE, MISSING
 
 
 class Run:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from study.environment import launch_environment
-from study.layout import DONE
-from study.store import open_result
+from study.storage.layout import DONE
+from study.storage.store import open_result
 from tests.study.launching import ROOT, contents, differing, launch, wait_for
 
 pytestmark = pytest.mark.launches

@@ -7,10 +7,10 @@ from argparse import Namespace
 
 import pytest
 
-from study.build import check_object, shapes_of, warnings
+from study.case.build import check_object, shapes_of, warnings
 from study.cli import main
+from study.execution.running import petsc_overrides, prepare
 from study.exits import StudyError
-from study.running import petsc_overrides, prepare
 from study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
 

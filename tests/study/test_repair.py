@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 import pytest
 
-from study import repair as repairing
+from study.execution.lock import Lock
 from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
-from study.layout import DONE, MISSING
-from study.lock import Lock
-from study.record import record
-from study.repair import repair
-from study.store import ResultWriter, create, open_result
+from study.storage import repair as repairing
+from study.storage.layout import DONE, MISSING
+from study.storage.record import record
+from study.storage.repair import repair
+from study.storage.store import ResultWriter, create, open_result
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import contents, differing, launch
 

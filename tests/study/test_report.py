@@ -20,19 +20,19 @@ import pytest
 from study import pictures
 from study.data import Data, number
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.layout import Derived, Header, Layout
 from study.outline import read_scene, shape_outline, slice_polygon
-from study.ranking import TOO_STRONG
-from study.reading import StoredAxis
-from study.record import blank, crc32, record
 from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
 from study.report.patch import cells, friction_directions
 from study.report.writing import build, write_report
-from study.result import CaseResult
 from study.scene.shapes import EllipticCylinder, Sphere
-from study.show import best
-from study.store import create, open_result
+from study.storage.layout import Derived, Header, Layout
+from study.storage.reading import StoredAxis
+from study.storage.record import blank, crc32, record
+from study.storage.result import CaseResult
+from study.storage.store import create, open_result
+from study.tables.ranking import TOO_STRONG
+from study.tables.show import best
 
 ROOT = Path(__file__).parent.parent.parent
 FACES = (6, 4)

@@ -16,7 +16,7 @@ from study.cli import main
 from study.data import Data
 from study.report import object_view
 from study.speaking import RANK
-from study.store import open_result
+from study.storage.store import open_result
 from study.view.model import View
 from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser

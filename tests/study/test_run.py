@@ -12,8 +12,8 @@ import time
 import numpy as np
 import pytest
 
-from study.layout import DONE, FAILED, MISSING
-from study.store import open_result
+from study.storage.layout import DONE, FAILED, MISSING
+from study.storage.store import open_result
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 pytestmark = pytest.mark.launches

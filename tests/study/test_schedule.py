@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from study.environment import launch_environment
-from study.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
-from study.scaling import Ladder, Machine, replay, replayed, segmented
+from study.execution.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
+from study.execution.scaling import Ladder, Machine, replay, replayed, segmented
 
 CLAIMS = """
 from mpi4py import MPI
-from study.schedule import Claims
+from study.execution.schedule import Claims
 import time
 comm = MPI.COMM_WORLD
 node = comm.Split({color}) if {color} is not None else None

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from friction.frame import FrameFlag
-from study import contact
+from study.case import contact
 from study.cli import main
-from study.layout import DONE, FAILED
-from study.quantities import MAPS, quantities
-from study.ranking import FLAGS
-from study.reading import StoredAxis
-from study.show import as_csv, as_text, best, place
-from study.status import reasons
+from study.storage.layout import DONE, FAILED
+from study.storage.quantities import MAPS, quantities
+from study.storage.reading import StoredAxis
+from study.tables.ranking import FLAGS
+from study.tables.show import as_csv, as_text, best, place
+from study.tables.status import reasons
 
 FORCES = np.array([1.0, 5.0])
 

@@ -12,18 +12,18 @@ import h5py
 import numpy as np
 import pytest
 
+from study.execution.lock import Lock, holder
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.finger_quantities import PATCH
-from study.grid import Surface
-from study.layout import Derived, Header, Layout, layout_from_options
-from study.lock import Lock, holder
-from study.plots import axes_of, groups, view_slice
-from study.quantities import MAPS, quantities
-from study.quantity import MODELS, NEEDS
-from study.reading import StoredAxis
-from study.record import blank, crc32, record, text_bytes
-from study.result import CaseResult
-from study.store import create, open_result, torn_rows, verify
+from study.storage.finger_quantities import PATCH
+from study.storage.grid import Surface
+from study.storage.layout import Derived, Header, Layout, layout_from_options
+from study.storage.plots import axes_of, groups, view_slice
+from study.storage.quantities import MAPS, quantities
+from study.storage.quantity import MODELS, NEEDS
+from study.storage.reading import StoredAxis
+from study.storage.record import blank, crc32, record, text_bytes
+from study.storage.result import CaseResult
+from study.storage.store import create, open_result, torn_rows, verify
 from tests.study.fake_run import fake_result
 
 HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))

@@ -9,12 +9,12 @@ from lsfit.ellipsoid import Ellipsoid
 from lsfit.form import exponents, monomials
 from lsfit.quartic import Quartic
 from study import pictures
+from study.case.stored_surface import circle, shadow_outline, stored_surface
 from study.data import Data
-from study.finger_quantities import MONOMIALS
-from study.layout import Layout
 from study.report.surface import misfit_curves, surface_pictures
-from study.store import open_result
-from study.stored_surface import circle, shadow_outline, stored_surface
+from study.storage.finger_quantities import MONOMIALS
+from study.storage.layout import Layout
+from study.storage.store import open_result
 from tests.study.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02

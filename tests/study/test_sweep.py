@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import candidates, sweep
+from study.case import candidates, sweep
 from study.scene import load_scene, parse_scene
 
 JOBS = Path(__file__).parents[2] / "jobs"

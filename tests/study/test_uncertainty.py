@@ -9,16 +9,16 @@ import pytest
 
 from lsfit.ellipsoid import Ellipsoid
 from scoring.volume import volume_linf
-from study import sweep
-from study.candidates import axis_poses
-from study.compare import compare
-from study.export import cases
-from study.layout import Derived, Layout
+from study.case import sweep
+from study.case.candidates import axis_poses
 from study.lookup import GraspMap
 from study.scene import parse_scene
 from study.scene.errors import SceneError
-from study.show import as_text, best
-from study.store import open_result
+from study.storage.layout import Derived, Layout
+from study.storage.store import open_result
+from study.tables.compare import compare
+from study.tables.export import cases
+from study.tables.show import as_text, best
 from study.uncertainty import carrying, probing
 from study.uncertainty.rescoring import _volume
 from study.uncertainty.stored import derived
@@ -267,7 +267,7 @@ def test_a_file_without_errors_knows_none():
 def solved(given, name):
     """A map ``(units, forces)`` of a scene, NaN where a case fails, and the units."""
     from study.pipeline import solve_unit
-    from study.result import CaseFailure
+    from study.storage.result import CaseFailure
 
     units = sweep.units(given, lambda point: point.axis_symmetry)
     found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)
@@ -299,8 +299,8 @@ def test_the_change_by_the_modulus_is_that_of_further_solves():
 
 @pytest.mark.long
 def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
-    from study.ranking import LOST
     from study.scene import load_scene
+    from study.tables.ranking import LOST
     from study.uncertainty.probes import probe_candidates
 
     coarse = "gripper.elements=[12, 6, 4]", "candidates.stations=18", "candidates.angles_deg=[0]"

@@ -21,7 +21,8 @@ from fem.objects import Box, EllipticCylinder
 from study.cli import main
 from study.data import Data
 from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
-from study.store import open_result
+from study.storage.store import open_result
+from study.storage.wall_quantities import ALONG, AROUND
 from study.view import colours, command, limits
 from study.view.model import quantity_of, view_of
 from study.view.pads import corners_of, pads
@@ -29,7 +30,6 @@ from study.view.page import page, payload
 from study.view.server import server
 from study.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals
 from study.view.wall import Wall, between
-from study.wall_quantities import ALONG, AROUND
 from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")

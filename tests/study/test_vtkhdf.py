@@ -9,13 +9,13 @@ import pyvista as pv
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from study.cli import main
+from study.execution.plan import make_plan
 from study.exits import CANNOT_WRITE, StudyError
-from study.grid_values import fill_grid
-from study.plan import make_plan
-from study.record import record
 from study.scene import parse_scene
-from study.store import ResultWriter, create
-from study.vtkhdf import write_grid
+from study.storage.grid_values import fill_grid
+from study.storage.record import record
+from study.storage.store import ResultWriter, create
+from study.storage.vtkhdf import write_grid
 from tests.study.view_files import GRID, PRESSURE, SCENE, SIZE, make, quality, solved
 
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]

@@ -10,25 +10,26 @@ import h5py
 import numpy as np
 import pytest
 
-from study import model, pictures, pipeline, wall, window
-from study.build import build_object
+from study import pictures, pipeline
+from study.case import model, wall, window
+from study.case.build import build_object
+from study.case.solving import solver
 from study.data import Data
-from study.layout import DONE
+from study.execution.plan import make_plan, memory, plan_text
+from study.execution.wall_cost import wall_size
 from study.outline import read_scene, undeformed
-from study.overview import RULE, scene_text
-from study.plan import make_plan, memory, plan_text
-from study.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
-from study.record import blank, crc32, record
 from study.report import cases, wall_words, words, writing
 from study.report.levels import level_picture, rule
 from study.report.wall_shape import Cut, shape_picture
 from study.report.window import window_picture
 from study.scene import parse_scene
-from study.show import as_csv, as_json, best
-from study.show_text import as_text
-from study.solving import solver
-from study.store import create, open_result
-from study.wall_cost import wall_size
+from study.storage.layout import DONE
+from study.storage.record import blank, crc32, record
+from study.storage.store import create, open_result
+from study.tables.overview import RULE, scene_text
+from study.tables.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
+from study.tables.show import as_csv, as_json, best
+from study.tables.show_text import as_text
 from tests.study.test_report import Page
 
 SCENE = """

@@ -7,12 +7,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from study import pipeline, wall
-from study.build import build_object
-from study.quantities import REASONS
-from study.result import CaseFailure
+from study import pipeline
+from study.case import wall
+from study.case.build import build_object
+from study.case.sweep import units
 from study.scene import parse_scene
-from study.sweep import units
+from study.storage.quantities import REASONS
+from study.storage.result import CaseFailure
 from tests.study.test_pipeline import SCALES, differing
 
 CUP = """shape = "revolution"

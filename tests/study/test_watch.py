@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from study import watch_view
 from study.cli import main
-from study.layout import DONE, FAILED, MISSING
-from study.watch import INTERRUPTED, watch
+from study.storage.layout import DONE, FAILED, MISSING
+from study.tables import watch_view
+from study.tables.watch import INTERRUPTED, watch
 from tests.study.formula_results import grid_axes, make
 
 SIZE = 4 * 6 * 4  # cases of the file

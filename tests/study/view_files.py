@@ -7,11 +7,11 @@ import math
 import h5py
 import numpy as np
 
-from study.layout import Header, Layout
-from study.reading import StoredAxis
-from study.record import blank, crc32, record
-from study.result import CaseResult
-from study.store import create
+from study.storage.layout import Header, Layout
+from study.storage.reading import StoredAxis
+from study.storage.record import blank, crc32, record
+from study.storage.result import CaseResult
+from study.storage.store import create
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)

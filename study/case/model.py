@@ -1,0 +1,125 @@
+"""From a scene to the finite element model of one finger: object, pad, place of first touch, symmetry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.contact import Gap
+from fem.linear_pad import CondensedPad, linearised
+from fem.pad import Pad
+from fem.pose import Pose
+from fem.shape import GapFunction, GapObject
+from fem.touch import first_touch
+from study.case.build import pad_material, pad_shape, sheet
+from study.scene import Scene
+from study.scene.sections import Gripper
+
+FloatArray = NDArray[np.float64]
+DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known
+
+
+@lru_cache(maxsize=8)
+def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool) -> Pad:
+    """Discrete pad with its sheet; the same for all candidates, so it is made once."""
+    behind = sheet(gripper) if elastic_sheet else None
+    return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
+
+
+@lru_cache(maxsize=8)
+def condensed_pad(
+    gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool
+) -> CondensedPad:
+    """Discrete pad for small strains, reduced to its front; one factorisation for all candidates."""
+    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser, elastic_sheet)))
+
+
+@dataclass(frozen=True, eq=False)
+class Finger:
+    """A pad at first touch with the object.
+
+    Parameters
+    ----------
+    pose : Pose
+        The pad's frame at first touch.
+    surface : GapFunction
+        The object round the contact, in the object's frame.
+    """
+
+    pose: Pose
+    surface: GapFunction
+
+    def gap(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Signed distance, gradient and Hessian at points of the pad's frame."""
+        R = self.pose.rotation
+        g, normal, hessian = self.surface.gap(self.pose.to_object(x))
+        return g, normal @ R, R.T @ hessian @ R
+
+
+def approach(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Finger:
+    """Move a pad of this size from afar along its approach to first touch.
+
+    Raises
+    ------
+    NoContactError
+        If the pad passes the object.
+    """
+    lower, upper = obj.bounds
+    reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
+    ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
+    start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
+    distance = first_touch(obj, start, _front(size), 2.0 * reach)
+    touching = Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
+    box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
+    return Finger(touching, obj.near(touching, box * [-1, -1, -0.5], box))
+
+
+def _front(size: tuple[float, float, float]) -> FloatArray:
+    """Points spread over the undeformed front, independent of the mesh, the planes of symmetry among them."""
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+
+
+def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, bool]:
+    """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
+    u = np.linspace(0.03, 0.55, 12)
+    x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, DEEP, 7) * size[2], indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    quadrants = {(i, j): gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
+    tolerance = 1e-9 * size[0]
+
+    def same(pairs) -> bool:
+        return all(np.abs(quadrants[a] - quadrants[b]).max() <= tolerance for a, b in pairs)
+
+    return (
+        same([((1, 1), (-1, 1)), ((1, -1), (-1, -1))]),
+        same([((1, 1), (1, -1)), ((-1, 1), (-1, -1))]),
+    )
+
+
+def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
+    """Planes of symmetry used with this mesh: those that exist, halve it evenly and are allowed by the effects.
+
+    Raises
+    ------
+    ValueError
+        If the scene forces a symmetry that this candidate does not have.
+    """
+    wanted = scene.effects.model_size
+    if wanted == "full":
+        return False, False
+    found = mirror_planes(finger.gap, scene.gripper.pad_size)
+    usable = tuple(plane and n % 2 == 0 for plane, n in zip(found, elements, strict=False))
+    # a coarser mesh for error estimates takes what it can use
+    need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0
+    if sum(usable) < need:
+        raise ValueError(
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have "
+            f"{sum(usable)} here; use 'auto'"
+        )
+    if wanted == "half" and all(usable):
+        return False, True
+    return usable

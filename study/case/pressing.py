@@ -1,0 +1,42 @@
+"""A finger on a rigid object: its pad and sheet at the levels that the scene calls for, ready to climb the forces."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fem.coupling import CoupledProblem, way
+from fem.linear_pad import linearised
+from fem.linear_press import linear_press
+from fem.pad import Pad
+from fem.press import Press
+from fem.stepping import Settings
+from study.case import model
+from study.case.build import pad_shape
+from study.case.model import Finger
+from study.case.sheet_level import sheet_level
+from study.scene import Scene
+
+
+def settings(scene: Scene) -> Settings:
+    """When a solve ends and a step is given up."""
+    return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
+
+
+def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
+    """Pad of finite strain on its sheet; ``rule`` collocates the gaps."""
+    return model.pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
+
+
+def press_of(scene: Scene, finger: Finger, coarser: bool, linear: bool) -> Press:
+    """Pad of small (``linear``) or finite strains, with friction where the scene wants it to act back."""
+    elements, rule = pad_shape(scene.gripper, coarser).elements, scene.accuracy.contact
+    symmetry = model.usable_symmetry(scene, finger, elements)
+    wanted, nodal = (pad_of(scene, symmetry, r, coarser) for r in (rule, "nodal"))
+    fallback = None if nodal is wanted else nodal
+    if linear:
+        pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
+        return linear_press(pad, finger.gap, linearised(fallback) if fallback else None, settings(scene))
+    if scene.effects.friction_pressure_coupling == "tangential":
+        problem = partial(CoupledProblem, mu=scene.friction.mu)
+        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), problem_of=problem, way=way)
+    return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))

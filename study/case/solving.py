@@ -1,0 +1,220 @@
+"""Solvers of one candidate: both fingers on a rigid object, each by itself, or on a thin wall, together.
+
+Either climbs the ladder of forces and gives the contacts of every force; what comes after does not ask which it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fem.errors import CheckError, ConvergenceError
+from fem.extract import half_turned, mirrored
+from fem.grip import Grip, Gripped
+from fem.grip_problem import GripProblem
+from fem.linear_pad import linearised
+from fem.press import Press, Pressed
+from fem.spring_bed import SpringBed
+from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
+from friction.patch import ContactPatch
+from study.case.build import pad_shape
+from study.case.candidates import turn_of_pose
+from study.case.contact import Contact
+from study.case.model import Finger
+from study.case.pad_level import PadLevel, choose_pad_level, level_on_wall
+from study.case.pressing import pad_of, press_of, settings
+from study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+from study.scene import Scene
+
+STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Contacts of one force: for every finger that on each mesh, the finest first.
+
+    ``spent`` are the states whose work was done for it; ``grips`` those of both fingers on the wall, if it has one.
+    """
+
+    contacts: list[list[Contact]]
+    spent: list[Pressed]
+    grips: list[Gripped]
+
+
+class Solver(Protocol):
+    """Climbs the forces of one candidate.
+
+    ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
+    """
+
+    level: Level | None
+    pad_level: PadLevel
+    fingers_solved: int
+    planes: int
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+
+
+def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
+    """Solver for both fingers at first touch, at the level of the object's compliance that the candidate calls for."""
+    if getattr(scene.object, "wall", None) is None:
+        return OnRigid(scene, fingers, poses, None)
+    _refuse_along_axis(fingers)
+    held = _grasp(scene, fingers, False)
+    pad = pad_of(scene, held.pad_symmetry, scene.accuracy.contact, False)
+    travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
+    level = choose_level(scene, held, travel)
+    if level.number == RIGID:
+        return OnRigid(scene, fingers, poses, level)
+    return OnWall(scene, fingers, level)
+
+
+class OnRigid:
+    """Fingers on a rigid object do not feel each other."""
+
+    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: Level | None) -> None:
+        self.scene, self.fingers, self.level = scene, fingers, level
+        self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
+        meshes = (False, True)[: scene.accuracy.meshes]
+        solved = fingers[:1] if self.shared else fingers
+        self.pad_level = choose_pad_level(scene, solved)
+        linear = self.pad_level.linear
+        self.presses = [[press_of(scene, f, coarser, linear) for coarser in meshes] for f in solved]
+        self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """See `Solver`."""
+        ladders = (zip(*(self._climbed(p, forces) for p in own), strict=True) for own in self.presses)
+        for states in zip(*ladders, strict=True):
+            contacts = [
+                [Contact(self.scene, f, state) for state in own] for f, own in zip(self.fingers, states, strict=False)
+            ]
+            if self.shared:  # an image finger has its partner's states; only its place differs
+                contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
+            yield Solved(contacts, [s for own in states for s in own], [])
+
+    def _climbed(self, press: Press, forces: Sequence[float]) -> Iterator[Pressed]:
+        try:
+            yield from press.ladder(forces)
+        except (ConvergenceError, CheckError) as error:
+            if not self.pad_level.linear:
+                raise
+            hint = "the scene asks for pads at small strains; effects.pad = 'auto' allows finite ones"
+            raise type(error)(f"{error} ({hint})") from error
+
+    def destroy(self) -> None:
+        """See `Solver`."""
+        for press in (p for own in self.presses for p in own):
+            press.destroy()
+
+
+class OnWall:
+    """Fingers on a thin wall press against each other through it."""
+
+    def __init__(self, scene: Scene, fingers: list[Finger], level: Level) -> None:
+        self.scene, self.fingers, self.level, self.pad_level = scene, fingers, level, level_on_wall(scene)
+        meshes = (False, True)[: scene.accuracy.meshes]
+        self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
+        self.grips = [
+            _grip(scene, fingers, held, level, coarser) for held, coarser in zip(self.held, meshes, strict=True)
+        ]
+        self.fingers_solved, self.planes = len(self.held[0].poses), sum(self.held[0].mirrors)
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+        """See `Solver`."""
+        for states in zip(*(g.ladder(forces) for g in self.grips), strict=True):
+            each = [self._contacts(held, state) for held, state in zip(self.held, states, strict=True)]
+            yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
+
+    def wall_values(self, solved: Solved) -> dict[str, Any]:
+        """What the wall bears at one force, keyed as in ``study.storage.quantities``."""
+        shell = self.grips[0].problem.model.shell
+        return wall_values(self.scene, self.held[0], solved.grips[0], shell)
+
+    def _contacts(self, held: Grasp, state: Gripped) -> list[Contact]:
+        """Contacts of both fingers in their own frames."""
+        contacts = [
+            Contact(self.scene, f, own, half_turned if turned else None)
+            for f, own, turned in zip(self.fingers, state.fingers, held.flipped, strict=False)
+        ]
+        if len(state.fingers) == 1:
+            own = state.fingers[0]
+
+            def image(patch: ContactPatch) -> ContactPatch:
+                return mirrored(own.pad, half_turned(patch) if held.flipped[0] else patch)
+
+            contacts.append(Contact(self.scene, self.fingers[1], own, image))
+        return contacts
+
+    def destroy(self) -> None:
+        """See `Solver`."""
+        for g in self.grips:
+            g.destroy()
+
+
+def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
+    """Lids, bottoms and rims of a thin-walled object are not pressed."""
+    steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
+    if steepest > np.sin(STEEPEST):
+        raise CheckError(
+            f"a finger approaches a thin-walled object at {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees to "
+            f"the planes across its axis; its wall is simulated up to {np.degrees(STEEPEST):.0f} degrees: turn the "
+            "approach, or remove wall_mm"
+        )
+
+
+def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
+    """Grasp frame and the planes of symmetry that meshes and scene allow."""
+    even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
+    wanted = scene.effects.model_size
+    body, poses = thin_body(scene.object), tuple(f.pose for f in fingers)
+    held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
+    if wanted == "half" and all(held.mirrors):
+        held = grasp(body, poses, (False, True))
+    # a coarser mesh for error estimates takes what it can use
+    need = {"half": 1, "quarter": 2}.get(wanted, 0) if not coarser else 0
+    if sum(held.mirrors) < need:
+        raise ValueError(
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object, fingers and mesh share "
+            f"{sum(held.mirrors)} here; use 'auto'"
+        )
+    return held
+
+
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarser: bool) -> Grip:
+    """Both fingers on the wall."""
+    size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
+    mesh = size.halved() if coarser else size
+    body, linear = thin_body(scene.object), level.number == LINEAR
+    wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
+
+    def problem(rule: str) -> GripProblem:
+        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
+        if scene.effects.pad == "linear":
+            pad = linearised(pad)
+        return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
+
+    gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
+    rule = scene.accuracy.contact
+    fallback = None if rule == "nodal" else lambda: problem("nodal")
+    return Grip(problem(rule), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
+
+
+def _gap(finger: Finger, turned: bool):
+    """Gap function in the frame of the pad as it is solved."""
+    if not turned:
+        return finger.gap
+    sign = [-1.0, -1.0, 1.0]
+
+    def gap(x):
+        g, normal, hessian = finger.gap(x * sign)
+        return g, normal * sign, hessian * [[s * t for t in sign] for s in sign]
+
+    return gap

@@ -1,0 +1,153 @@
+"""Thin-walled objects in a study: their wall, the level that a candidate calls for, and what the wall bears."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.errors import CheckError
+from fem.grip import Gripped
+from fem.shell_model import Shell
+from fem.shell_stress import faces
+from fem.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
+from fem.wall_material import wall_material
+from study.case.build import outer_surface
+from study.scene import Scene
+from study.scene.shape import Walled
+from study.storage.wall_quantities import ALONG, AROUND
+
+FloatArray = NDArray[np.float64]
+RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.storage.quantities lists them
+STIFF = 0.02  # dent over travel below which a wall is as good as rigid: e_n then changes by less than 0.1 %
+SMALL_DENT = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
+ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
+SNAPPED, SLIDES_OUT, YIELDS = (8192 << k for k in range(3))  # flags, as study.storage.quantities says
+
+
+@lru_cache(maxsize=8)
+def thin_body(shape: Walled) -> ThinWalled:
+    """Wall of an object that has one (``shape.wall`` is not None)."""
+    name = None if shape.wall_material == "custom" else shape.wall_material
+    surface, is_round = outer_surface(shape)
+    return ThinWalled(
+        surface,
+        is_round,
+        shape.wall,
+        wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength),
+        shape.support,
+        shape.open_top,
+        shape.base_wall,
+        shape.springs,
+    )
+
+
+@dataclass(frozen=True)
+class Level:
+    """How the object's compliance is simulated.
+
+    ``indicator`` is the dent that a linear wall would get at the largest force, over the wall's thickness; ``share``
+    that dent over the travel of the pads on the rigid object.
+    """
+
+    number: int
+    indicator: float
+    share: float
+    forced: bool
+
+
+def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
+    """Level of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
+
+    ``travel`` is that of the pads on the rigid object at the largest force [m].
+    """
+    names = {"rigid": RIGID, "linear_shell": LINEAR, "nonlinear_shell": NONLINEAR}
+    body = thin_body(scene.object)
+    dent, ratio = estimated_dent(body, held, scene, travel)
+    if scene.effects.object != "auto":
+        return Level(names[scene.effects.object], ratio, dent / travel, forced=True)
+    number = RIGID if dent < STIFF * travel else LINEAR if ratio <= SMALL_DENT else NONLINEAR
+    return Level(number, ratio, dent / travel, forced=False)
+
+
+def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> tuple[float, float]:
+    """Dent of the linear wall at the largest force, where undeformed pads would overlap it [m], and over the wall.
+
+    The second is the largest ratio of an inward displacement to the wall's thickness there. One right-hand side with
+    factors that all candidates share.
+    """
+    length, width, _ = scene.gripper.pad_size
+    linear = object_factors(body, 0.0 if body.round else held.angle, held.mirrors, ESTIMATE, 0.6 * width)
+    mesh, area = linear.shell.mesh, linear.shell.node_area
+    load = np.zeros((linear.shell.nodes, 6))
+    pressed = np.zeros(linear.shell.nodes, dtype=bool)
+    for pose in held.poses:
+        local = pose.to_pad(mesh.outer)
+        under = (np.abs(local[:, 0]) <= 0.5 * length) & (np.abs(local[:, 1]) <= 0.5 * width)
+        under &= mesh.D @ pose.rotation[:, 2] < 0
+        depth = np.where(under, np.maximum(travel - local[:, 2], 0.0), 0.0) * area
+        if not depth.sum() > 0:  # the touch lies between the nodes
+            depth = np.where(under, area, 0.0)
+        if not depth.sum() > 0:
+            raise CheckError("a pad stands beside the wall of the object: move the candidate onto its wall")
+        force = scene.load.normal_force[-1] * (0.5 if held.mirrors[1] else 1.0)
+        load[:, :3] += (force * depth / depth.sum())[:, None] * pose.rotation[:, 2]
+        pressed |= depth > 0
+    load[:, 3:] = load[:, :3]
+    q = linear.solve(load.ravel()).reshape(-1, 6)
+    dents = _dents(linear.shell, q)
+    return float(dents[pressed].max(initial=0.0)), float((dents / mesh.thickness)[pressed].max(initial=0.0))
+
+
+def _dents(shell: Shell, q: FloatArray) -> FloatArray:
+    """Inward displacement ``(k,)`` of the outer face's nodes, less the motion of the wall as a whole [m]."""
+    v = q[:, :3] + q[:, 3:]
+    drift = shell.node_area @ v / shell.node_area.sum()
+    drift[:2][list(shell.mesh.symmetry)] = 0.0  # the mean over one side of a plane of symmetry is no drift
+    normal = shell.mesh.D / np.linalg.norm(shell.mesh.D, axis=1)[:, None]
+    return -np.einsum("ki,ki->k", v - drift, normal)
+
+
+def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict[str, Any]:
+    """What the wall bears in one case, keyed as in ``study.storage.quantities``."""
+    q = state.wall.q.reshape(-1, 6)
+    both = faces(shell, state.wall.q)
+    return {
+        "maps/dent": float(_dents(shell, q).max(initial=0.0)),
+        "maps/wall_stress": max(float(f.von_mises.max()) for f in both),
+        "maps/wall_strain": max(float(np.abs(f.principal_strain).max()) for f in both),
+        "maps/support_force": float(np.linalg.norm(state.wall.reaction)),
+        "wall/place": _places(held, shell, q),
+    }
+
+
+def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> int:
+    """Flags of a case that its wall adds."""
+    found = SNAPPED * state.wall.snapped
+    found |= SLIDES_OUT * (values["maps/support_force"] > 2.0 * scene.friction.mu * state.force)
+    strength = thin_body(scene.object).material.yield_strength
+    return found | YIELDS * (strength is not None and values["maps/wall_stress"] > strength)
+
+
+def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
+    """Deformed outer face ``(AROUND * ALONG, 3)`` of the whole object in its own frame [m].
+
+    The angles begin at finger 1, so that images of a grasp are stored alike but for their turn.
+    """
+    mesh = shell.mesh
+    theta, s = np.meshgrid(
+        2 * np.pi * np.arange(AROUND) / AROUND, np.linspace(mesh.s[0], mesh.s[-1], ALONG), indexing="ij"
+    )
+    # to the side that is meshed
+    x, y = np.cos(theta), np.sin(theta)
+    side = np.stack([np.where((x < 0) & held.mirrors[0], -1.0, 1.0), np.where((y < 0) & held.mirrors[1], -1.0, 1.0)])
+    own = np.arctan2(side[1] * y, side[0] * x).ravel()
+    nodes, N, _ = mesh.locate(own, s.ravel())
+    moved = np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
+    place = mesh.surface.jets(own, s.ravel())[:, 0] + moved
+    place[:, :2] *= side.reshape(2, -1).T
+    c, t = np.cos(held.angle), np.sin(held.angle)
+    return place @ np.array([[c, t, 0.0], [-t, c, 0.0], [0.0, 0.0, 1.0]])

@@ -1,0 +1,210 @@
+"""Look a grasp map up between its candidates and forces, for planners: values, errors, and why there is none.
+
+Needs neither MPI nor PETSc. The file is read once and closed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from study.lookup.interpolation import Corners, FloatArray, Nodes, bends, blend, circle, corners, error, place, plain
+from study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
+from study.lookup.source import SNAPPED, Source, read_source, turning
+from study.storage.layout import DONE
+from study.storage.quantity import MODELS
+
+NUMBER = (float, int)
+
+
+class GraspMap:
+    """A result file as a function of station [m], angle [rad] and normal force [N].
+
+    Values lie on straight lines between the solved cases around a point. A point has no value (NaN) outside the map,
+    beside a case that failed or is missing, and between a case before and one after the wall has snapped in. Angles
+    repeat after the period that the object's symmetry gives; half a turn exchanges the fingers.
+
+    Parameters
+    ----------
+    file : path
+        Result file; one that a run is still writing will do.
+    where : mapping, optional
+        The point of a sweep: a value for each swept key, in the scene's words (``{"object.radius_mm": 20}``) or by the
+        axis' name in SI units.
+
+    Raises
+    ------
+    study.exits.StudyError
+        The file cannot be read.
+    ValueError
+        ``where`` does not name one point of the sweep.
+
+    Notes
+    -----
+    The error of a value is that of a straight line through a curve with the largest second derivative that the
+    neighbouring cases show, added up over the three axes. It says nothing about the error of the cases themselves,
+    which ``e_n_error`` and others tell if the scene has ``accuracy.meshes = 2``. Along an axis of two values there is
+    no second derivative, and up to a quarter of their difference stands in. What is narrower than the spacing of the
+    candidates stays unseen.
+    """
+
+    def __init__(self, file: str | Path, where: Mapping[str, Any] | None = None) -> None:
+        self.source: Source = read_source(Path(file), dict(where or {}))
+        station, angle, force = self.source.axes
+        self.by_poses = not station.units
+        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(self.source)
+        angles = circle("angle", "rad", angle.values, 0.0 if self.by_poses else period, half_turn)
+        stations = plain("candidate" if self.by_poses else "station", station.units, station.values, self.by_poses)
+        self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
+        self.shape = tuple(len(nodes.x) for nodes in self.axes)
+        self.done = self._grid(self.source.status == DONE)
+        self.snapped = self.done & (np.nan_to_num(self._grid(self.source.read("flags"))).astype(int) & SNAPPED > 0)
+        self._whole = self._whole_cells()
+        self._tables: dict[tuple[str, str], FloatArray] = {}
+        self._bends: dict[tuple[str, str], FloatArray] = {}
+        self._lists: dict[tuple[str, str], list[float]] = {}
+
+    @property
+    def quantities(self) -> dict[str, tuple[str, str]]:
+        """Unit and definition of everything that `value` knows."""
+        return dict(self.source.maps)
+
+    def at(
+        self, station: ArrayLike | None = None, angle: ArrayLike | None = None, force: ArrayLike | None = None, *,
+        station_mm: ArrayLike | None = None, angle_deg: ArrayLike | None = None, candidate: ArrayLike | None = None,
+    ) -> GraspPoint:  # fmt: skip
+        """A point of the map, or many: arrays are taken together as numpy broadcasts them.
+
+        Parameters
+        ----------
+        station, angle, force : float or array
+            m, rad, N; ``station_mm`` and ``angle_deg`` instead of the first two. The angle may be left out where the
+            map has one, or where the object looks the same from every side.
+        candidate : int or array of int
+            Number of an explicit pose, from 0, instead of station and angle.
+        """
+        if force is None:
+            raise ValueError("force is missing: give the normal force per finger in N")
+        if self.by_poses:
+            if candidate is None or not (station is angle is station_mm is angle_deg is None):
+                raise ValueError("the candidates of this map are explicit poses: give at(candidate=0, force=5)")
+            return self._point(candidate, 0.0, force)
+        if candidate is not None:
+            raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
+        along = _one(station, station_mm, 1e-3, "station")
+        turn = _one(
+            angle, angle_deg, math.pi / 180, "angle", self.source.axes[1].values[0] if self._one_angle else None
+        )
+        return self._point(along, turn, force)
+
+    def value(
+        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "curved"
+    ) -> FloatArray | float:
+        """One quantity at a station [m], angle [rad] and force [N]; NaN where there is none. Built to be fast.
+
+        With explicit poses ``station`` is the candidate's number and the angle does not count. Arrays give arrays.
+        """
+        try:
+            table = self._lists[name, model]
+        except KeyError:
+            table = self._lists[name, model] = self.table(name, model).tolist()
+        if (
+            not isinstance(station, float | int)
+            or not isinstance(angle, float | int)
+            or not isinstance(force, float | int)
+        ):
+            return self._point(station, angle, force).value(name, model)
+        one, two, three = self.axes
+        a, b, c = place(one.quick, station), place(two.quick, angle), place(three.quick, force)
+        if a is None or b is None or c is None:
+            return math.nan
+        (i, r), (j, s), (k, t) = a, b, c
+        p = self.shape[2]
+        n = (i * self.shape[1] + j) * p + k
+        if not self._whole[n]:
+            return self._point(station, angle, force).value(name, model)
+        m, q = n + p, n + self.shape[1] * p
+        u, z, y = q + p, 1.0 - t, 1.0 - s
+        low = y * (z * table[n] + t * table[n + 1]) + s * (z * table[m] + t * table[m + 1])
+        high = y * (z * table[q] + t * table[q + 1]) + s * (z * table[u] + t * table[u + 1])
+        return (1.0 - r) * low + r * high
+
+    def error(
+        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "curved"
+    ) -> FloatArray | float:
+        """Estimated error of `value` by the interpolation, in the quantity's unit; NaN where there is no value."""
+        return self._point(station, angle, force).error(name, model)
+
+    def table(self, name: str, model: str = "curved") -> FloatArray:
+        """Values of a quantity at the nodes, flat over station, angle (folded) and force; NaN for unsolved cases.
+
+        Per finger where ``name`` is that of a dataset such as ``fingers/f_x_max``: ``(nodes, 2, ...)``.
+        """
+        key = name, model
+        if key not in self._tables:
+            if model not in MODELS:
+                raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
+            grid = self._grid(self.source.read(name, model))
+            if "/" in name:
+                grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
+            grid = np.where(_like(self.done, grid, 0), grid, np.nan)
+            self._tables[key] = grid.reshape(-1, *grid.shape[3:])
+        return self._tables[key]
+
+    def interpolated(self, name: str, model: str, at: Corners) -> FloatArray:
+        """A quantity at many points, whether they can be trusted or not."""
+        found = blend(self.table(name, model), at)
+        return np.where(_like(at.swap, found, 0), found[:, ::-1], found) if "/" in name else found
+
+    def errors(self, name: str, model: str, at: Corners) -> FloatArray:
+        """Error of `interpolated` for a quantity of the case, at many points."""
+        key = name, model
+        if key not in self._bends:
+            self._bends[key] = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
+        return error(self._bends[key], at)
+
+    def states(self, at: Corners) -> np.ndarray:
+        """Position in `STATES` of many points."""
+        used, done, snapped = at.weight > 0, self.done.ravel()[at.index], self.snapped.ravel()[at.index]
+        across = (used & snapped).any(axis=1) & (used & ~snapped).any(axis=1)
+        kinds = [~at.inside.all(axis=1), (used & ~done).any(axis=1), across]
+        return np.select(kinds, [OUTSIDE, NO_RESULT, SNAP], INSIDE)
+
+    def _point(self, station: ArrayLike, angle: ArrayLike, force: ArrayLike) -> GraspPoint:
+        parts = np.broadcast_arrays(*(np.asarray(v, float) for v in (station, angle, force)))
+        flat = np.stack([part.ravel() for part in parts], axis=-1)
+        at = corners(self.axes, flat)
+        return GraspPoint(self, parts[0].shape, flat, at, self.states(at))
+
+    @property
+    def _one_angle(self) -> bool:
+        return len(self.source.axes[1].values) == 1 or self.axes[1].free
+
+    def _grid(self, values: np.ndarray) -> np.ndarray:
+        for axis, nodes in enumerate(self.axes):
+            values = np.take(values, nodes.take, axis=axis)
+        return values
+
+    def _whole_cells(self) -> list[bool]:
+        """Whether all corners of the cell above each node are solved and none is across a snap-in, flat."""
+        corner = np.stack([
+            np.roll(v, (-i, -j, -k), (0, 1, 2))
+            for v in (self.done & ~self.snapped, self.done & self.snapped) for i, j, k in np.ndindex(2, 2, 2)
+        ])  # fmt: skip
+        return (corner[:8].all(axis=0) | corner[8:].all(axis=0)).ravel().tolist()
+
+
+def _one(si: Any, other: Any, factor: float, name: str, default: Any = None) -> Any:
+    if (si is None) == (other is None) and not (si is other is None and default is not None):
+        raise ValueError(f"{name} is given {'twice' if si is not None else 'nowhere'}: give it once")
+    return default if si is other is None else si if other is None else np.asarray(other, float) * factor
+
+
+def _like(mask: np.ndarray, values: np.ndarray, lead: int = 1) -> np.ndarray:
+    """A mask with as many axes as the values that it is for; ``lead`` axes of the values come before it."""
+    return mask.reshape((1,) * lead + mask.shape + (1,) * (values.ndim - mask.ndim - lead))

@@ -1,0 +1,198 @@
+"""What a map says at one point, or at many at once: values with errors, the limit surfaces of both fingers, reasons."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from study.lookup.interpolation import Corners, FloatArray
+from study.storage.layout import MISSING
+from study.tables.ranking import FLAGS
+
+if TYPE_CHECKING:
+    from lsfit.surface import LimitSurface
+    from study.lookup import GraspMap
+
+STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
+INSIDE, OUTSIDE, NO_RESULT, SNAP = range(4)
+PEOPLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / math.pi), "Pa": ("MPa", 1e-6)}
+TOLD = ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "dent", "force_low", "force_high")
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPoint:
+    """A map at points of this ``shape``; numbers for one point, arrays for many. Made by ``GraspMap.at``.
+
+    Where a point is not inside, values are NaN and `reason` says why.
+    """
+
+    map: GraspMap
+    shape: tuple[int, ...]
+    place: FloatArray  # (m, 3) station [m], angle [rad], force [N] as asked for
+    corners: Corners
+    states: np.ndarray  # (m,)
+
+    @property
+    def state(self) -> Any:
+        """Position in `STATES`: 0 inside, 1 outside the map, 2 beside a case without result, 3 across a snap-in."""
+        return self._shaped(self.states)
+
+    @property
+    def ok(self) -> Any:
+        """Whether there are values."""
+        return self._shaped(self.states == INSIDE)
+
+    @property
+    def reason(self) -> Any:
+        """Why there is no value, in a sentence; empty where there is one."""
+        texts = [self._reason(i) for i in range(len(self.states))]
+        return texts[0] if not self.shape else np.array(texts, object).reshape(self.shape)
+
+    def value(self, name: str, model: str = "curved") -> Any:
+        """A quantity of the grasp, in SI units; NaN where there is none."""
+        found = self.map.interpolated(name, model, self.corners)
+        return self._shaped(np.where(self.states == INSIDE, found, np.nan))
+
+    def error(self, name: str, model: str = "curved") -> Any:
+        """Estimated error of `value` by the interpolation, in the quantity's unit; see `study.lookup.GraspMap`."""
+        found = self.map.errors(name, model, self.corners)
+        valid = (self.states == INSIDE) & np.isfinite(self.map.interpolated(name, model, self.corners))
+        return self._shaped(np.where(valid, found, np.nan))
+
+    def fingers(self, name: str, model: str = "curved") -> FloatArray:
+        """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
+        found = self.map.interpolated(name if "/" in name else f"fingers/{name}", model, self.corners)
+        found[self.states != INSIDE] = np.nan
+        return found.reshape(self.shape + found.shape[1:])
+
+    @property
+    def e_n(self) -> Any:
+        """Eccentricity parameter of the weaker finger, curved model [m]."""
+        return self.value("e_n")
+
+    @property
+    def quality(self) -> Any:
+        """Grasp quality, curved model [-]."""
+        return self.value("quality")
+
+    @property
+    def safety_factor(self) -> Any:
+        """How many times its weight the object could have; `KeyError` where the scene gives no mass."""
+        return self.value("safety_factor")
+
+    @property
+    def flags(self) -> Any:
+        """Flags of all cases around the point together (``study.tables.ranking.FLAGS``); 0 where there is no value."""
+        flags = np.nan_to_num(self.map.table("flags")[self.corners.index]).astype(int)
+        used = (self.corners.weight > 0) & (self.states == INSIDE)[:, None]
+        return self._shaped(np.bitwise_or.reduce(np.where(used, flags, 0), axis=1))
+
+    def semi_axes(self, model: str = "curved") -> FloatArray:
+        """Largest f_x, f_y, tau_z of each finger ``(..., 2, 3)`` [N, N, N m]: the ellipsoid from three motions."""
+        return self.fingers("limit_surface/semi_axes", model) * self.fingers("S")[..., None]
+
+    def coefficients(self, model: str = "curved") -> FloatArray:
+        """Coefficients of the fitted quartics ``(..., 2, 15)``, in the units of ``limit_surface/coefficients``."""
+        return self.fingers("limit_surface/coefficients", model)
+
+    def limit_surface(self, finger: int, model: str = "curved", fitted: bool = True) -> LimitSurface:
+        """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m], with ``support``, ``holds`` and the rest.
+
+        Between the cases the coefficients are interpolated: a mean of convex forms is convex, so the surface is.
+
+        Parameters
+        ----------
+        finger : 1 or 2
+        model : str
+            Friction model.
+        fitted : bool
+            The surface that the scene's ``[limit_surface]`` asks for; else the ellipsoid from three motions.
+
+        Raises
+        ------
+        ValueError
+            No value here, several points, or no fitted surface in all of the cases around.
+        """
+        from lsfit.ellipsoid import Ellipsoid
+        from lsfit.form import exponents
+        from lsfit.quartic import Quartic
+        from lsfit.tilted import TiltedEllipsoid
+
+        if finger not in (1, 2):
+            raise ValueError(f"finger is {finger!r}: expected 1 or 2")
+        if self.shape or self.reason:
+            raise ValueError(
+                self.reason if not self.shape else "limit surfaces are made one at a time: ask for one point"
+            )
+        if not fitted:
+            return Ellipsoid(self.semi_axes(model)[finger - 1])
+        S, rho = self.fingers("S")[finger - 1], self.fingers("limit_surface/rho")[finger - 1]
+        mu = self.fingers("f_x_max", "flat")[finger - 1] / S
+        P, A = self.coefficients(model)[finger - 1], self.fingers("limit_surface/matrix", model)[finger - 1]
+        unit = mu * S * np.array([1.0, 1.0, rho])
+        if np.isfinite(P).all():
+            return Quartic(P, exponents(3, 4)).scaled(unit)
+        if np.isfinite(A).all():
+            return TiltedEllipsoid(A).scaled(unit)
+        raise ValueError("the cases around have no fitted surface of one kind: take fitted=False")
+
+    def __str__(self) -> str:
+        """What people want to know at one point, in a few lines."""
+        if self.shape:
+            return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
+        axes, station, angle, force = self.map.axes, *self.place[0]
+        turn = [] if self.map.by_poses else [f"angle {_number(angle, 'rad')}"]
+        words = [f"{axes[0].name} {_number(station, axes[0].units)}", *turn, f"force {force:.5g} N"]
+        lines = [", ".join(words)]
+        if self.reason:
+            return f"{lines[0]}: {self.reason}"
+        for name in (n for n in TOLD if self.map.source.has(n)):
+            units, error = self.map.quantities[name][0], self.error(name)
+            lines.append(f"  {name:<13} {_number(self.value(name), units)}  +- {_number(error, units, 2)}")
+        lines += [f"  {meaning}" for mask, _, meaning in FLAGS if self.flags & mask]
+        return "\n".join(lines)
+
+    def _shaped(self, values: np.ndarray) -> Any:
+        return values.reshape(self.shape) if self.shape else values[0].item()
+
+    def _reason(self, i: int) -> str:
+        state, source = int(self.states[i]), self.map.source
+        if state == OUTSIDE:
+            return self._outside(i)
+        cases = self._cases(i)
+        if state == NO_RESULT:
+            bad = next(c for c, n in cases if not self.map.done.ravel()[n])
+            what = "is not solved yet" if source.status[bad] == MISSING else f"failed: {source.messages[bad]}"
+            return f"no value: the case beside it at {source.case(bad)} {what}"
+        if state == SNAP:
+            before, after = (next(c for c, n in cases if self.map.snapped.ravel()[n] == side) for side in (False, True))
+            return (
+                f"no value: the wall snaps in between {source.case(before)} and {source.case(after)};"
+                " ask at one of the solved cases"
+            )
+        return ""
+
+    def _outside(self, i: int) -> str:
+        a = int(np.argmin(self.corners.inside[i]))
+        nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.source.axes[a]
+        found = f"outside the map: {nodes.name} {_number(value, nodes.units)}"
+        if nodes.exact:
+            return f"{found}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
+        low, high = (_number(v, nodes.units) for v in (axis.values.min(), axis.values.max()))
+        return f"{found}, solved is {low}" + (f" to {high}" if low != high else " only")
+
+    def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
+        """Indices of the cases around a point along the file's axes, with their nodes."""
+        found = []
+        for n in self.corners.index[i][self.corners.weight[i] > 0]:
+            at = np.unravel_index(n, self.map.shape)
+            found.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
+        return found
+
+
+def _number(value: float, units: str, digits: int = 5) -> str:
+    unit, factor = PEOPLE.get(units, (units, 1.0))
+    return f"{value * factor:.{digits}g} {unit}".rstrip()

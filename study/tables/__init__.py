@@ -1,0 +1,1 @@
+"""What is said in terminals: best grasps, state, differences, exports."""
