@@ -67,7 +67,7 @@ def _header(data: bytes) -> tuple[str, list[Element], bytes]:
                     elements[-1].properties.append((name, KINDS[kind], ""))
     except (IndexError, KeyError, ValueError):
         found = b""
-    if not (found and lines[0] == ["ply"] and order is not None and _usable(elements)):
+    if not (found and lines[:1] == [["ply"]] and order is not None and _usable(elements)):
         raise MeshError("is no PLY file with a complete header; export it again")
     if sum(element.count for element in elements) <= len(data):  # or else a count is a lie, which is told better below
         for element in elements:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study.catalogue.model import Case, Catalogue, load_catalogue
+from study.catalogue.model import Case, Catalogue, first_of, load_catalogue
 from study.catalogue.outcome import Outcome, outcome
 from study.catalogue.scenes import case_scene
 from study.catalogue.table import table_text
@@ -106,7 +106,7 @@ def check_text(path: Path, overrides: Sequence[str]) -> str:
         if told and (case.expect != "refused" or not re.search(case.reason, told)):
             problems += [f"{path}: case '{case.name}': {line}" for line in told.splitlines()]
     if problems:
-        raise StudyError(USAGE, "\n".join(problems))
+        raise StudyError(USAGE, first_of(problems, path))
     expected = sum(c.expect == "refused" for c in catalogue.case)
     kinds = ", ".join(dict.fromkeys(c.kind for c in catalogue.case))
     late = f" ({expected - refused} of them only when poses are tried)" if refused < expected else ""

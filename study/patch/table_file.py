@@ -15,6 +15,7 @@ from study.patch.columns import CENTRE, CORNERS, NORMAL, UNITS, Column, used_col
 from study.patch.faces import Faces, corner_geometry, refuse
 from study.patch.reading import Reading, check_count
 from study.scene.errors import Problem, shown
+from study.tables.printable import shortened
 
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
 OPTION = {"length": "--unit", "area": "--unit", "pressure": "--pressure-unit"}
@@ -107,7 +108,7 @@ def _missing(table: Table, by_name: dict[str, Column], others: list[str], readin
         remedy = f"no column is {named}: give the column's name with --pressure-name"
     if others:
         remedy += f" (known units: {', '.join(unit for kind in OPTION for unit in UNITS[kind])})"
-    found = f"the columns {', '.join(h.strip() for h in table.headers)}"
+    found = f"the columns {shortened(', '.join(h.strip() for h in table.headers), 300)}"
     return [Problem(table.file, 1, "", found, f"also {', '.join(absent)}", remedy)]
 
 

@@ -16,8 +16,10 @@ import pytest
 
 from fem.mesh_check import MeshError
 from fem.mesh_file import read_polygons
+from study.catalogue.model import load_catalogue
 from study.cli import main
 from study.exits import OTHER_FILE, USAGE, StudyError
+from study.patch.reading import Reading, read_patch
 from study.scene import SceneError, load_scene, parse_scene
 from study.storage.store import open_result
 from study.storage.trial import trouble
@@ -310,3 +312,27 @@ def test_limits_are_stated_where_users_look():
 def test_the_seed_of_these_tests_is_a_scene(tmp_path):
     (tmp_path / "scene.toml").write_bytes(SCENE)
     assert load_scene(tmp_path / "scene.toml").cases == 4
+
+
+def test_a_ply_file_of_empty_lines_is_refused(tmp_path):
+    path = tmp_path / "empty.ply"
+    path.write_bytes(b"\n\nend_header\n")
+    with pytest.raises(MeshError, match="PLY"):
+        read_polygons(path)
+
+
+def test_names_of_columns_are_told_without_control_characters(tmp_path):
+    path = tmp_path / "patch.csv"
+    path.write_text("\x00x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa\n1,2,3,4,0,0,1,5\n")
+    with pytest.raises((StudyError, SceneError)) as told:
+        read_patch(str(path), Reading("mm", "kpa"))
+    assert "\\u0000x_mm" in str(told.value)
+    assert not UNPRINTABLE.search(str(told.value))
+
+
+def test_a_catalogue_tells_only_the_first_of_many_problems(tmp_path):
+    path = tmp_path / "cases.toml"
+    path.write_text("[[case]]\n" * 400)
+    with pytest.raises(StudyError, match="more problems") as told:
+        load_catalogue(path)
+    assert len(told.value.message.splitlines()) < 60
