@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from study.exits import USAGE, StudyError
-from study.scene.errors import MOST_TOLD, SceneError
+from study.scene.errors import SceneError, first_of
 from study.scene.loading import NAMES
 from study.scene.shape import Section
 from study.scene.text import parse_toml, read_text
@@ -136,12 +136,6 @@ def load_catalogue(path: Path) -> Catalogue:
     except ValidationError as error:
         lines = [f"{path}: {_place(e['loc'], cases)}{e['msg'].removeprefix('Value error, ')}" for e in error.errors()]
         raise StudyError(USAGE, first_of(lines, path)) from error
-
-
-def first_of(problems: list[str], path: Path) -> str:
-    """The first problems of a catalogue, and how many more there are."""
-    more = [f"{path}: and {len(problems) - MOST_TOLD} more problems"] if len(problems) > MOST_TOLD else []
-    return "\n".join([*problems[:MOST_TOLD], *more])
 
 
 def _with_sections(case: Any) -> Any:

@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study.catalogue.model import Case, Catalogue, first_of, load_catalogue
+from study.catalogue.model import Case, Catalogue, load_catalogue
 from study.catalogue.outcome import Outcome, outcome
 from study.catalogue.scenes import case_scene
 from study.catalogue.table import table_text
 from study.catalogue.verdict import judge
 from study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
+from study.scene.errors import first_of
 
 
 def folder_of(options: Namespace) -> Path:

@@ -8,7 +8,7 @@ from study.data import LIMITS, Data, number, shown
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 from study.storage.layout import DONE, FAILED, MISSING
-from study.tables.ranking import FLAGS, LOST, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS
+from study.tables.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS, passed_over
 from study.uncertainty.verdict import sure
 from study.uncertainty.verdict import verdict as judgement
 
@@ -166,13 +166,13 @@ def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
 
 def _passed_over(data: Data, best: tuple[int, ...]) -> list[str]:
     """Why the brightest place of the map is not the best grasp: those that cannot be used stand last."""
-    score = data.at(data.score, best)
-    better = [i for i in data.order(best[-1]) if data.lost[i] and data.at(data.score, i) > score * (1 + 1e-3)]
-    if data.lost[best] or not better:
+    order = data.order(best[-1])
+    scores = np.array([data.at(data.score, i) for i in order])
+    better, why = passed_over(scores, np.array([data.flags[i] for i in order], int))
+    if not better:
         return []
-    marks = int(np.bitwise_or.reduce([int(data.flags[i]) & LOST for i in better]))
-    why = " or ".join(name for bit, name, _ in FLAGS if marks & bit)
-    place, top = data.place(better[0]), number(data.at(data.score, better[0]) * data.units(data.score)[2])
+    highest = order[better[0]]
+    place, top = data.place(highest), number(data.at(data.score, highest) * data.units(data.score)[2])
     count = "One grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
     return [f"{count} higher at this force (the highest {top}, {place}) but cannot be used: {why}."]
 

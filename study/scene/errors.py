@@ -46,9 +46,14 @@ class SceneError(ValueError):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
-        more = len(self.problems) - MOST_TOLD
-        rest = [f"{self.problems[0].file}: and {more} more problems"] if more > 0 else []
-        super().__init__("\n".join([*map(str, self.problems[:MOST_TOLD]), *rest]))
+        super().__init__(first_of([str(p) for p in self.problems], self.problems[0].file if self.problems else ""))
+
+
+def first_of(lines: Sequence[str], file: object) -> str:
+    """The first problems of a file, and how many more there are."""
+    more = len(lines) - MOST_TOLD
+    rest = [f"{file}: and {more} more problems"] if more > 0 else []
+    return "\n".join([*lines[:MOST_TOLD], *rest])
 
 
 def key_text(path: KeyPath) -> str:

@@ -62,6 +62,20 @@ def ranking(score: np.ndarray, flags: np.ndarray) -> np.ndarray:
     return np.lexsort((-np.nan_to_num(score, nan=-np.inf), lost))
 
 
+def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
+    """Positions of the `LOST` grasps that score higher than the best usable one, the highest first, and what they lack.
+
+    >>> passed_over(np.array([1.0, 3.0, 2.0]), np.array([0, 1024, TOO_STRONG]))
+    ([1, 2], 'slips or too strong')
+    """
+    order = ranking(score, flags)
+    if not len(order) or flags[order[0]] & LOST or not np.isfinite(score[order[0]]):
+        return [], ""
+    better = [int(i) for i in order if flags[i] & LOST and score[i] > score[order[0]] * (1 + 1e-3)]
+    marks = int(np.bitwise_or.reduce([int(flags[i]) & LOST for i in better])) if better else 0
+    return better, " or ".join(name for bit, name, _ in FLAGS if marks & bit)
+
+
 def borne_level(status: np.ndarray, flags: np.ndarray) -> int | None:
     """Highest force level at which some solved grasp is neither too weak nor too strong; None where all forces are.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from study.storage.layout import DONE
 from study.tables.columns import DISPLAY, csv_text, with_unit
-from study.tables.ranking import BORNE, FLAGS, LOST, OF_FILE, borne_level, judged, ranking
+from study.tables.ranking import BORNE, LOST, OF_FILE, borne_level, judged, passed_over, ranking
 from study.tables.show_text import WINDOW, Columns, alike
 from study.tables.show_text import as_text as as_text
 from study.uncertainty.verdict import sure, verdict
@@ -81,7 +81,7 @@ def best(result: Any, force: float | None = None, top: int = 10, whole_lines: bo
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(result.layout.shape[:-1])]
     told = verdict(sure(result, scored[0], k), holding, same, scored[1])
-    told = " ".join(filter(None, [told, _passed_over(score, flags, order)]))
+    told = " ".join(filter(None, [told, _passed_over(score[done], flags[done])]))
     return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), told)
 
 
@@ -93,15 +93,11 @@ def _solved_elsewhere(result: Any) -> str:
     return f"; --force takes {', '.join(f'{f:g}' for f in result.axes[-1].values[solved])}"
 
 
-def _passed_over(score: np.ndarray, flags: np.ndarray, order: np.ndarray) -> str:
+def _passed_over(score: np.ndarray, flags: np.ndarray) -> str:
     """That grasps of a higher score than the best one stand last, and why."""
-    if not len(order) or flags[order[0]] & LOST or not np.isfinite(score[order[0]]):
-        return ""
-    better = [int(i) for i in order if flags[i] & LOST and score[i] > score[order[0]] * (1 + 1e-3)]
+    better, why = passed_over(score, flags)
     if not better:
         return ""
-    marks = int(np.bitwise_or.reduce([int(flags[i]) & LOST for i in better]))
-    why = " or ".join(name for bit, name, _ in FLAGS if marks & bit)
     count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
     return f"{count} higher but cannot be used and stand last: {why}"
 
