@@ -62,7 +62,7 @@ class Contact:
         self.nodal_instead = state.pad.contact != scene.accuracy.contact
         patch = extract(state.pad, state)
         self.patch: ContactPatch = seen(patch) if seen else patch
-        self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
+        self.frame: Frame = contact_frame(self.patch, X_OF_PAD, whole_face=True)
         self.local: ContactPatch = in_frame(self.patch, self.frame)
         self.rho = contact_length(self.local)
         mu = scene.friction.mu

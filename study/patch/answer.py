@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from friction.frame import FrameFlag
-from study.patch.evaluate import SPACE, Judged
+from friction.orientation import wound
+from study.patch.evaluate import SPACE, Judged, minority, told_of
 from study.patch.grasp import ANTIPODAL, Grasp
 from study.storage.quantity import MODELS
 
@@ -73,6 +74,9 @@ def _patch_remarks(judged: Judged) -> list[str]:
         if frame.flag & flag:
             share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
             told.append(sentence + share * (flag == FrameFlag.OVERHANG))
+    if frame.flag & FrameFlag.WINDING:
+        against = told_of(judged.read, minority(wound(judged.read.patch) < 0))
+        told.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
     for model in MODELS:
         failed = [name for name, fit in judged.surfaces[model].items() if fit.stands_in]
         if failed:

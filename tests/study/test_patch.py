@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from friction.frame import FrameFlag
 from friction.patch import ContactPatch
 from study.cli import main
 from study.patch.evaluate import SURFACES, judge
@@ -281,6 +282,29 @@ def test_overhanging_faces_are_counted(tmp_path, told):
     assert beyond > 0
     assert answer["patches"][0]["frame"]["overhang_count"] == beyond
     assert any(f"more than 90 deg from the contact normal: {beyond}" in text for text in answer["remarks"])
+
+
+def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):
+    """One cell wound the other way changes nothing but a note, which names it; without normals it is refused."""
+    points, cells, patch = faceted()
+    arrays = [("pressure", patch.pressure), ("Normals", patch.normal)]
+    right = vtk(tmp_path / "right.vtu", points, cells, arrays)
+    turned = cells.copy()
+    turned[40] = turned[40, ::-1]
+    other = vtk(tmp_path / "other.vtu", points, turned, arrays)
+    reading = "--unit", "m", "--pressure-unit", "pa"
+    one, two = told(right, *reading), told(other, *reading)
+    assert friction(two) == pytest.approx(friction(one), **SAME)
+    assert (one["patches"][0]["frame"]["flag"], two["patches"][0]["frame"]["flag"]) == (0, int(FrameFlag.WINDING))
+    [note] = set(two["remarks"]) - set(one["remarks"])
+    assert "1 of 135 loaded faces" in note
+    assert "cell 40" in note
+
+
+def test_a_whole_file_wound_against_its_normals_is_none_the_wiser(tmp_path, told):
+    points, cells, patch = faceted()
+    file = vtk(tmp_path / "a.vtu", points, cells[:, ::-1], [("pressure", patch.pressure), ("Normals", patch.normal)])
+    assert told(file, "--unit", "m", "--pressure-unit", "pa")["patches"][0]["frame"]["flag"] == 0
 
 
 def keys(record):
