@@ -182,7 +182,7 @@ def _on_the_whole(
 def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
     hint = np.asarray(x_hint, float)
     x = hint - (hint @ N) * N
-    if not np.linalg.norm(x) > 1e-9 * np.linalg.norm(hint):
+    if np.linalg.norm(x) <= CANCEL * np.linalg.norm(hint):
         raise ValueError(
             f"x_hint {hint.tolist()} is parallel to the contact normal {N.tolist()}: give another direction"
         )

@@ -39,7 +39,8 @@ DEFINITIONS = {
 }
 FRAME = {
     FrameFlag.CYCLE: "the contact normal is a mean, because its search went in a circle between faces",
-    FrameFlag.HOLE: "the centre of pressure lies over a hole of the patch, so the nearest face gave the contact frame",
+    FrameFlag.HOLE: "the centre of pressure lies over a hole of the loaded faces, so the nearest face gave the contact"
+    " frame",
     FrameFlag.NO_CORNERS: "the faces have no corners, so the face with the nearest centre gave the contact frame",
     FrameFlag.OVERHANG: "some loaded faces are turned more than 90 deg from the contact normal",
 }

@@ -16,7 +16,7 @@ from study.exits import USAGE, StudyError
 from study.patch.evaluate import Judged
 from study.storage.quantity import MODELS
 
-ANTIPODAL = np.radians(5.0)  # beyond this the study flags a grasp
+ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this the study flags a grasp; at 5 degrees rounding decides nothing
 ACROSS = 1e-6  # cosine between a normal and the line of the contacts: one across the line points neither way
 FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands
 
