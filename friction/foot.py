@@ -174,7 +174,7 @@ def _reference(q: FloatArray) -> FloatArray:
         flat = np.abs(det) <= STEEP * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
         step = np.stack([r[:, 1] * dv[:, 0] - r[:, 0] * dv[:, 1], r[:, 0] * du[:, 1] - r[:, 1] * du[:, 0]], axis=1)
         uv = np.clip(uv + np.where(flat[:, None], 3.0, step / np.where(flat, 1.0, det)[:, None]), -3.0, 3.0)
-        if (np.abs(step) <= 1e-14 * np.abs(det)[:, None]).all():
+        if (np.abs(step) <= TOLERANCE * np.abs(det)[:, None]).all():  # Newton squares it: rounding is reached
             break
     return uv
 
