@@ -7,12 +7,15 @@ from enum import IntFlag
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
-from friction.patch import ContactPatch, FloatArray, NoContactError
+from friction.foot import ContactFace, foot
+from friction.orientation import behind, firm, opposing, wound
+from friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
 
 MAX_ITERATIONS = 100
-TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both faces
+STILL = 1e-12  # change of the unit normal at which the iteration ends
+NEARLY = 1e-9  # change at which it may end too, after all passes: far from the file's origin rounding allows no less
+HALVED = 20  # passes after which the steps on a whole face are halved, again and again
 
 
 class FrameFlag(IntFlag):
@@ -20,10 +23,11 @@ class FrameFlag(IntFlag):
 
     CLEAN = 0
     CYCLE = 1  # origin and normal alternated between faces: the normal is their mean
-    HOLE = 2  # the line through the centre of pressure meets no face: the nearest face was taken
+    HOLE = 2  # the line through the centre of pressure meets no face: the nearest one was taken
     NO_CORNERS = 4  # the faces have no corners: the face with the nearest centre was taken
     ORIENTATION = 8  # neighbouring normals point to opposite sides: normal force and frame cannot be trusted
     OVERHANG = 16  # some loaded normals are more than 90 degrees away from the contact normal
+    WINDING = 32  # the corners of some faces are wound against their normals, which were taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +61,7 @@ class Frame:
     overhang_share: float = 0.0
 
 
-def contact_frame(patch: ContactPatch, x_hint: ArrayLike) -> Frame:
+def contact_frame(patch: ContactPatch, x_hint: ArrayLike, whole_face: bool = False) -> Frame:
     """Origin O, normal N and axes of the contact, found together by iteration.
 
     The line through the centre of pressure along N meets the contact area in O; N is the mean normal of the faces
@@ -66,9 +70,13 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike) -> Frame:
     Parameters
     ----------
     patch : ContactPatch
-        ``n`` faces in any frame; faces without load are left out.
+        ``n`` faces in any frame.
     x_hint : (3,) array
         Direction that becomes x after projection on the contact plane (the long side of the pad).
+    whole_face : bool
+        Whether the line may meet faces without load too, and the normal turns continuously from face to face, as
+        `friction.foot.ContactFace` says. Frames of neighbouring grasps are then neighbours, also where the centre of
+        pressure lies over a hole of the patch. By default faces without load are left out, as in the paper.
 
     Raises
     ------
@@ -80,32 +88,21 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike) -> Frame:
     S = load.sum()
     cop = (load[:, None] * faces.centroid).sum(axis=0) / S
     N = _direction((load[:, None] * faces.normal).sum(axis=0), S)
-    flag = FrameFlag.CLEAN if faces.corners is not None else FrameFlag.NO_CORNERS
-    visited: list[tuple[int, ...]] = []
-    for iterations in range(1, MAX_ITERATIONS + 1):
-        origin, met, missed = _foot(faces, cop, N)
-        new = _direction(faces.normal[met].mean(axis=0))
-        step, N = np.linalg.norm(new - N), new
-        if step < 1e-12:
-            break
-        key = tuple(met.tolist())
-        if key in visited or iterations == MAX_ITERATIONS:
-            start = visited.index(key) if key in visited else 0
-            union = sorted(set().union(*visited[start:]))
-            N = _direction(faces.normal[union].mean(axis=0))
-            origin, met, missed = _foot(faces, cop, N)
-            flag |= FrameFlag.CYCLE
-            break
-        visited.append(key)
-    if missed and faces.corners is not None:
-        flag |= FrameFlag.HOLE
-    below = faces.normal @ N < 0
-    if below.any():
+    faces = faces.only(firm(faces))
+    if whole_face:
+        origin, N, iterations, flag = _on_the_whole(ContactFace.of(patch), cop, N)
+    else:
+        origin, N, iterations, flag = _on_faces(faces, cop, N)
+    turned = behind(faces.normal, N)
+    if turned.any():
         flag |= FrameFlag.OVERHANG
-    if _orientation_is_mixed(faces, below):
+    side = wound(faces)
+    if opposing(faces, turned):
         flag |= FrameFlag.ORIENTATION
-    share = float(load[below].sum() / S)
-    return Frame(origin, _axes(N, x_hint), iterations, flag, cop, int(below.sum()), share)
+    elif side.min() < 0 < side.max():
+        flag |= FrameFlag.WINDING
+    share = float(faces.load[turned].sum() / S)
+    return Frame(origin, _axes(N, x_hint), iterations, flag, cop, int(turned.sum()), share)
 
 
 def in_frame(patch: ContactPatch, frame: Frame) -> ContactPatch:
@@ -131,7 +128,7 @@ def contact_length(patch: ContactPatch) -> float:
 
 def _direction(vector: FloatArray, scale: float = 1.0) -> FloatArray:
     length = np.linalg.norm(vector)
-    if length <= 1e-12 * scale:
+    if length <= CANCEL * scale:
         raise NoContactError(
             "the normals of the patch cancel, so the contact has no direction: check that all normals point to the "
             "same side and that the patch is one side of an object"
@@ -139,63 +136,55 @@ def _direction(vector: FloatArray, scale: float = 1.0) -> FloatArray:
     return vector / length
 
 
+def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[FloatArray, FloatArray, int, FrameFlag]:
+    """Origin, normal, passes and flag on plane faces."""
+    flag = FrameFlag.CLEAN if faces.corners is not None else FrameFlag.NO_CORNERS
+    visited: list[tuple[int, ...]] = []
+    for iterations in range(1, MAX_ITERATIONS + 1):
+        origin, met, missed = foot(faces, cop, N)
+        new = _direction(faces.normal[met].mean(axis=0))
+        step, N = np.linalg.norm(new - N), new
+        if step < STILL:
+            break
+        key = tuple(met.tolist())
+        if key in visited or iterations == MAX_ITERATIONS:
+            start = visited.index(key) if key in visited else 0
+            union = sorted(set().union(*visited[start:]))
+            N = _direction(faces.normal[union].mean(axis=0))
+            origin, met, missed = foot(faces, cop, N)
+            flag |= FrameFlag.CYCLE
+            break
+        visited.append(key)
+    if missed and faces.corners is not None:
+        flag |= FrameFlag.HOLE
+    return origin, N, iterations, flag
+
+
+def _on_the_whole(
+    face: ContactFace, cop: FloatArray, N: FloatArray
+) -> tuple[FloatArray, FloatArray, int, FrameFlag]:
+    """Origin, normal, passes and flag on one surface; steps are halved where they lead to and fro."""
+    flag, seen = FrameFlag.CLEAN, []
+    for iterations in range(1, MAX_ITERATIONS + 1):
+        origin, new, missed = face.foot(cop, N)
+        step = new - N
+        if np.linalg.norm(step) < STILL:
+            break
+        seen.append(new)
+        N = _direction(N + 0.5 ** (iterations // HALVED) * step)
+    if np.linalg.norm(step) > NEARLY:
+        N = _direction(np.mean(seen[-HALVED:], axis=0))
+        origin, _, missed = face.foot(cop, N)
+        flag |= FrameFlag.CYCLE
+    return origin, N, iterations, flag | FrameFlag.HOLE * missed
+
+
 def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
     hint = np.asarray(x_hint, float)
     x = hint - (hint @ N) * N
-    if not np.linalg.norm(x) > 1e-9 * np.linalg.norm(hint):
+    if np.linalg.norm(x) <= CANCEL * np.linalg.norm(hint):
         raise ValueError(
             f"x_hint {hint.tolist()} is parallel to the contact normal {N.tolist()}: give another direction"
         )
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(N, x), N])
-
-
-def _foot(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[FloatArray, np.ndarray, bool]:
-    """Point where the line ``cop + s N`` meets the patch, the faces that hold it, and whether it met none."""
-    offset = faces.centroid - cop
-    along = offset @ N
-    away = np.linalg.norm(offset - along[:, None] * N, axis=1)
-    slope = faces.normal @ N
-    steep = np.abs(slope) < 1e-9
-    s = np.where(steep, along, (offset * faces.normal).sum(axis=1) / np.where(steep, 1.0, slope))
-    met = np.array([], dtype=int) if faces.corners is None else _pierced(faces, cop, N, away, steep)
-    if len(met):
-        nearest = met[np.argmin(np.abs(s[met]))]
-        q = faces.corners[met]
-        warp = np.abs(((q - faces.centroid[met, None]) * faces.normal[met, None]).sum(axis=-1)).max(axis=1)
-        size = np.ptp(q, axis=1).max(axis=1)
-        met = met[np.abs(s[met] - s[nearest]) <= TOLERANCE * size + warp]
-        return cop + s[nearest] * N, met, False
-    met = np.flatnonzero(away <= away.min() + TOLERANCE * np.sqrt(faces.area.max()))
-    return cop + s[met].mean() * N, met, True
-
-
-def _pierced(faces: ContactPatch, cop: FloatArray, N: FloatArray, away: FloatArray, steep: np.ndarray) -> np.ndarray:
-    """Faces, edges included, that the line through ``cop`` along ``N`` runs through."""
-    offset = faces.corners - faces.centroid[:, None]
-    reach = np.sqrt(np.einsum("ikj,ikj->ik", offset, offset).max(axis=1))
-    near = np.flatnonzero((away <= (1 + 1e-6) * reach) & ~steep)
-    if not len(near):
-        return near
-    across = np.linalg.svd(N[None])[2][1:]
-    q = (faces.corners[near] - cop) @ across.T
-    d = np.roll(q, -1, axis=1) - q
-    side = d[..., 1] * q[..., 0] - d[..., 0] * q[..., 1]
-    slack = TOLERANCE * reach[near, None] * np.linalg.norm(d, axis=-1)
-    return near[(side >= -slack).all(axis=1) | (side <= slack).all(axis=1)]
-
-
-def _orientation_is_mixed(faces: ContactPatch, below: np.ndarray) -> bool:
-    """Whether some normals disagree with the mesh's winding, or oppose those of the faces next to them."""
-    if faces.corners is not None:
-        q = faces.corners
-        last = min(3, q.shape[1] - 1)
-        wound = np.einsum("ij,ij->i", np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1]), faces.normal)
-        if (wound > 0).any() and (wound < 0).any():
-            return True
-    if not below.any() or len(below) == 1:
-        return False
-    # A real overhang turns gradually from face to face; a flipped face opposes all its neighbours.
-    near = cKDTree(faces.centroid).query(faces.centroid[below], k=min(5, len(below)))[1]
-    cosines = np.einsum("ij,ikj->ik", faces.normal[below], faces.normal[near])
-    return bool((cosines < -0.5).any())

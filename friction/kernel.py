@@ -10,6 +10,10 @@ from numba import njit
 # Reordering of sums lets the loop fill the vector registers. Not among the flags: nnan and ninf, which would allow the
 # compiler to drop the test for a face at rest.
 _FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
+# Speed below which a face is at rest, for motions and arms that move no face faster than some 1: what rounding of both
+# leaves of a speed of 0. Its force would have its full size and a direction of chance.
+REST = 32 * 2.0**-52
+_REST_SQUARED = REST**2
 
 
 @njit(cache=True, fastmath=set(_FAST))
@@ -27,7 +31,7 @@ def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
     load : (n,) array
         Normal force of each face.
     twist : (m, 6) array
-        ``[v, omega]``.
+        ``[v, omega]``, scaled so that the largest of ``v`` and of ``omega`` times ``arm`` is some 1.
     out : (m, 7) array
         Receives force, torque and ``H = sum load |P v|``.
     """
@@ -41,7 +45,7 @@ def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
             vx, vy, vz = v0 - o2 * y + o1 * z, v1 + o2 * x - o0 * z, v2 + o0 * y - o1 * x
             cx, cy, cz = ny * vz - nz * vy, nz * vx - nx * vz, nx * vy - ny * vx
             q = cx * cx + cy * cy + cz * cz
-            s = load[i] / math.sqrt(q) if q > 0.0 else 0.0
+            s = load[i] / math.sqrt(q) if q > _REST_SQUARED else 0.0
             fx, fy, fz = s * (cy * nz - cz * ny), s * (cz * nx - cx * nz), s * (cx * ny - cy * nx)
             f0 += fx
             f1 += fy
@@ -61,6 +65,6 @@ def friction_sums_reference(arm, normal, load, twist):
         v = t[:3] + np.cross(t[3:], r)
         slip = v - (v * n).sum(axis=1, keepdims=True) * n
         speed = np.linalg.norm(slip, axis=1)
-        f = np.divide(load, speed, out=np.zeros_like(load), where=speed > 0)[:, None] * slip
+        f = np.divide(load, speed, out=np.zeros_like(load), where=speed > REST)[:, None] * slip
         rows.append([*f.sum(axis=0), *np.cross(r, f).sum(axis=0), (load * speed).sum()])
     return np.array(rows)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+CANCEL = 1e-6  # of what a sum of directions could reach: below it they cancel, and rounding could turn it by 1e-9
 
 
 class NoContactError(ValueError):
@@ -82,7 +83,10 @@ class ContactPatch:
     @property
     def loaded(self) -> ContactPatch:
         """The same patch without the faces that carry no force."""
-        keep = self.load > 0
+        return self.only(self.load > 0)  # exactly: no load is what the data say, and no result of a calculation
+
+    def only(self, keep: NDArray[np.bool_]) -> ContactPatch:
+        """The same patch without the faces that are not to be kept, ``(n,)``; itself if all are."""
         if keep.all():
             return self
         corners = None if self.corners is None else self.corners[keep]

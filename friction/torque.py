@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friction.kernel import friction_sums
-from friction.patch import ContactPatch, FloatArray, NoContactError
+from friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
 from friction.wrench import Model, checked_mu, model_faces
 
 MAX_CUTS = 2000
@@ -57,7 +57,7 @@ def _radius(patch: ContactPatch) -> float:
     """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
     r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
     weight = patch.load @ upright
-    if weight <= 1e-12 * patch.load.sum():
+    if weight <= CANCEL * patch.load.sum():
         raise NoContactError("all faces stand parallel to the contact normal: bring the patch into its contact frame")
     return float(patch.load @ (r * (1 + upright)) / weight)
 

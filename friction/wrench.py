@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 
 from friction.kernel import friction_sums
 from friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
-from friction.patch import ContactPatch, FloatArray
+from friction.patch import CANCEL, ContactPatch, FloatArray
 
 Model = Literal["curved", "flat", "projected", "unrolled"]
 MODELS: tuple[str, ...] = get_args(Model)
@@ -63,8 +63,8 @@ class FrictionLimits:
 
     @property
     def e_n_projected(self) -> float:
-        """Eccentricity parameter ``tau_z / (mu F_N)`` [m]; NaN if the normals cancel to ``F_N <= 0``."""
-        return self.e_n * self.S / self.F_N if self.F_N > 0 else math.nan
+        """Eccentricity parameter ``tau_z / (mu F_N)`` [m]; NaN if the normals cancel to `CANCEL` of S or less."""
+        return self.e_n * self.S / self.F_N if self.F_N > CANCEL * self.S else math.nan
 
     @property
     def per_unit_force(self) -> tuple[float, float, float]:

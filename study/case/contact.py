@@ -22,7 +22,7 @@ from study.storage.quantity import MODELS
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
+ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this misalignment a flag says so; at 5 degrees rounding decides nothing
 OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
@@ -62,7 +62,7 @@ class Contact:
         self.nodal_instead = state.pad.contact != scene.accuracy.contact
         patch = extract(state.pad, state)
         self.patch: ContactPatch = seen(patch) if seen else patch
-        self.frame: Frame = contact_frame(self.patch, X_OF_PAD)
+        self.frame: Frame = contact_frame(self.patch, X_OF_PAD, whole_face=True)
         self.local: ContactPatch = in_frame(self.patch, self.frame)
         self.rho = contact_length(self.local)
         mu = scene.friction.mu

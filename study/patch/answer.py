@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from friction.frame import FrameFlag
-from study.patch.evaluate import SPACE, Judged
+from friction.orientation import wound
+from study.patch.evaluate import SPACE, Judged, minority, told_of
 from study.patch.grasp import ANTIPODAL, Grasp
 from study.storage.quantity import MODELS
 
@@ -38,7 +39,8 @@ DEFINITIONS = {
 }
 FRAME = {
     FrameFlag.CYCLE: "the contact normal is a mean, because its search went in a circle between faces",
-    FrameFlag.HOLE: "the centre of pressure lies over a hole of the patch, so the nearest face gave the contact frame",
+    FrameFlag.HOLE: "the centre of pressure lies over a hole of the loaded faces, so the nearest face gave the contact"
+    " frame",
     FrameFlag.NO_CORNERS: "the faces have no corners, so the face with the nearest centre gave the contact frame",
     FrameFlag.OVERHANG: "some loaded faces are turned more than 90 deg from the contact normal",
 }
@@ -73,6 +75,9 @@ def _patch_remarks(judged: Judged) -> list[str]:
         if frame.flag & flag:
             share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
             told.append(sentence + share * (flag == FrameFlag.OVERHANG))
+    if frame.flag & FrameFlag.WINDING:
+        against = told_of(judged.read, minority(wound(judged.read.patch) < 0))
+        told.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
     for model in MODELS:
         failed = [name for name, fit in judged.surfaces[model].items() if fit.stands_in]
         if failed:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from friction.frame import Frame, FrameFlag, contact_frame, contact_length, in_frame
 from friction.motion import fibonacci_twists
+from friction.orientation import behind
 from friction.patch import ContactPatch, FloatArray, NoContactError
 from friction.torque import pure_torque
 from friction.wrench import FrictionLimits, Model, friction_limits, friction_wrench
@@ -26,6 +28,7 @@ from study.storage.quantity import MODELS
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")  # as a scene names them
 FITTED_ON = 500  # Fibonacci motions; a fit is judged on others
 EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
+EQUAL = 1e-6  # relative difference of extents, and difference of cosines, that decide nothing
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
 
 
@@ -118,19 +121,29 @@ def _frame(read: ReadPatch, long_side: FloatArray | None) -> Frame:
     except ValueError as error:
         raise StudyError(USAGE, f"{read.file}: --long-side: {str(error).replace('x_hint', 'the direction')}") from error
     if frame.flag & FrameFlag.ORIENTATION:
-        along = patch.normal @ frame.axes[2]
-        opposed = np.flatnonzero(along < 0 if 2 * (along < 0).sum() <= len(along) else along >= 0)
-        where = f" in {len(opposed)} of {len(along)} loaded faces, the first in {read.place(int(opposed[0]))}"
-        found = f"normals{where if len(opposed) else ''} that oppose their neighbours or the order of their corners"
+        turned = minority(behind(patch.normal, frame.axes[2]))
+        found = f"normals in {told_of(read, turned)} that oppose their neighbours"
         remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
         refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
     return frame
 
 
+def minority(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The chosen ones, or the others where the chosen ones are more than half."""
+    return ~chosen if 2 * chosen.sum() > len(chosen) else chosen
+
+
+def told_of(read: ReadPatch, chosen: NDArray[np.bool_]) -> str:
+    """How many of the loaded faces ``(n,)`` are chosen, and where the first of them stands in the file."""
+    first = f", the first in {read.place(int(np.argmax(chosen)))}" if chosen.any() else ""
+    return f"{int(chosen.sum())} of {len(chosen)} loaded faces{first}"
+
+
 def principal_direction(patch: ContactPatch) -> FloatArray:
     """Direction ``(3,)`` in which the loaded faces extend most, across their mean normal.
 
-    Where no direction is longer it is the file's axis that lies most nearly in the contact plane.
+    Where no direction is longer it is the file's axis that lies most nearly in the contact plane. Its largest component
+    is positive; of equally large ones the first.
     """
     faces = patch.loaded
     N = faces.load @ faces.normal
@@ -138,10 +151,10 @@ def principal_direction(patch: ContactPatch) -> FloatArray:
     across = np.eye(3) - np.outer(N, N)
     offset = (faces.centroid - faces.area @ faces.centroid / faces.area.sum()) @ across
     spread, directions = np.linalg.eigh(offset.T @ (faces.area[:, None] * offset))
-    if spread[2] - spread[1] <= 1e-6 * spread[2]:
-        return np.eye(3)[np.argmin(np.abs(N).round(9))]
+    if spread[2] - spread[1] <= EQUAL * spread[2]:
+        return np.eye(3)[np.argmax(np.abs(N) <= np.abs(N).min() + EQUAL)]
     longest = directions[:, 2]
-    return longest * np.sign(longest[np.argmax(np.abs(longest).round(9))])
+    return longest * np.sign(longest[np.argmax(np.abs(longest) >= np.abs(longest).max() - EQUAL)])
 
 
 def _fitted(local: ContactPatch, mu: float, rho: float, model: Model, limits: FrictionLimits) -> dict[str, Fitted]:

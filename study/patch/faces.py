@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from friction.orientation import slivers
 from friction.patch import ContactPatch, FloatArray
 from study.exits import USAGE, StudyError
 from study.scene.errors import Problem
@@ -98,8 +99,9 @@ def corner_geometry(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
 def checked(faces: Faces, flip: bool = False) -> ReadPatch:
     """The loaded faces as a contact patch; all that is wrong with them at once, by their places in the file."""
     refuse([*_not_finite(faces), *_negative(faces), *_implausible(faces)])
-    loaded = (faces.pressure > 0) & (faces.area > 0)
-    refuse([*_no_load(faces, loaded), *_no_area(faces), *_no_normal(faces, loaded)])
+    flat = faces.area == 0 if faces.corners is None else (faces.area == 0) | slivers(faces.corners)
+    loaded = (faces.pressure > 0) & ~flat
+    refuse([*_no_load(faces, loaded), *_no_area(faces, flat), *_no_normal(faces, loaded)])
     normal = -faces.normal if flip else faces.normal
     corners = None if faces.corners is None else faces.corners[loaded]
     patch = ContactPatch(faces.centroid[loaded], faces.area[loaded], normal[loaded], faces.pressure[loaded], corners)
@@ -166,9 +168,9 @@ def _no_load(faces: Faces, loaded: NDArray[np.bool_]) -> list[Problem]:
     return [Problem(faces.file, None, "pressure", found, expected, remedy)]
 
 
-def _no_area(faces: Faces) -> list[Problem]:
-    wrong = (faces.area == 0) & (faces.pressure > 0)
-    return _told(faces, wrong, "area", lambda i: f"0 under {faces.pressure[i]:g} Pa",
+def _no_area(faces: Faces, flat: NDArray[np.bool_]) -> list[Problem]:
+    """Faces without area under pressure; corners on one line give an area of rounding, which is none either."""
+    return _told(faces, flat & (faces.pressure > 0), "area", lambda i: f"0 under {faces.pressure[i]:g} Pa",
                  "an area above 0 where there is pressure; correct the face or set its pressure to 0")  # fmt: skip
 
 

@@ -16,7 +16,8 @@ from study.exits import USAGE, StudyError
 from study.patch.evaluate import Judged
 from study.storage.quantity import MODELS
 
-ANTIPODAL = np.radians(5.0)  # beyond this the study flags a grasp
+ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this the study flags a grasp; at 5 degrees rounding decides nothing
+ACROSS = 1e-6  # cosine between a normal and the line of the contacts: one across the line points neither way
 FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands
 
 
@@ -122,7 +123,7 @@ def _check_facing(one: Judged, two: Judged, line: FloatArray, distance: float) -
             f"--other: {two.read.file} has its contact at the same place as {one.read.file}; both files have to use "
             "the coordinates of one object",
         )
-    away = [j.read.file for j, towards in ((one, line), (two, -line)) if j.frame.axes[2] @ towards < 0]
+    away = [j.read.file for j, to in ((one, line), (two, -line)) if j.frame.axes[2] @ to < -ACROSS * distance]
     if len(away) == 2:
         raise StudyError(
             USAGE,

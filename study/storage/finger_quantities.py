@@ -13,8 +13,11 @@ FINGER = (
     finger("fingers", "S", "N", "pressure times area", "As the map, for each finger."),
     finger("fingers", "F_N", "N", "normal force", "As the map, for each finger."),
     finger("fingers", "travel", "m", "travel of the pad", "As the map, for each finger."),
-    finger("fingers", "frame_origin", "m", "origin of the contact frame", "In the pad's frame.", shape=(3,)),
-    finger("fingers", "frame_axes", "", "axes of the contact frame", "Rows x, y, z in the pad's frame.", shape=(3, 3)),
+    finger("fingers", "frame_origin", "m", "origin of the contact frame", "In the pad's frame: where"
+            " the line through the centre of pressure along z meets the pad's deformed face, loaded there or not.",
+            shape=(3,)),
+    finger("fingers", "frame_axes", "", "axes of the contact frame", "Rows x, y, z in the pad's frame; z is"
+            " the object's normal at the origin, the deformed face's own where no load is near.", shape=(3, 3)),
     finger("fingers", "frame_flag", "", "flag of the contact frame", "0: regular; otherwise a rule for a degenerate"
             " patch chose the frame."),
     finger("fingers", "pose_rotation", "", "rotation of the pad", "x_object = rotation x_pad + origin.", shape=(3, 3)),

@@ -102,7 +102,8 @@ MAPS = (
         "largest torque without a net force",
         "Largest torque about the contact normal that the"
         " contact carries while it transmits no force in its plane; tau_z_max comes with such a force where the"
-        " patch is not symmetric. Curved model, of the weaker finger.",
+        " patch is not symmetric, and is larger: up to 2 max(a, b) / (a + b) times where a pad bears on two ends with"
+        " loads a and b, because its origin lies between them. Curved model, of the weaker finger.",
     ),
     Quantity("S", "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity(
@@ -139,8 +140,9 @@ MAPS = (
         "",
         "flags of the case",
         "Sum of: 1 a contact carries no torque, 2 a contact carries no force"
-        " along an axis; contact frame: 4 normal averaged over a cycle, 8 centre of pressure over a hole, 16 no"
-        " corners, 32 mixed orientation, 64 overhanging normals; 256 contacts more than 5 degrees from antipodal;"
+        " along an axis; contact frame: 4 normal averaged over a cycle, 8 no face on the line through the centre of"
+        " pressure, 16 no corners, 32 mixed orientation, 64 overhanging normals, 128 corners of some faces wound"
+        " against their normals, which were taken; 256 contacts more than 5 degrees from antipodal;"
         " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
         " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
         " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"

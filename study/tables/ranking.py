@@ -19,10 +19,11 @@ LOST = 1024 | 2048 | BORNE  # of a grasp that does not hold, or does harm, as it
 FLAGS = (  # as study.storage.quantities defines them
     (1, "no torque", "a contact carries no torque about its normal"),
     (2, "no force", "a contact carries no force along one of its axes"),
-    (8, "hole", "the centre of pressure lies over a hole of the patch"),
+    (8, "hole", "the line through the centre of pressure along the contact normal misses the contact area"),
     (4 + 16, "frame", "the contact frame came from a rule for degenerate patches"),
     (32, "mixed", "normals of a patch point to opposite sides: its normal force and frame cannot be trusted"),
     (64, "overhang", "some loaded faces of a patch are turned more than 90 deg from the contact normal"),
+    (128, "winding", "corners of some faces of a patch are wound against their normals, which were taken as they are"),
     (256, "askew", "contacts more than 5 deg from antipodal"),
     (512, "nodal", "solved with nodal gaps, because weighted ones had no solution"),
     (1024, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"),

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 from friction.motion import TURN_Z
-from friction.patch import NoContactError, moved
+from friction.patch import ContactPatch, NoContactError, moved
 from friction.torque import pure_torque
 from friction.wrench import friction_limits, friction_support, friction_wrench
 from tests.generators import build, cylinder_grid, lcg_patch, points_patch, rect_grid
@@ -35,6 +35,64 @@ def test_three_equal_supports_turn_about_the_point_of_fermat(corner):
     squares = sum(np.sum((r[i] - r[i - 1]) ** 2) for i in range(3))
     exact = math.sqrt(squares / 2 + 2 * math.sqrt(3) * corner[1] / 2)
     assert pure_torque(points_patch(r, [2.0, 2.0, 2.0]), 0.4) == pytest.approx(0.4 * 2 * exact, rel=1e-9)
+
+
+def test_of_two_points_the_pure_torque_turns_about_the_heavier_one():
+    """``mu F_2 d`` about the heavier point and ``2 mu d F_1 F_2 / (F_1 + F_2)`` about the centre of pressure.
+
+    Their ratio, twice the heavier point's share of the load, is at most 2; no plane patch has more about its centre of
+    pressure, for the distances to it add up to at most twice those to the median.
+    """
+    for heavy in (0.5, 0.6, 0.9, 0.999):
+        patch = centred(points_patch([[-0.02, 0], [0.03, 0]], [heavy, 1 - heavy]))
+        about_cop = friction_limits(patch, 0.8).tau_z
+        assert about_cop == pytest.approx(0.8 * 2 * 0.05 * heavy * (1 - heavy), rel=1e-12)
+        assert about_cop / pure_torque(patch, 0.8) == pytest.approx(2 * heavy, rel=1e-8)
+    for seed in range(20):
+        patch = lcg_patch(seed, 12)
+        flat = centred(replace(patch, pressure=patch.pressure**8, normal=np.tile([0.0, 0, 1], (12, 1))))
+        ratio = friction_limits(flat, 1.0).tau_z / pure_torque(flat, 1.0)
+        assert 1 <= ratio <= 2
+
+
+# A pad over a waist, which bears on its two ends: of each end load [N], place and length along the pad, width [mm], as
+# rectangles with the second moments of the solved pressures; and tau_z_max / tau_pure of the solved patches. These are
+# stations 64.7 mm at 1 and 2 N and 69.1 mm at 1 N of jobs/bottle-rigid.toml.
+TWO_ENDS = [
+    ((0.886, -6.267, 5.519, 10.746), (0.135, 41.279, 2.030, 6.465), 1.2786),
+    ((1.616, -9.610, 9.078, 11.810), (0.425, 36.507, 5.651, 8.589), 1.2416),
+    ((0.275, -35.097, 2.574, 8.213), (0.745, 12.959, 4.977, 10.005), 1.2837),
+]
+
+
+def two_ends(*ends):
+    """Uniformly loaded rectangles ``(load, place, length, width)`` in a row along x."""
+    parts = [rect_grid(length, width, 24, 24) for _, _, length, width in ends]
+    places, loads = [place for _, place, *_ in ends], [load for load, *_ in ends]
+    pressure = np.repeat([load / part.area.sum() for load, part in zip(loads, parts, strict=True)], 24**2)
+    r = [np.add(part.centroid, [place, 0, 0]) for place, part in zip(places, parts, strict=True)]
+    return replace(stacked(*parts), centroid=np.concatenate(r), pressure=pressure)
+
+
+def stacked(*parts):
+    names = ("centroid", "area", "normal", "pressure")
+    return ContactPatch(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+@pytest.mark.parametrize(("one", "two", "solved"), TWO_ENDS)
+def test_a_pad_that_bears_on_two_ends_unequally_has_more_torque_about_its_centre_than_without_force(one, two, solved):
+    """More than 10 % is right there: the centre of pressure lies between the ends, the median on the heavier one.
+
+    The torque about the centre of pressure comes with a net force of up to the difference of the loads. Equal ends at
+    the same places have none of this.
+    """
+    patch = centred(two_ends(one, two))
+    about_cop = friction_limits(patch, 0.8).tau_z
+    assert about_cop / pure_torque(patch, 0.8) == pytest.approx(solved, rel=2e-3)
+    force = np.linalg.norm(friction_wrench(patch, TURN_Z, 0.8)[0, :2])
+    assert 0.8 * abs(one[0] - two[0]) * 0.8 < force < 0.8 * abs(one[0] - two[0])
+    alike = centred(two_ends((1.0, *one[1:]), (1.0, *two[1:])))
+    assert friction_limits(alike, 0.8).tau_z / pure_torque(alike, 0.8) < 1.005
 
 
 def rectangle(field):

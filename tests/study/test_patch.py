@@ -7,14 +7,21 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from friction.frame import FrameFlag
 from friction.patch import ContactPatch
+from study.case.contact import ANTIPODAL as CASE_ANTIPODAL
+from study.case.contact import angles
 from study.cli import main
-from study.patch.evaluate import SURFACES, judge
+from study.exits import StudyError
+from study.patch.evaluate import SURFACES, judge, principal_direction
 from study.patch.faces import corner_geometry
+from study.patch.grasp import ANTIPODAL, _angle, _check_facing
 from study.patch.picture import PLANES, section
 from study.patch.reading import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
@@ -281,6 +288,76 @@ def test_overhanging_faces_are_counted(tmp_path, told):
     assert beyond > 0
     assert answer["patches"][0]["frame"]["overhang_count"] == beyond
     assert any(f"more than 90 deg from the contact normal: {beyond}" in text for text in answer["remarks"])
+
+
+def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):
+    """One cell wound the other way changes nothing but a note, which names it; without normals it is refused."""
+    points, cells, patch = faceted()
+    arrays = [("pressure", patch.pressure), ("Normals", patch.normal)]
+    right = vtk(tmp_path / "right.vtu", points, cells, arrays)
+    turned = cells.copy()
+    turned[40] = turned[40, ::-1]
+    other = vtk(tmp_path / "other.vtu", points, turned, arrays)
+    reading = "--unit", "m", "--pressure-unit", "pa"
+    one, two = told(right, *reading), told(other, *reading)
+    assert friction(two) == pytest.approx(friction(one), **SAME)
+    assert (one["patches"][0]["frame"]["flag"], two["patches"][0]["frame"]["flag"]) == (0, int(FrameFlag.WINDING))
+    [note] = set(two["remarks"]) - set(one["remarks"])
+    assert "1 of 135 loaded faces" in note
+    assert "cell 40" in note
+
+
+def test_a_whole_file_wound_against_its_normals_is_none_the_wiser(tmp_path, told):
+    points, cells, patch = faceted()
+    file = vtk(tmp_path / "a.vtu", points, cells[:, ::-1], [("pressure", patch.pressure), ("Normals", patch.normal)])
+    assert told(file, "--unit", "m", "--pressure-unit", "pa")["patches"][0]["frame"]["flag"] == 0
+
+
+def test_the_direction_of_a_patch_hangs_on_no_rounding():
+    """Of a square pressed evenly the file's axis nearest to its plane, of equal components the first, positive."""
+    rng = np.random.default_rng(0)
+    r = np.array([[x, y, 0.0] for x in (-1, 1) for y in (-1, 1)])
+    long = r * [2.0, 1.0, 1.0]
+    half = 0.5000000005  # two equal components at which the ninth decimal place turns
+    leaning = Rotation.align_vectors([[half, half, np.sqrt(1 - 2 * half**2)]], [[0, 0, 1]])[0]
+    cases = [
+        (r, leaning, [1, 0, 0]),
+        (r, Rotation.from_euler("x", 0.3), [1, 0, 0]),
+        (r, Rotation.from_rotvec([-np.pi / 4, 0, 0]) * Rotation.from_euler("z", 0.2), [1, 0, 0]),
+        (r, Rotation.align_vectors([[1, 1, 1]], [[0, 0, 1]])[0], [1, 0, 0]),
+        (long, Rotation.from_euler("z", -np.pi / 4), np.array([1, -1, 0]) / np.sqrt(2)),
+        (long, Rotation.from_euler("z", 3 * np.pi / 4), np.array([1, -1, 0]) / np.sqrt(2)),
+    ]
+    for places, turn, expected in cases:
+        for _ in range(40):
+            noise = 4e-16 * rng.uniform(-1, 1, (2, 4, 3))
+            normals = turn.apply(np.tile([0.0, 0, 1], (4, 1))) + noise[1]
+            patch = ContactPatch(turn.apply(places) + noise[0], np.ones(4), normals, np.ones(4))
+            np.testing.assert_allclose(principal_direction(patch), expected, atol=1e-9)
+
+
+def test_a_grasp_at_five_degrees_or_across_its_line_hangs_on_no_rounding():
+    """Contacts at exactly 5 degrees are antipodal; a normal across the line points neither way, one 1e-5 off does."""
+
+    def facing(turn, normal):
+        pair = [
+            SimpleNamespace(rho=0.02, frame=SimpleNamespace(axes=turn.apply([X, Y, n])), read=SimpleNamespace(file="a"))
+            for n in (normal, Z)
+        ]
+        _check_facing(*pair, turn.apply([0, 0, 0.06]), 0.06)
+
+    X, Y, Z = np.eye(3)
+    tilt = np.radians(5.0)
+    for turn in Rotation.random(200, random_state=1):
+        N1, N2, N3 = turn.apply([[0, np.sin(a), np.cos(a)] for a in (0, np.pi + tilt, np.pi + tilt + 1e-5)])
+        assert not _angle(N1, -N2) > ANTIPODAL
+        assert _angle(N1, -N3) > ANTIPODAL
+        contacts = [SimpleNamespace(origin=0.06 * k * N1, normal=n) for k, n in enumerate((N1, N2))]
+        assert not max(angles(*contacts)) > CASE_ANTIPODAL
+        with pytest.raises(StudyError, match="away from the other contact and those of the other towards it"):
+            facing(turn, Y)  # the second one looks away, the first one neither way
+        with pytest.raises(StudyError, match="point away from each other"):
+            facing(turn, [0, 1, -1e-5])
 
 
 def keys(record):

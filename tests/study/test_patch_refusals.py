@@ -62,6 +62,8 @@ CORNER_HEAD = ",".join(f"{c}{k}_mm" for k in (1, 2, 3) for c in "xyz") + ",press
          ["normals in 1 of 3 loaded faces", "the first in line 3", "same side"]),
         (f"{CORNER_HEAD.replace('z3_mm', 'c')}\n0,0,0,1,0,0,0,1,0,5", ":1", ["also z3"]),
         (f"{CORNER_HEAD}\n0,0,0,1,0,0,2,0,0,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", ["area: found 0"]),
+        # on a line too, but rounding leaves an area of 2e-23 m^2
+        (f"{CORNER_HEAD}\n.1,.1,.1,.2,.2,.8,.3,.3,1.5,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", ["area: found 0"]),
     ],
 )  # fmt: skip
 def test_a_table_that_is_no_patch(tmp_path, refused, text, place, parts):

@@ -1,0 +1,191 @@
+"""Where a line meets a contact area: on plane faces, or on one surface whose normal turns continuously."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from friction.orientation import slivers
+from friction.patch import CANCEL, ContactPatch, FloatArray
+
+TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both faces
+SAME = 1e-6  # of a usual face's size: corners no farther apart are one
+STEEP = 1e-9  # cosine between a line and a face's normal, below which the line runs along the face
+UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
+NEWTON = 20  # iterations, of which bilinear faces take three or four
+
+
+class Foot(NamedTuple):
+    """Point of a contact area on a line, the numbers of the faces that hold it, and whether the line misses all."""
+
+    point: FloatArray
+    met: np.ndarray
+    missed: bool
+
+
+def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
+    """Where the line ``start + s N`` meets the faces, with the least ``abs(s)``; without corners the nearest centre.
+
+    Of two places that are equally near the one along ``N`` counts. A line through an edge meets the faces on both
+    sides; slivers are met by none. A line that meets nothing has its foot on the plane of the face, or the mean of the
+    planes of several, whose centre is nearest.
+    """
+    offset = faces.centroid - start
+    along = offset @ N
+    away = np.linalg.norm(offset - along[:, None] * N, axis=1)
+    slope = faces.normal @ N
+    steep = np.abs(slope) < STEEP
+    s = np.where(steep, along, (offset * faces.normal).sum(axis=1) / np.where(steep, 1.0, slope))
+    met = np.array([], dtype=int) if faces.corners is None else _pierced(faces, start, N, away, steep)
+    if len(met):
+        q = faces.corners[met]
+        warp = np.abs(((q - faces.centroid[met, None]) * faces.normal[met, None]).sum(axis=-1)).max(axis=1)
+        margin = TOLERANCE * np.ptp(q, axis=1).max(axis=1) + warp
+        nearest = met[_nearest(s[met], margin)]
+        met = met[np.abs(s[met] - s[nearest]) <= margin]
+        return Foot(start + s[nearest] * N, met, False)
+    met = np.flatnonzero(away <= away.min() + TOLERANCE * np.sqrt(faces.area.max()))
+    return Foot(start + s[met].mean() * N, met, True)
+
+
+def _nearest(s: FloatArray, margin: FloatArray) -> int:
+    """Position of the least ``abs(s)``; of those that are equal within the margin, the one with the largest ``s``."""
+    tied = np.flatnonzero(np.abs(s) <= np.abs(s).min() + margin)
+    return int(tied[np.argmax(s[tied])])
+
+
+def _pierced(faces: ContactPatch, start: FloatArray, N: FloatArray, away: FloatArray, steep: np.ndarray) -> np.ndarray:
+    """Faces, edges included, that the line through ``start`` along ``N`` runs through."""
+    offset = faces.corners - faces.centroid[:, None]
+    reach = np.sqrt(np.einsum("ikj,ikj->ik", offset, offset).max(axis=1))
+    near = np.flatnonzero((away <= (1 + 1e-6) * reach) & ~steep)
+    if not len(near):
+        return near
+    q = (faces.corners[near] - start) @ _across(N).T
+    d = np.roll(q, -1, axis=1) - q
+    side = d[..., 1] * q[..., 0] - d[..., 0] * q[..., 1]
+    slack = TOLERANCE * reach[near, None] * np.linalg.norm(d, axis=-1)
+    return near[(side >= -slack).all(axis=1) | (side <= slack).all(axis=1)]
+
+
+def _across(N: FloatArray) -> FloatArray:
+    """Two directions ``(2, 3)`` at right angles to ``N`` and to each other."""
+    return np.linalg.svd(N[None])[2][1:]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFace:
+    """One surface of bilinear faces, loaded or not, whose normal is bilinear between the corners.
+
+    Parameters
+    ----------
+    corners, normal : (n, 4, 3) arrays
+        Corners around each face [m] and the normals there, unit vectors; faces that share a corner share both.
+    """
+
+    corners: FloatArray
+    normal: FloatArray
+
+    @classmethod
+    def of(cls, patch: ContactPatch) -> ContactFace:
+        """The contact face of a pad from all faces of its patch, the unloaded ones included.
+
+        The normal at a corner is the mean of those of the faces around it. A face counts with its normal, which is
+        the object's, times its load, and with the normal of its own plane times a small share `UNLOADED` of the mean
+        load: where there is no load the object may be far away, and its nearest point jump.
+        """
+        q = patch.corners
+        if q is None or q.shape[1] != 4:
+            found = "none" if q is None else f"{q.shape[1]}"
+            raise ValueError(f"corners: found {found} around each face, expected 4; a contact face has quadrilaterals")
+        own = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
+        length = np.linalg.norm(own, axis=1)
+        own = own * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
+        sense = patch.load @ (own * patch.normal).sum(axis=1) / patch.load.sum()
+        if abs(sense) <= CANCEL:
+            raise ValueError("corners: found faces that are wound both ways about their normals, expected one sense")
+        own *= np.sign(sense)
+        share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * own
+        corner = _numbered(q.reshape(-1, 3), SAME * np.median(np.ptp(q, axis=1).max(axis=1)))
+        weight = np.repeat(share, 4, axis=0)
+        total = np.column_stack([np.bincount(corner, weight[:, k]) for k in range(3)])
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return cls(q, (total / np.where(length > 0, length, 1.0))[corner].reshape(q.shape))
+
+    @cached_property
+    def _middle(self) -> FloatArray:
+        return self.corners.mean(axis=1)
+
+    @cached_property
+    def _reach(self) -> FloatArray:
+        return np.linalg.norm(self.corners - self._middle[:, None], axis=2).max(axis=1)
+
+    def foot(self, start: FloatArray, N: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
+        """Where the line ``start + s N`` meets the face, the normal there, and whether the line misses the face.
+
+        Of several places the one with the least ``abs(s)``, as in `foot`; beside a face that the line misses, the
+        point of its rim that is nearest to the line, moved onto the line.
+        """
+        offset = self._middle - start
+        along = offset @ N
+        near = np.flatnonzero((offset**2).sum(axis=1) - along**2 <= (1 + TOLERANCE) * self._reach**2)
+        across = _across(N).T
+        q = (self.corners[near] - start) @ across
+        uv = _reference(q)
+        weights = _bilinear(*uv.T)
+        left = np.linalg.norm(np.einsum("nk,nkc->nc", weights, q), axis=1)
+        hit = (np.abs(uv) <= 1 + TOLERANCE).all(axis=1) & (left <= TOLERANCE * self._reach[near])
+        near, weights = near[hit], weights[hit]
+        missed = not len(near)
+        if missed:
+            near, weights = _beside((self.corners - start) @ across)
+        s = np.einsum("nk,nkc->nc", weights, self.corners[near] - start) @ N
+        k = _nearest(s, TOLERANCE * np.ptp(self.corners[near], axis=1).max(axis=1))
+        normal = weights[k] @ self.normal[near[k]]
+        return start + s[k] * N, normal / np.linalg.norm(normal), missed
+
+
+def _numbered(points: FloatArray, apart: float) -> np.ndarray:
+    """Numbers ``(n,)`` that are the same for points ``(n, 3)`` no more than ``apart`` from each other."""
+    number = np.arange(len(points))
+    pairs = cKDTree(points, balanced_tree=False).query_pairs(apart, output_type="ndarray")
+    np.minimum.at(number, pairs.max(axis=1), pairs.min(axis=1))
+    return number
+
+
+def _bilinear(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Shape functions ``(n, 4)`` of the corners at ``-1 <= u, v <= 1``."""
+    return np.stack([(1 - u) * (1 - v), (1 + u) * (1 - v), (1 + u) * (1 + v), (1 - u) * (1 + v)], axis=-1) / 4
+
+
+def _reference(q: FloatArray) -> FloatArray:
+    """Coordinates ``u, v`` ``(n, 2)`` of the point 0 in plane quadrilaterals ``(n, 4, 2)``, by Newton's method."""
+    uv = np.zeros((len(q), 2))
+    for _ in range(NEWTON):
+        u, v = uv.T
+        r = np.einsum("nk,nkc->nc", _bilinear(u, v), q)
+        du = ((q[:, 1] - q[:, 0]) * (1 - v)[:, None] + (q[:, 2] - q[:, 3]) * (1 + v)[:, None]) / 4
+        dv = ((q[:, 3] - q[:, 0]) * (1 - u)[:, None] + (q[:, 2] - q[:, 1]) * (1 + u)[:, None]) / 4
+        det = du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0]
+        flat = np.abs(det) <= STEEP * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
+        step = np.stack([r[:, 1] * dv[:, 0] - r[:, 0] * dv[:, 1], r[:, 0] * du[:, 1] - r[:, 1] * du[:, 0]], axis=1)
+        uv = np.clip(uv + np.where(flat[:, None], 3.0, step / np.where(flat, 1.0, det)[:, None]), -3.0, 3.0)
+        if (np.abs(step) <= TOLERANCE * np.abs(det)[:, None]).all():  # Newton squares it: rounding is reached
+            break
+    return uv
+
+
+def _beside(q: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    """Number of the face and weights of its corners for the point of all edges nearest to 0; ``q (n, 4, 2)``."""
+    d = np.roll(q, -1, axis=1) - q
+    square = (d**2).sum(axis=-1)
+    t = np.clip(-(q * d).sum(axis=-1) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    away = np.linalg.norm(q + t[..., None] * d, axis=-1)
+    face, k = np.unravel_index(int(np.argmin(away)), away.shape)
+    weights = np.zeros((1, 4))
+    weights[0, k], weights[0, (k + 1) % 4] = 1 - t[face, k], t[face, k]
+    return np.array([face]), weights

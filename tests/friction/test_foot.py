@@ -1,0 +1,166 @@
+"""The contact frame on the whole contact face of a pad: continuous over holes, exact on smooth surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.spatial.transform import Rotation
+
+from friction.foot import ContactFace, foot
+from friction.frame import FrameFlag, contact_frame
+from tests.friction.test_decisions import REPEATABLE, seeds, shaken
+from tests.generators import cyl_mesh, cylinder_grid, grid_mesh, mesh_patch
+
+X = np.array([1.0, 0.0, 0.0])
+
+
+def height(x, y):
+    return 0.3 * (1 - x**2)
+
+
+def bridge(share, n=24, gap=0.25):
+    """A pad that is bent as a parabola and loaded at both sides of a gap, ``share`` of the force on the right one.
+
+    The nearest points of the object lie on the lips of the gap: the object's normals over it point inwards from both
+    sides, and jump in the middle.
+    """
+    patch = mesh_patch(grid_mesh(n, 6, 1, 0.4, height))
+    x = patch.centroid[:, 0]
+    over = np.abs(x) < gap
+    lips = np.column_stack([np.sign(x), 0 * x, 0.1 + 0 * x])
+    pressure = np.where(over, 0.0, np.where(x > 0, share, 1 - share))
+    return replace(patch, normal=np.where(over[:, None], lips, patch.normal), pressure=pressure)
+
+
+def frames(shares):
+    return [contact_frame(bridge(share), X, whole_face=True) for share in shares]
+
+
+def test_over_a_hole_the_frame_stands_on_the_face_itself():
+    """By symmetry in the middle, at a corner; the planes of the nearest loaded faces meet above it."""
+    patch = bridge(0.5)
+    frame = contact_frame(patch, X, whole_face=True)
+    assert frame.flag == FrameFlag.CLEAN
+    np.testing.assert_allclose(frame.origin, [0, 0, height(0.0, 0.0)], atol=1e-12)
+    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-9)
+    without = contact_frame(patch, X)
+    assert without.flag == FrameFlag.HOLE
+    assert without.origin[2] == pytest.approx(0.3 * (1 + 1 / 4 * 1 / 3), rel=1e-12)
+
+
+def test_the_frame_over_a_hole_is_continuous_where_that_of_loaded_faces_jumps():
+    """The largest change over a step of the share is in proportion to the step; that of a jump is not."""
+
+    def largest(found, count):
+        places = np.array([np.concatenate([f.origin, f.axes[2]]) for f in found])
+        return np.abs(np.diff(places, axis=0)).max() * count
+
+    coarse, fine = (np.linspace(0.2, 0.8, count + 1) for count in (40, 160))
+    assert largest(frames(fine), 160) == pytest.approx(largest(frames(coarse), 40), rel=0.35)
+    jumps = [largest([contact_frame(bridge(share), X) for share in s], len(s) - 1) for s in (coarse, fine)]
+    assert jumps[1] > 2 * jumps[0]
+
+
+def test_the_origin_lies_on_the_line_and_on_the_face():
+    for share in np.linspace(0.1, 0.9, 23):
+        patch = bridge(share)
+        frame = contact_frame(patch, X, whole_face=True)
+        arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
+        assert np.abs(arm[:2]).max() < 1e-12
+        column = int((frame.origin[0] + 1) * 12)
+        x = patch.corners.reshape(24, 6, 4, 3)[column, 0, :2]
+        along = (frame.origin[0] - x[0, 0]) / (x[1, 0] - x[0, 0])
+        assert frame.origin[2] == pytest.approx(x[0, 2] + along * (x[1, 2] - x[0, 2]), abs=1e-12)
+
+
+def test_the_normal_of_a_skew_cylinder_has_order_two():
+    """Exact normal direction 15.8376 degrees; on plane faces the error is up to half of a face's turning angle."""
+    errors = []
+    for n in (8, 16, 32, 64):
+        patch = mesh_patch(cyl_mesh(1, np.pi / 3, 2, n, 4), lambda r: 1 + 0.8 * r[:, 1])
+        N = contact_frame(patch, X, whole_face=True).axes[2]
+        errors.append(abs(np.degrees(np.arctan2(N[1], N[2])) - 15.8376))
+    assert errors[-1] < 0.01
+    assert np.polyfit(np.log([8, 16, 32, 64]), np.log(errors), 1)[0] < -1.7
+
+
+def test_faces_without_load_count_only_on_request():
+    """The frame of the loaded faces does not feel the others, bit for bit."""
+    whole = bridge(0.3)
+    loaded = whole.loaded
+    one, two = contact_frame(whole, X), contact_frame(loaded, X)
+    np.testing.assert_array_equal(one.origin, two.origin)
+    np.testing.assert_array_equal(one.axes, two.axes)
+
+
+def test_a_line_beside_the_face_meets_the_nearest_point_of_its_rim():
+    face = ContactFace.of(mesh_patch(grid_mesh(4, 3, 1, 0.5, lambda x, y: -(x**2))))
+    point, normal, missed = face.foot(np.array([1.5, 0.1, 3.0]), np.array([0, 0, 1.0]))
+    assert missed
+    np.testing.assert_allclose(point, [1.5, 0.1, -1.0], atol=1e-12)
+    assert normal[0] > 0.7  # of the rim, which falls by 1.5 per unit in its last face
+    patch = mesh_patch(grid_mesh(4, 3, 1, 0.5, lambda x, y: -(x**2)))
+    bent = replace(patch, normal=np.tile([2.0, 0, 1], (12, 1)), pressure=(patch.centroid[:, 0] > 0.5).astype(float))
+    assert contact_frame(bent, X, whole_face=True).flag & ~FrameFlag.HOLE == 0
+
+
+def test_of_two_crossings_the_nearer_one_counts_and_of_equal_ones_that_along_the_normal():
+    floors = [grid_mesh(2, 2, 1, 1, lambda x, y, h=h: h + 0 * x) for h in (-1.0, 1.0)]
+    patch = mesh_patch(np.concatenate(floors))
+    face, N = ContactFace.of(patch), np.array([0, 0, 1.0])
+    for z, expected in ((0.0, 1.0), (1e-12, 1.0), (-1e-12, 1.0), (-0.1, -1.0), (0.1, 1.0)):
+        start = np.array([0.3, 0.2, z])
+        assert face.foot(start, N)[0][2] == pytest.approx(expected, abs=1e-12)
+        assert foot(patch, start, N).point[2] == pytest.approx(expected, abs=1e-12)
+
+
+def test_steps_that_lead_to_and_fro_are_halved():
+    """Pressed far above its ridge a roof's normal leads to the other side; half steps end on the ridge."""
+    corners = grid_mesh(2, 1, 1, 1, lambda x, y: -1.5 * np.abs(x))
+    patch = mesh_patch(corners)
+    high = replace(patch, centroid=np.add(patch.centroid, [0.01, 0, 2.0]))
+    frame = contact_frame(high, X, whole_face=True)
+    assert not frame.flag & FrameFlag.CYCLE
+    assert frame.iterations > 20
+    arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
+    assert np.abs(arm[:2]).max() < 1e-9
+
+
+@REPEATABLE
+@given(seed=seeds)
+def test_the_frame_on_the_whole_face_turns_with_the_patch(seed):
+    """Corners that differ by rounding are still one corner."""
+    patch = bridge(0.37, n=8)
+    frame = contact_frame(patch, X, whole_face=True)
+    turned, R, t = shaken(patch, seed)
+    found = contact_frame(turned, R @ X, whole_face=True)
+    assert found.flag == frame.flag
+    np.testing.assert_allclose(found.axes, frame.axes @ R.T, atol=1e-9)
+    np.testing.assert_allclose(found.origin, R @ frame.origin + t, atol=1e-9)
+
+
+def test_a_whole_face_needs_quadrilaterals_of_one_sense():
+    with pytest.raises(ValueError, match="found none around each face, expected 4"):
+        contact_frame(cylinder_grid(1, 1, 2, 5, 5), X, whole_face=True)
+    with pytest.raises(ValueError, match="found 3 around each face, expected 4"):
+        contact_frame(mesh_patch(cyl_mesh(1, 1, 2, 4, 4, tri=True)), X, whole_face=True)
+    patch = mesh_patch(grid_mesh(2, 1, 1, 1))
+    corners = patch.corners.copy()
+    corners[0] = corners[0, ::-1]
+    with pytest.raises(ValueError, match="wound both ways"):
+        contact_frame(replace(patch, corners=corners), X, whole_face=True)
+
+
+def test_a_face_far_from_the_origin_of_its_coordinates_has_a_frame_too():
+    patch = bridge(0.37)
+    frame = contact_frame(patch, X, whole_face=True)
+    R = Rotation.from_rotvec([0.3, -0.2, 1.1]).as_matrix()
+    far = np.array([900.0, -800.0, 700.0])
+    moved = replace(patch, centroid=patch.centroid @ R.T + far, normal=patch.normal @ R.T)
+    moved = replace(moved, corners=patch.corners @ R.T + far)
+    found = contact_frame(moved, R @ X, whole_face=True)
+    assert found.flag == frame.flag
+    np.testing.assert_allclose(found.origin, R @ frame.origin + far, atol=1e-8)

@@ -1,0 +1,112 @@
+"""Grasps of a bottle at neighbouring stations: over its waist a pad bears on both ends, with a hole between them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from friction.torque import pure_torque
+from friction.wrench import friction_limits
+from study import pipeline
+from study.case.build import build_object
+from study.case.sweep import units
+from study.scene import load_scene
+from tests.friction.test_torque import centred, two_ends
+from tests.study.launching import ROOT
+
+MU = 0.8
+WAIST = 67.5  # station in the middle of the waist [mm], where the bottle is its own mirror image
+
+
+@lru_cache(maxsize=4)
+def grasps(first, last, count, forces="[1, 2]"):
+    """Stations [mm] ``(count,)`` and results of every force ``[station][force]`` of the shipped scene."""
+    overrides = (
+        f"candidates.stations={count}", f"candidates.station_range_mm=[{first}, {last}]", "candidates.angles_deg=[0]",
+        f"load.normal_force_n={forces}",
+    )  # fmt: skip
+    scene = load_scene(ROOT / "jobs" / "bottle-rigid.toml", overrides)
+    made = units(scene, lambda point: build_object(point.object).axis_symmetry)
+    return np.linspace(first, last, count), [[result for _, result in pipeline.solve_unit(unit)] for unit in made]
+
+
+def values(results, name, force):
+    """A map's values of the curved model ``(count,)``, or a finger's, of the first finger."""
+    found = np.array([ladder[force].values[name] for ladder in results])
+    return found if found.ndim == 1 else found[:, 0]
+
+
+def jumps(line):
+    """How far each value is from the middle of its neighbours, over itself."""
+    return np.abs(line[1:-1] - 0.5 * (line[2:] + line[:-2])) / np.abs(line[1:-1])
+
+
+def test_over_the_hole_the_frame_stands_on_the_pad():
+    """At 1 N in the middle of the waist the pad's middle hangs 0.3 mm over the bottle of 58 mm diameter."""
+    _, [_, [result]] = grasps(WAIST - 0.25, WAIST, 2, "[1]")
+    origin, axes = (result.values[f"fingers/frame_{name}"][0] for name in ("origin", "axes"))
+    assert result.values["fingers/frame_flag"][0] == 0
+    np.testing.assert_allclose(axes, np.eye(3), atol=1e-6)
+    np.testing.assert_allclose(origin[:2], 0, atol=1e-8)
+    assert 58e-3 < result.values["maps/contact_distance"] < 59e-3
+    pressure, centroid = result.patch["pressure"][0], result.patch["centroid"][0]
+    nearest = np.argsort(np.linalg.norm(centroid - origin, axis=1))[:4]
+    assert (pressure[nearest] == 0).all()
+    assert origin[2] == pytest.approx(centroid[nearest, 2].mean(), abs=2e-5)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("force", [0, 1])
+def test_frame_distance_and_quality_are_continuous_over_stations(force):
+    """Stations 60 to 75 mm in steps of 0.25 mm at 1 and 2 N.
+
+    Quality itself grows sixfold within 4 mm where the second end begins to bear, up to 23 % from station to station;
+    a jump is what is left of a value beside the middle of its neighbours. Where the end begins to bear there is a kink,
+    which half the step halves.
+    """
+    stations, results = grasps(60, 75, 61)
+    quality, distance = (values(results, f"maps/{name}", force) for name in ("quality", "contact_distance"))
+    begins = stations[1:-1][jumps(quality) > 0.02]
+    assert all((np.abs(np.abs(begins - WAIST) - at) <= 0.75).all() for at in [(4.0, 6.5)[force]])
+    assert jumps(distance).max() < 2e-3
+    assert np.abs(np.diff(values(results, "fingers/frame_axes", force)[:, 2], axis=0)).max() < 0.07
+    np.testing.assert_allclose(quality, quality[::-1], rtol=1e-6)
+
+
+@pytest.mark.long
+def test_half_the_step_between_stations_makes_half_the_change():
+    """From one end alone to both alike, of the smaller steps at least: a jump would stay as large as it is."""
+    _, results = grasps(63, WAIST, 73, "[1]")
+    for name in ("maps/quality", "maps/contact_distance", "fingers/frame_origin", "fingers/frame_axes"):
+        line = values(results, name, 0)
+        changes = [np.abs(np.diff(line[::step], axis=0)).max() for step in (1, 2)]
+        assert changes[0] < 0.55 * changes[1], name
+
+
+@pytest.mark.long
+def test_torque_about_the_centre_of_pressure_and_without_force_over_stations():
+    """Their ratio follows from loads and places of the two ends alone: 1 where they bear alike, up to 1.3 beside it."""
+    stations, results = grasps(63, WAIST, 73, "[1]")
+    tau_z, tau_pure = values(results, "maps/tau_z_max", 0), values(results, "maps/tau_pure", 0)
+    assert (tau_z / tau_pure).max() == pytest.approx(1.33, abs=0.03)
+    assert tau_z[-1] / tau_pure[-1] < 1.002
+    for k in np.flatnonzero(stations > 64.5)[::6]:
+        patch = centred(two_ends(*ends(results[k][0].patch)))
+        expected = friction_limits(patch, MU).tau_z / pure_torque(patch, MU)
+        assert tau_z[k] / tau_pure[k] == pytest.approx(expected, rel=0.02), stations[k]
+
+
+def ends(patch):
+    """Load, place, length and width of the two parts of a patch that lie before and behind its widest gap along x."""
+    load, r = patch["pressure"][0] * patch["area"][0], patch["centroid"][0]
+    x = np.sort(r[load > 0, 0])
+    widest = np.argmax(np.diff(x))
+    found = []
+    for part in (r[:, 0] <= x[widest], r[:, 0] > x[widest]):
+        p = load[part] / load[part].sum()
+        middle = p @ r[part, :2]
+        length, width = np.sqrt(12 * p @ (r[part, :2] - middle) ** 2)
+        found.append((load[part].sum(), middle[0], length, width))
+    return found
