@@ -13,7 +13,7 @@ from study.storage.quantities import EFFECTS, INDICATORS, REASONS
 from study.storage.quantity import FINGERS, MODELS, Quantity
 
 MISSING = 0  # state of a case that has not been solved
-MESSAGE = 240  # bytes of a message
+MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
 ROOT = "/study"
 FIRST_SEEN = ("quality", "e_n")  # maps that viewers open at
 

@@ -20,6 +20,7 @@ import pytest
 from study import pictures
 from study.data import Data, number
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.flags import Flag
 from study.outline import read_scene, shape_outline, slice_polygon
 from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
@@ -31,7 +32,6 @@ from study.storage.reading import StoredAxis
 from study.storage.record import blank, crc32, record
 from study.storage.result import CaseResult
 from study.storage.store import create, open_result
-from study.tables.ranking import TOO_STRONG
 from study.tables.show import best
 
 ROOT = Path(__file__).parent.parent.parent
@@ -339,7 +339,7 @@ def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
         worse, better = sorted(data.order(0), key=lambda i: data.at("quality", i))
         assert "but cannot be used" not in words.verdict(data, 0.8)
         data = Data(result)
-        data.flags[better] = TOO_STRONG
+        data.flags[better] = Flag.TOO_STRONG
         assert data.best == worse
         assert "One grasp scores higher at this force" in (told := words.verdict(data, 0.8))
         assert "but cannot be used: too strong." in told
