@@ -25,12 +25,13 @@ from study.report.wall_shape import Cut, shape_picture
 from study.report.window import window_picture
 from study.scene import parse_scene
 from study.storage.layout import DONE
-from study.storage.record import blank, crc32, record
-from study.storage.store import create, open_result
+from study.storage.record import record
+from study.storage.store import ResultWriter, create, open_result
 from study.tables.overview import RULE, scene_text
 from study.tables.ranking import borne_level, judged, ranking
 from study.tables.show import as_csv, as_json, best
 from study.tables.show_text import as_text
+from tests.study.sealing import sealed
 from tests.study.test_report import Page
 
 SCENE = """
@@ -56,36 +57,19 @@ normal_force_n = [1, 3]
 """
 
 
-class Filled:
-    """As much of a writer as derived datasets need."""
-
-    def __init__(self, layout, file):
-        self.layout, self.file = layout, file
-
-    def codes(self):
-        return self.file["study/status/code"][()].ravel()
-
-    def read(self, path):
-        return self.file[f"study/{path}"][()]
-
-    def write_derived(self, name, values):
-        self.file[f"study/derived/{name}"][...] = values
-
-
 def write(path, scene, results):
     """A result file of these cases by row; the others failed."""
     plan = make_plan(scene, "can.toml")
     layout = plan.layout
     create(path, layout, plan.header)
-    with h5py.File(path, "r+") as file:
-        for row, index in enumerate(np.ndindex(layout.shape)):
-            done = row in results
-            values = record(layout, results[row]) if done else blank(layout, "the wall gave way")
-            for column, value in zip(layout.columns, values, strict=True):
-                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-            file["study/status/crc"][index] = crc32(layout, row, values)
-            file["study/status/code"][index] = DONE if done else 2
-        window.finalise(Filled(layout, file), scene)
+    writer = ResultWriter(path, layout, None)
+    for row in range(layout.rows):
+        if row in results:
+            writer.write(row, record(layout, results[row]))
+        else:
+            writer.fail(row, "the wall gave way")
+    window.finalise(writer, scene)
+    writer.close()
     return path
 
 
@@ -119,7 +103,7 @@ def changed(path, folder, name, values, index=...):
     shutil.copy(path, other)
     with h5py.File(other, "r+") as file:
         file[f"study/{name}"][index] = values
-    return other
+    return sealed(other)
 
 
 def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
