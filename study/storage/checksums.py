@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from study.storage.datasets import CLOSING, MISSING, STATE, SUMS, Column
@@ -102,21 +100,19 @@ def closing_sum(file: GuardedFile, layout: Layout, name: str) -> int:
     return int(file.values(found)[layout.closing.index(name)])
 
 
-def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
+def rows_of(file: GuardedFile, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
     """Every row that is done or failed: number, state, and values, or None where they do not match their checksums.
 
     A state that does not match its own checksum is the one that the checksum is of.
     """
-    with h5py.File(path, "r") as file:
-        guarded = GuardedFile(path, file)
-        found = {d.path: guarded.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
-        views = [_mapped(path, found[c.path], c.dtype) for c in layout.columns]
-        codes = guarded.values(found[f"{ROOT}/status/code"]).ravel()
-        sums = {part: _sums(guarded, layout, part) for part in layout.parts} if layout.version > 3 else {}
-        whole = None if sums else guarded.values(found[f"{ROOT}/status/crc"]).ravel()
-        if sums:
-            state = _sums(guarded, layout, STATE)
-            codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
+    found = {d.path: file.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
+    views = [_mapped(file, found[c.path], c.dtype) for c in layout.columns]
+    codes = file.values(found[f"{ROOT}/status/code"]).ravel()
+    sums = {part: _sums(file, layout, part) for part in layout.parts} if layout.version > 3 else {}
+    whole = None if sums else file.values(found[f"{ROOT}/status/crc"]).ravel()
+    if sums:
+        state = _sums(file, layout, STATE)
+        codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
     for row in np.flatnonzero(codes != MISSING):
         pairs = zip(views, layout.places(row), strict=True)
         values = [None if place is None else view[place] for view, place in pairs]
@@ -161,9 +157,8 @@ def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
     return np.where(slot < 0, -1, lines)
 
 
-def _mapped(path: Path, dataset: h5py.Dataset, dtype: np.dtype) -> np.ndarray:
-    if dataset.size == 0:
-        return np.empty(dataset.shape, dtype)
-    if dataset.chunks:  # a file that was repacked
-        return dataset[()].astype(dtype)
-    return np.memmap(path, dtype, "r", dataset.id.get_offset(), dataset.shape)
+def _mapped(file: GuardedFile, dataset: Any, dtype: np.dtype) -> np.ndarray:
+    """A dataset's values, which are read when they are asked for, unless it was repacked."""
+    if dataset.chunks or not dataset.size:
+        return file.values(dataset).astype(dtype)
+    return np.memmap(file.path, dtype, "r", dataset.id.get_offset(), dataset.shape)

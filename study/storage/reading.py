@@ -209,7 +209,7 @@ class Result:
             self._trusted.add(part)
         else:
             self._trusted.update(self.layout.parts)
-            wrong = np.array([r for r, _, v in checksums.rows_of(self.path, self.layout) if v is None], dtype=int)
+            wrong = np.array([r for r, _, v in checksums.rows_of(self.file, self.layout) if v is None], dtype=int)
         self._refuse(self._still(wrong, self.status), f"'{part}'")
 
     def _still(self, wrong: np.ndarray, codes: np.ndarray) -> np.ndarray:

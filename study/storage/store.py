@@ -9,15 +9,19 @@ solved again.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 
 from study.exits import OTHER_FILE, StudyError
-from study.storage.checksums import broken_rows, broken_states, rows_of
-from study.storage.guarded import opened
+from study.storage import checksums
+from study.storage.checksums import broken_rows, broken_states
+from study.storage.guarded import GuardedFile, opened
 from study.storage.layout import MISSING, VERSION, Header, Layout
 from study.storage.reading import Result
 from study.storage.result_writer import ResultWriter
@@ -74,6 +78,12 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
         if lost := int(np.sum(codes[wrong] == MISSING)):
             text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
             raise StudyError(OTHER_FILE, f"{text}; 'softjaw repair' makes a file that can be gone on with")
+
+
+def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
+    """Every row of a file that is done or failed; see `study.storage.checksums.rows_of`."""
+    with h5py.File(path, "r") as file:
+        yield from checksums.rows_of(GuardedFile(path, file), layout)
 
 
 def torn_rows(path: Path, layout: Layout) -> list[int]:
