@@ -220,8 +220,9 @@ class Result:
 
     def _refuse(self, rows: np.ndarray, what: str) -> None:
         if rows.size:
-            listed = f"{', '.join(map(str, rows[:5]))}{', ...' if rows.size > 5 else ''}"
-            raise self._damaged(f"{what} of {rows.size} cases does not match its checksum, rows {listed}")
+            some = f"{', '.join(map(str, rows[:5]))}{', ...' if rows.size > 5 else ''}"
+            cases = f"case {some}" if rows.size == 1 else f"{rows.size} cases ({some})"
+            raise self._damaged(f"{what} of {cases} does not match its checksum")
 
     def _believable(self, path: str, found: np.ndarray) -> np.ndarray:
         if found.dtype.kind == "f" and (np.isfinite(found) & (np.abs(found) > BEYOND)).any():

@@ -124,12 +124,12 @@ def _examine(path: Path, copy: Path) -> Findings:
         codes, torn = np.full(marked.shape, MISSING), []
         for row, state, values in rows_of(copy, layout):
             codes[row], torn = state, torn + [row] * (values is None)
-        if not lost and (codes != marked).any():
-            lost = f"the states of {np.sum(codes != marked)} cases, which their checksums tell"
+        unmarked = int(np.sum(codes != marked))
     except BROKEN as error:
         raise _hopeless(path, str(error).removeprefix(f"{copy}: ")) from error
     leftovers = [path.with_name(path.name + end) for end in (".part", ".lock")]
-    flaw = f"damaged: {lost}; it can be made again" if lost else ""
+    flaw = f"damaged: the states of {unmarked} cases, which their checksums still tell" if unmarked else ""
+    flaw = f"damaged: {lost}; it can be made again" if lost else flaw
     flaw = "repacked: a run could not write it in parallel" if packed else flaw
     return Findings(path.stat().st_size, copy.stat().st_size, codes, torn, flaw, [p for p in leftovers if p.exists()])
 

@@ -253,7 +253,7 @@ def test_what_a_killed_run_leaves_is_missing_and_no_damage(copy):
     """Stored, but not yet marked: the one moment in which state and checksum may differ."""
     with h5py.File(copy, "r+") as file:
         file["study/status/code"][0, 0, 0] = MISSING
-    with open_result(copy) as result, pytest.raises(StudyError, match="the state of 1 cases"):
+    with open_result(copy) as result, pytest.raises(StudyError, match="the state of case 0 does not match"):
         assert result.status.any()
     layout = make_plan(parse_scene(SCENE)).layout
     writer = ResultWriter(copy, layout, None)
