@@ -91,9 +91,9 @@ class ResultWriter:
                 _write_block(dataset, place, value)
         for position, dataset in self._maps.items():
             dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
-        for part, crc in checksums.of_parts(self.layout, row, values).items():
-            self._sums[part][index] = crc
-        self._sums[STATE][index] = checksums.OF_STATE[state]
+        sums = {**checksums.of_parts(self.layout, row, values), STATE: checksums.OF_STATE[state]}
+        for part, crc in sums.items():
+            _write_block(self._sums[part], index, np.array(crc, "<u4"))
         self._code[index] = state
 
     def _index(self, row: int) -> tuple[int, ...]:
