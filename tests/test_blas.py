@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from study.environment import launch_environment
 from tests.blas import loaded, usable
 
 ASK = "from tests.blas import loaded; print(*(f'{file}|{kernel}' for file, kernel in loaded().items()), sep='\\n')"
@@ -20,7 +21,7 @@ def kernels_of(**environment):
     """Kernel of every copy of OpenBLAS in a process of its own."""
     done = subprocess.run(
         [sys.executable, "-c", ASK], capture_output=True, text=True, check=True, cwd=Path(__file__).parent.parent,
-        env={**os.environ, **environment},
+        env={**launch_environment(), **environment},
     )  # fmt: skip
     return dict(line.split("|") for line in done.stdout.splitlines() if "|" in line)
 
@@ -33,6 +34,7 @@ def test_the_kernel_that_was_asked_for_is_in_use():
     assert set(loaded().values()) == {os.environ["OPENBLAS_CORETYPE"]}
 
 
+@pytest.mark.launches
 @pytest.mark.skipif(ASKED, reason="a kernel is asked for")
 @pytest.mark.parametrize("kernel", usable())
 def test_a_kernel_can_be_asked_for(kernel):

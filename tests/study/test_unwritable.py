@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from study.cli import main
+from study.cost.command import SIZES
 from study.environment import launch_environment
 from study.exits import CANNOT_WRITE, StudyError
 from study.figures import command as figures
@@ -85,6 +86,8 @@ def refused(code, errors, place):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_that_writes_says_what_it_cannot_write(file, place, command, capfd, monkeypatch):
     drawn = SimpleNamespace(name="4c", scenes=(), file="4c.png", gaps=False, draw=lambda: (Figure(), "drawn"))
+    for name in SIZES:
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(figures, "chosen", lambda names: [drawn])  # without solving and drawing anything
     monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
     code = main([word.replace("FILE", str(file)).replace("PLACE", str(place)) for word in COMMANDS[command]])
@@ -92,6 +95,7 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
     assert list(file.parent.iterdir()) == [file]
 
 
+@pytest.mark.launches
 @pytest.mark.parametrize("words", [("run", SMOKE, "-o"), ("figure", "4c", "--results")])
 def test_a_run_says_what_it_cannot_write(tmp_path, words):
     with read_only(tmp_path, {}):
@@ -111,6 +115,7 @@ def test_a_repair_says_what_it_cannot_write(file, tmp_path, capfd, monkeypatch, 
     refused(code, capfd.readouterr().err, tmp_path)
 
 
+@pytest.mark.launches
 @pytest.mark.parametrize("command", ["show", "status", "export", "schema", "compare"])
 def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
     words = {"export": (file, "--csv"), "schema": (), "compare": (file, file)}.get(command, (file,))
