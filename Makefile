@@ -28,16 +28,20 @@ AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
 # Two files of tests at a time; leave it out where pytest-xdist is missing.
 TWO = -n 2 --dist loadfile
+# Tests whose numbers could depend on the kernel of the BLAS.
+NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/test_*friction*.py \
+    tests/test_*decision*.py) tests/test_blas.py
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures effects test test-long bench lint doctor
+.PHONY: help setup map figures effects test test-blas test-long bench lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
 	@echo 'make figures    the figures of the paper, into $(FIGURES)'
 	@echo 'make effects    indicators of the effects against true errors, into results/effects.csv and .png'
-	@echo 'make test       the tests, first without MPI and then on $(RANKS) ranks'
+	@echo 'make test       the tests, first without MPI, then on $(RANKS) ranks, then as test-blas'
+	@echo 'make test-blas  the numerical tests with each kernel of OpenBLAS that this CPU can run (OPENBLAS_CORETYPE)'
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make lint       ruff'
@@ -68,6 +72,14 @@ effects: setup
 test: setup
 	$(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO)
 	$(LIMIT) 12m ./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no -m "not long and not launches"
+	@$(MAKE) --no-print-directory test-blas
+
+# Kernels end sums in other bits: a decision that hangs on them shows here.
+test-blas: setup
+	@for kernel in $$($(BIN)/python -m tests.blas); do \
+	    echo "OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q $(TWO) $(NUMERICAL)"; \
+	    OPENBLAS_CORETYPE=$$kernel $(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO) $(NUMERICAL) || exit; \
+	done
 
 test-long: setup
 	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import math
 import os
 import sys
@@ -14,7 +15,7 @@ from study import commands
 from study.completion import add_options as add_completion_options
 from study.cost.command import add_options as add_cost_options
 from study.environment import keep_compiled_loops, pin_threads
-from study.exits import BUG, DONE, USAGE, StudyError
+from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
 from study.file_options import add_repair_options, add_scale_options
 from study.help import Formatter, Parser, Program
@@ -24,6 +25,8 @@ from study.start import add_options as add_init_options
 from study.tables.watch import add_options as add_watch_options
 from study.view.command import add_choice
 from study.view.command import add_options as add_view_options
+
+UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,17 +47,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.petsc and options.command is not commands.run:
             raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
-        return options.command(options)
+        code = options.command(options)
+        sys.stdout.flush()
+        return code
     except StudyError as error:
         return complain(error)
-    except BrokenPipeError:  # the reader of a pipe has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
+    except OSError as error:
+        if error.errno not in UNWRITABLE or error.filename:
+            return _unforeseen(options, error)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again as it ends
+        if error.errno == errno.EPIPE:  # the reader of a pipe has seen enough
+            return DONE
+        return complain(StudyError(CANNOT_WRITE, f"the output cannot be written ({error.strerror})"))
     except Exception as error:
-        if damage := commands.damage(options, error):
-            return complain(damage)
-        traceback.print_exc()
-        return BUG
+        return _unforeseen(options, error)
+
+
+def _unforeseen(options: argparse.Namespace, error: Exception) -> int:
+    """The exit code of an error that no command expects: a damaged file, or a bug."""
+    if damage := commands.damage(options, error):
+        return complain(damage)
+    traceback.print_exc()
+    return BUG
 
 
 def program() -> Program:

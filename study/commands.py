@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from study.execution.running import prepare, scene_of, target, with_target_met, work
-from study.exits import BUG, CANNOT_WRITE, DONE, OTHER_FILE, USAGE, StudyError
+from study.exits import BUG, DONE, OTHER_FILE, USAGE, StudyError
 from study.speaking import complain, say
+from study.writing import write_file
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
@@ -160,10 +161,7 @@ def export(options: Namespace) -> int:
     if options.output is None:
         say(text)
         return DONE
-    try:
-        Path(options.output).write_text(f"{text}\n", encoding="utf-8")
-    except OSError as error:
-        raise StudyError(CANNOT_WRITE, f"{options.output}: cannot be written: {error.strerror}") from error
+    write_file(Path(options.output), f"{text}\n")
     print(f"written: {options.output}")
     return DONE
 

@@ -18,13 +18,14 @@ from friction.motion import cor_grid
 from friction.wrench import friction_wrench
 from study.case import model
 from study.case.build import build_object
-from study.case.contact import Contact, angles, flags, remark
+from study.case.contact import Contact, angles, flags
 from study.case.effects import effects_of
 from study.case.grasp import grasp_values, quality
 from study.case.limit_surface import Bound, bound, fit_flag, surface_values
 from study.case.solving import Solved, Solver, solver
 from study.case.wall import wall_flags
 from study.case.weight import safety_factors
+from study.flags import flag_sentences
 from study.scene import Scene
 from study.storage.quantity import MODELS
 from study.storage.result import CaseFailure, CaseResult
@@ -198,4 +199,4 @@ def _result(values: dict[str, Any], outcome: Solved, friction: float, effects: d
     values |= {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values | checks, patch, remark(values["maps/flags"]), effects)
+    return CaseResult(values | checks, patch, flag_sentences(values["maps/flags"]), effects)

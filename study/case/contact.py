@@ -16,7 +16,9 @@ from friction.patch import ContactPatch
 from friction.torque import pure_torque
 from friction.wrench import FrictionLimits, friction_limits
 from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
+from scoring.score import ScoreFlag
 from study.case.model import Finger
+from study.flags import Flag, raised
 from study.scene import Scene
 from study.storage.quantity import MODELS
 
@@ -26,22 +28,6 @@ ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this misalignment a flag says so; a
 OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
-FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
-NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as in storage.quantities
-UNSTABLE = 131072
-REMARKS = {  # the most important ones first: a stored message has an end
-    UNSTABLE: "foam lost ellipticity, strains may localise",
-    SLIPS: "the line between the contacts leaves a friction cone, the grasp slips",
-    NOT_ANTIPODAL: "contacts more than 5 deg from antipodal",
-    PADS_MEET: "the pads run into each other beside the object, which is not simulated",
-    COARSE: "the mesh is coarse for this contact",
-    NODAL_INSTEAD: "weighted gaps had no solution, nodal gaps were taken",
-    1 | 2: "a contact carries no torque, or no force along an axis",
-    8192: "the wall has snapped in",
-    16384: "the object slides out of the grasp along its axis",
-    32768: "the wall yields, the dent stays",
-    65536: "a limit surface could not be fitted, the ellipsoid from three motions stands in",
-}
 
 
 class Contact:
@@ -124,21 +110,16 @@ def angles(one: Contact, two: Contact) -> tuple[float, float]:
     return between(one.normal, -two.normal), max(between(one.normal, line), between(two.normal, -line))
 
 
-def flags(contacts: Sequence[Contact], mu: float, score_flag: int) -> int:
-    """Flags of a case, added up as ``study.storage.quantities`` defines them."""
+def flags(contacts: Sequence[Contact], mu: float, score_flag: ScoreFlag) -> Flag:
+    """Flags of a case, ``score_flag`` being that of its score."""
     one, two = contacts
     normals, line = angles(one, two)
     between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
-    found = score_flag
-    found |= NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL)
-    found |= SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
-    found |= PADS_MEET * (one.free_front + two.free_front > between_fronts)
-    found |= UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
+    found = raised(score_flag)
+    found |= Flag.ASKEW * (max(normals, line) > ANTIPODAL)
+    found |= Flag.SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
+    found |= Flag.OVERLAP * (one.free_front + two.free_front > between_fronts)
+    found |= Flag.UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
     for c in contacts:
-        found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * c.coarse
-    return int(found)
-
-
-def remark(flagged: int) -> str:
-    """What the reader should know about a valid result, always in the same words, so that remarks can be counted."""
-    return "; ".join(text for mask, text in REMARKS.items() if flagged & mask)
+        found |= raised(c.frame.flag) | Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
+    return found

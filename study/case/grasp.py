@@ -15,7 +15,7 @@ from scoring.contact import PolytopeBody, SoftContact
 from scoring.epsilon_search import epsilon
 from scoring.polytope import graspit_vertices, polytope_volume
 from scoring.pose import pose_volume
-from scoring.score import score
+from scoring.score import ScoreFlag, score
 from scoring.volume import volume_linf
 from study.case.contact import Contact, angles
 from study.case.limit_surface import Bound
@@ -46,7 +46,7 @@ def lengths(scene: Scene, obj: Any, contacts: Sequence[Contact]) -> Lengths:
 
 def grasp_values(
     scene: Scene, obj: Any, contacts: Sequence[Contact], bounds: Sequence[Mapping[str, Bound]]
-) -> tuple[dict[str, Any], int]:
+) -> tuple[dict[str, Any], ScoreFlag]:
     """Maps of the grasp's quality, one value for each friction model, and the flag of the score."""
     size = lengths(scene, obj, contacts)
     facing = max(angles(*contacts)) <= FACING
@@ -75,7 +75,7 @@ def grasp_values(
         search = scene.score.epsilon == "everywhere"
         found["epsilon"].append(_epsilon(contacts, ellipsoids, size) if search else math.nan)
     flag = score(*(c.ellipsoids[MODELS[0]].semi_axes for c in contacts), size.distance, size.arms, size.torques).flag
-    return {f"maps/{name}": values for name, values in found.items()}, int(flag)
+    return {f"maps/{name}": values for name, values in found.items()}, flag
 
 
 def quality(scene: Scene, obj: Any, contacts: Sequence[Contact]) -> float:

@@ -26,6 +26,7 @@ from lsfit.span import CollapsedFitError, sphere_motions
 from lsfit.surface import LimitSurface
 from lsfit.tilted import TiltedEllipsoid
 from lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
+from study.flags import Flag
 from study.scene import Scene
 from study.scene.score_sections import LimitSurface as Choice
 
@@ -33,7 +34,6 @@ FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
-NO_FIT = 65536  # flag of a case, as study.storage.quantities says
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.storage.finger_quantities says
 
 
@@ -114,9 +114,9 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
         return ellipsoid, STANDS_IN
 
 
-def fit_flag(bounds: Sequence[Mapping[str, Bound]]) -> int:
-    """`NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
-    return NO_FIT * any(b.certificate == STANDS_IN for own in bounds for b in own.values())
+def fit_flag(bounds: Sequence[Mapping[str, Bound]]) -> Flag:
+    """`Flag.NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
+    return Flag.NO_FIT * any(b.certificate == STANDS_IN for own in bounds for b in own.values())
 
 
 def matrix(surface: LimitSurface) -> FloatArray:

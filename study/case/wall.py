@@ -16,6 +16,7 @@ from fem.shell_stress import faces
 from fem.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
 from fem.wall_material import wall_material
 from study.case.build import outer_surface
+from study.flags import Flag
 from study.scene import Scene
 from study.scene.shape import Walled
 from study.storage.wall_quantities import ALONG, AROUND
@@ -25,7 +26,6 @@ RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.s
 STIFF = 0.02  # dent over travel below which a wall is as good as rigid: e_n then changes by less than 0.1 %
 SMALL_DENT = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
-SNAPPED, SLIDES_OUT, YIELDS = (8192 << k for k in range(3))  # flags, as study.storage.quantities says
 
 
 @lru_cache(maxsize=8)
@@ -124,12 +124,12 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
     }
 
 
-def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> int:
+def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
-    found = SNAPPED * state.wall.snapped
-    found |= SLIDES_OUT * (values["maps/support_force"] > 2.0 * scene.friction.mu * state.force)
+    found = Flag.SNAPPED * state.wall.snapped
+    found |= Flag.SLIDES_OUT * (values["maps/support_force"] > 2.0 * scene.friction.mu * state.force)
     strength = thin_body(scene.object).material.yield_strength
-    return found | YIELDS * (strength is not None and values["maps/wall_stress"] > strength)
+    return found | Flag.YIELDS * (strength is not None and values["maps/wall_stress"] > strength)
 
 
 def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:

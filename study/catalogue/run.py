@@ -16,6 +16,7 @@ from study.catalogue.table import table_text
 from study.catalogue.verdict import judge
 from study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
 from study.scene.errors import first_of
+from study.writing import make_folders
 
 
 def folder_of(options: Namespace) -> Path:
@@ -57,7 +58,7 @@ def run_catalogue(options: Namespace, comm: Any) -> int:
 def _make(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise StudyError(CANNOT_WRITE, f"{folder}: is a file; name a folder for the cases of the catalogue with -o")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folders(folder)
 
 
 def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: Namespace) -> tuple[int, str]:

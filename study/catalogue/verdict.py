@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem import checks
-from study.case.contact import REMARKS, UNSTABLE
 from study.catalogue.model import Case
 from study.catalogue.outcome import Outcome
+from study.flags import Flag
 
 FINITE = ("travel", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
 LIMITS = {
@@ -78,7 +78,7 @@ def _solved(case: Case, found: Outcome) -> Iterator[str]:
             yield f"{name} is {found.checks[name]:.1e}, above {limit:.0e}, without a flag"
     if not found.checks["min_det_f"] > 0:
         yield f"an element is inverted: det F = {found.checks['min_det_f']:.2g}"
-    if not found.checks["acoustic"] > 0 and REMARKS[UNSTABLE] not in parts:
+    if not found.checks["acoustic"] > 0 and Flag.UNSTABLE.sentence not in parts:
         yield "the foam lost ellipticity, and no remark says so"
     if any(not np.isfinite(found.maps[name]).all() for name in FINITE):
         yield "a map is not finite: " + ", ".join(n for n in FINITE if not np.isfinite(found.maps[n]).all())

@@ -8,7 +8,8 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
-from study.exits import CANNOT_WRITE, OTHER_FILE, STOPPED, USAGE, StudyError
+from study.exits import OTHER_FILE, STOPPED, USAGE, StudyError
+from study.writing import write_file
 
 TIME_LIMIT = 300.0  # CPU seconds
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS")
@@ -67,10 +68,7 @@ def _conclude(study: Any, what: Any, path: Path) -> None:
     tables = what.errors(study)
     html, png = cost_page(study, tables)
     for place, data in ((path.with_suffix(".html"), html.encode()), (path.with_suffix(".png"), png)):
-        try:
-            place.write_bytes(data)
-        except OSError as error:
-            raise StudyError(CANNOT_WRITE, f"{place}: cannot be written: {error.strerror}") from error
+        write_file(place, data)
     count = len(study.skipped)
     left = f"{count} level{'s were' if count > 1 else ' was'} not measured, the page says why" if count else ""
     print("\n".join(["", *sentences(study, tables), *([left] if left else [])]))

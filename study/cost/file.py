@@ -13,8 +13,9 @@ import numpy as np
 
 from study.cost.knobs import Skipped
 from study.cost.measure import QUANTITIES, UNITS, Measured
-from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.exits import OTHER_FILE, StudyError
 from study.storage.guarded import GuardedFile, opened
+from study.writing import beside
 
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
 TEXT = h5py.string_dtype("utf-8")
@@ -89,31 +90,25 @@ HEADER = ("scene", "digest", "title", "scene_file", "base", "calibration", "mach
 
 def save(path: Path, study: CostStudy) -> None:
     """Write the study; raise `StudyError` where that cannot be done."""
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(part, "w") as file:
-            file.attrs.update(program=PROGRAM, kind=KIND, version=VERSION)
-            for name in HEADER:
-                file.attrs[name] = getattr(study, name)
-            file.attrs["calibration_meaning"] = "CPU seconds of one sparse factorisation of fixed size on this machine"
-            file.create_dataset("candidates", data=np.array(study.candidates, object), dtype=TEXT)
-            for name, values in _columns(study).items():
-                units, meaning = MEANING[name]
-                text = isinstance(values[0], str) if values else name in ("setting", "level", "candidate", "message")
-                made = file.create_dataset(
-                    f"measurements/{name}",
-                    data=np.array(values, object if text else float),
-                    dtype=TEXT if text else "<f8",
-                )
-                made.attrs.update(units=units, long_name=meaning)
-            for name in ("knob", "level", "reason"):
-                values = [getattr(s, name) for s in study.skipped]
-                file.create_dataset(f"skipped/{name}", data=np.array(values, object), dtype=TEXT)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written: {error.strerror or error}") from error
+    with beside(path, folders=True) as part, h5py.File(part, "w") as file:
+        file.attrs.update(program=PROGRAM, kind=KIND, version=VERSION)
+        for name in HEADER:
+            file.attrs[name] = getattr(study, name)
+        file.attrs["calibration_meaning"] = "CPU seconds of one sparse factorisation of fixed size on this machine"
+        file.create_dataset("candidates", data=np.array(study.candidates, object), dtype=TEXT)
+        for name, values in _columns(study).items():
+            units, meaning = MEANING[name]
+            text = isinstance(values[0], str) if values else name in ("setting", "level", "candidate", "message")
+            made = file.create_dataset(
+                f"measurements/{name}",
+                data=np.array(values, object if text else float),
+                dtype=TEXT if text else "<f8",
+                fletcher32=True if values and not text else None,  # what HDF5 then compares whenever it is read
+            )
+            made.attrs.update(units=units, long_name=meaning)
+        for name in ("knob", "level", "reason"):
+            values = [getattr(s, name) for s in study.skipped]
+            file.create_dataset(f"skipped/{name}", data=np.array(values, object), dtype=TEXT)
 
 
 def _columns(study: CostStudy) -> dict[str, list]:

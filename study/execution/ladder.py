@@ -40,6 +40,8 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
     for row in again:
         writer.forget(int(row))
         codes[row], attempts[row] = MISSING, 0
+    for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):
+        writer.tidy(int(row))
     for unit in units:
         for rows in unit.rows:
             deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]

@@ -19,6 +19,7 @@ from study.execution.session import Session, print_summary
 from study.exits import CANNOT_WRITE, StudyError
 from study.storage.layout import MISSING
 from study.storage.store import ResultWriter, create, torn_rows, verify
+from study.writing import make_folders
 
 T = TypeVar("T")
 
@@ -101,7 +102,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 
 
 def _take(lock: Lock, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folders(path.parent)
     if path.is_dir():
         raise StudyError(CANNOT_WRITE, f"{path}: is a folder; name a file with -o")
     lock.take_first()

@@ -19,7 +19,7 @@ from study.execution.plan import by_cost
 from study.execution.progress import duration
 from study.exits import OTHER_FILE, StudyError
 
-STATE_WRITES = 4  # of a case besides its values: begun, checksum, state, and the map that is seen first
+STATE_WRITES = 5  # of a case besides its values: begun, state, its checksum, and the maps that are seen first
 NOTHING = 0.05  # share of the time below which something does not count as the limit
 GOOD = 0.8
 
@@ -133,9 +133,9 @@ def scaling_text(path: Path, options: Any) -> str:
 
     with open_result(path) as result:
         ladders = measured_ladders(result) * options.repeat
-        columns, rows = result.layout.columns, result.layout.rows * options.repeat
+        columns, rows, parts = result.layout.columns, result.layout.rows * options.repeat, len(result.layout.parts)
     row = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns)
-    writes = len(columns) + STATE_WRITES
+    writes = len(columns) + parts + STATE_WRITES
     service = max(writes / options.writes_per_s, row / (1e6 * options.mb_per_s))
     machine = Machine(options.per_node, 1e-6 * options.claim_us, 1e-3 * options.write_ms * writes, service)
     replays = [replay(ladders, n, machine) for n in options.ranks]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import os
 from argparse import ArgumentParser, Namespace
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.exits import CANNOT_WRITE, DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
+from study.exits import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
 from study.figures import JOBS
 from study.speaking import first_rank
+from study.writing import write_file
 
 if TYPE_CHECKING:
     from study.figures.table import Figure
@@ -109,7 +110,7 @@ def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
                 text = f"figure {one.name} is not drawn: {failed} cases of {result.path} failed"
                 raise StudyError(SOME_FAILED, f"{text}; 'softjaw status {result.path}' says why")
         drawn, said = one.draw(*(Data(result) for result in opened))
-        write(path, as_png(drawn))
+        write_file(path, as_png(drawn), folders=True)
     return said
 
 
@@ -118,17 +119,3 @@ def as_png(drawn: Any) -> bytes:
     store = io.BytesIO()
     drawn.savefig(store, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
     return store.getvalue()
-
-
-def write(path: Path, content: bytes) -> None:
-    """Write beside ``path`` and rename, so that nobody sees half a picture."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        text = f"{path}: cannot be written: {error.strerror}; choose another place with -o"
-        raise StudyError(CANNOT_WRITE, text) from error

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from study.flags import Flag
 from study.lookup.interpolation import Corners, FloatArray, Nodes, bends, blend, circle, corners, error, place, plain
 from study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
-from study.lookup.source import SNAPPED, Source, read_source, turning
+from study.lookup.source import Source, read_source, turning
 from study.storage.layout import DONE
 from study.storage.quantity import MODELS
 
@@ -63,7 +64,7 @@ class GraspMap:
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
         self.done = self._grid(self.source.status == DONE)
-        self.snapped = self.done & (np.nan_to_num(self._grid(self.source.read("flags"))).astype(int) & SNAPPED > 0)
+        self.snapped = self.done & (np.nan_to_num(self._grid(self.source.read("flags"))).astype(int) & Flag.SNAPPED > 0)
         self._whole = self._whole_cells()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from study.flags import flags_in
 from study.lookup.interpolation import Corners, FloatArray
 from study.storage.layout import MISSING
-from study.tables.ranking import FLAGS
 
 if TYPE_CHECKING:
     from lsfit.surface import LimitSurface
@@ -85,7 +85,7 @@ class GraspPoint:
 
     @property
     def flags(self) -> Any:
-        """Flags of all cases around the point together (``study.tables.ranking.FLAGS``); 0 where there is no value."""
+        """Flags of all cases around the point together (`study.flags.Flag`); 0 where there is no value."""
         flags = np.nan_to_num(self.map.table("flags")[self.corners.index]).astype(int)
         used = (self.corners.weight > 0) & (self.states == INSIDE)[:, None]
         return self._shaped(np.bitwise_or.reduce(np.where(used, flags, 0), axis=1))
@@ -152,7 +152,7 @@ class GraspPoint:
         for name in (n for n in TOLD if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
             lines.append(f"  {name:<13} {_number(self.value(name), units)}  +- {_number(error, units, 2)}")
-        lines += [f"  {meaning}" for mask, _, meaning in FLAGS if self.flags & mask]
+        lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 
     def _shaped(self, values: np.ndarray) -> Any:

@@ -15,7 +15,6 @@ from study.storage.layout import MODELS, ROOT
 from study.storage.store import open_result
 from study.tables.show import place
 
-SNAPPED = 8192  # flag of a case after the wall has snapped in
 GROUPS = ("fingers", "limit_surface")
 TOO_LARGE = ("cor_wrench",)
 

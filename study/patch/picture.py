@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from friction.patch import FloatArray
-from study.exits import CANNOT_WRITE, StudyError
 from study.patch.evaluate import Judged
 from study.pictures import SOFT, as_png, as_svg, figure, style
+from study.writing import write_file
 
 FORMS = {".png": as_png, ".svg": as_svg}
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
@@ -39,12 +39,7 @@ def write_picture(patches: Sequence[Judged], mu: float, surface: str, path: Path
             _row(row, judged, mu, surface)
         axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center")
         data = FORMS[path.suffix.lower()](drawn)
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise StudyError(
-            CANNOT_WRITE, f"-o: {path} cannot be written ({error.strerror}); choose another place"
-        ) from error
+    write_file(path, data)
 
 
 def section(judged: Judged, name: str, plane: tuple[int, int], n: int = 361) -> FloatArray:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from study.data import ABOVE, LIMITS, Data, number, passes
+from study.flags import flags_in
 from study.report.page import details, paragraph, table
 from study.report.words import VALUES, head, value
 from study.storage.layout import DONE, FAILED, MISSING
-from study.tables.ranking import FLAGS
 
 MOST_REASONS, MOST_PLACES = 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
@@ -75,8 +75,7 @@ def remark(data: Data, index: tuple[int, ...]) -> str:
         return str(data.result.messages[index]) or "no reason was given"
     if data.status[index] != DONE:
         return ""
-    flags = [word for mask, word, _ in FLAGS if int(data.flags[index]) & mask]
-    return ", ".join([*data.flagged(index), *flags])
+    return ", ".join([*data.flagged(index), *(flag.word for flag in flags_in(int(data.flags[index])))])
 
 
 def checks(data: Data) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
+from study.exits import StudyError
 from study.report.maps import MAPS, SHORT, extremes, scaled
 from study.report.page import Picture, paragraph, picture
 from study.storage.layout import FAILED, MISSING
@@ -50,7 +51,10 @@ def in_a_child(view: Any, index: tuple[int, ...], limits: Limits) -> np.ndarray 
     child.start()
     theirs.close()
     try:
-        return ours.recv() if ours.poll(PATIENCE) else None
+        found = ours.recv() if ours.poll(PATIENCE) else None
+        if isinstance(found, StudyError):  # what it read does not match its checksum
+            raise found
+        return found
     except EOFError:  # it ended without a word
         return None
     finally:
@@ -64,6 +68,8 @@ def _draw(answer: Any, view: Any, index: tuple[int, ...], limits: Limits) -> Non
         from study.view.sides import two_sides
 
         answer.send(two_sides(view, index, limits))
+    except StudyError as error:
+        answer.send(error)
     except (ImportError, RuntimeError, OSError):  # as a machine without VTK or its libraries says it
         answer.send(None)
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from study import pictures
 from study.data import Data, number
+from study.flags import Flag
 from study.report.page import Picture
 
-SNAPPED = 8192  # flag, as study.storage.quantities says
 MOST_LINES = 40
 
 
@@ -20,7 +20,7 @@ def force_curves(data: Data, index: tuple[int, ...], allowed: float | None) -> P
     if dent is None or travel is None or len(data.forces) < 2:
         return None
     cut = (*index[:-3], slice(None), index[-2], slice(None))
-    snapped = (data.flags & SNAPPED > 0)[cut]
+    snapped = (data.flags & Flag.SNAPPED > 0)[cut]
     drawn, axes = pictures.figure(10, 3.3, 1, 2, gap=0.16, sharey=True)
     panels = ((travel, "travel of the pads"), (dent, "dent"))
     for panel, (found, text) in zip(axes[0], panels, strict=True):

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from study.data import LIMITS, Data, number, shown
+from study.flags import Flag, flags_in
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 from study.storage.layout import DONE, FAILED, MISSING
-from study.tables.ranking import FLAGS, SLIDES_OUT, TOO_STRONG, TOO_WEAK, YIELDS, passed_over
+from study.tables.ranking import BORNE, passed_over
 from study.uncertainty.verdict import sure
 from study.uncertainty.verdict import verdict as judgement
 
 BEST = 6
 LEAST = 1e-4  # relative error below which only a bound is told
-HARM = SLIDES_OUT | YIELDS | TOO_WEAK | TOO_STRONG
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
     "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
@@ -189,7 +189,7 @@ def chosen(data: Data) -> str:
         return box([f"{which}, is not solved yet."], "warn")
     order = data.order(index[-1])
     said = ", ".join(f"{head(data, name)} {value(data, name, index, 3)}" for name in ("quality", "e_n"))
-    flags = "".join(f" {word}: {meaning}." for _, word, meaning in _flags(data, index))
+    flags = "".join(f" {flag.word}: {flag.sentence}." for flag in _flags(data, index))
     text = f"{which}: {said}, place {order.index(index) + 1} of {len(order)} at this force.{flags}"
     return box([text + (" It is the best one." if index == data.best else "")], "verdict")
 
@@ -202,7 +202,7 @@ def _warnings(data: Data, best: tuple[int, ...]) -> str:
     if best[-1] < len(data.forces) - 1:
         above = "grasp is safe" if np.any(data.status[..., best[-1] + 1 :] == DONE) else "case is solved"
         found.append(f"No {above} above {number(data.forces[best[-1]])} N; all comparisons are made there.")
-    if reasons := [meaning for mask, _, meaning in _flags(data, best) if mask & HARM]:
+    if reasons := [flag.sentence for flag in _flags(data, best) if flag & BORNE]:
         found.append(f"Of all grasps at this force none is without a fault; of the best: {'; '.join(reasons)}.")
     if flagged := data.flagged(best):
         found.append(f"The best case does not pass its checks: {', '.join(flagged)}.")
@@ -253,7 +253,7 @@ def best_tables(data: Data) -> str:
         html += table("Best grasp at each force", heads, rows, wide=(1, len(heads) - 1))
     tops = [index for k in range(len(data.forces)) for index in data.order(k)[:1]]
     html += paragraph(SAFE, "note") if data.bound("force_high") is not None else ""
-    words = {word: meaning for index in (*chosen, *tops) for _, word, meaning in _flags(data, index)}
+    words = {flag.word: flag.sentence for index in (*chosen, *tops) for flag in _flags(data, index)}
     return html + "".join(paragraph(f"{word}: {meaning}.", "note") for word, meaning in words.items())
 
 
@@ -267,15 +267,14 @@ def _with_angles(data: Data, index: tuple[int, ...]) -> str:
     return data.place(index) + (f" (and {_listed(angles)})" if angles else "")
 
 
-def _flags(data: Data, index: tuple[int, ...]) -> list[tuple[int, str, str]]:
-    value = int(data.flags[tuple(index)])
-    return [flag for flag in FLAGS if value & flag[0]]
+def _flags(data: Data, index: tuple[int, ...]) -> list[Flag]:
+    return flags_in(int(data.flags[tuple(index)]))
 
 
 def _row(data: Data, index: tuple[int, ...]) -> list[str]:
     values = [value(data, name, index) for name in VALUES]
     known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
     checks = data.flagged(index) or ["passed" if known else "not stored"]
-    remarks = ", ".join([*checks, *(word for _, word, _ in _flags(data, index))])
+    remarks = ", ".join([*checks, *(flag.word for flag in _flags(data, index))])
     planar = number(data.at("e_n", index, data.planar) * 1e3, 4)
     return [*values, planar if data.bound("force_high") is None else window_text(data, index), remarks]

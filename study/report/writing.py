@@ -7,7 +7,6 @@ tells the values of the maps' cells.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -38,6 +37,7 @@ from study.report.angle_maps import angle_maps
 from study.report.page import Picture, heading, page, paragraph, picture
 from study.storage.store import open_result
 from study.view.model import view_of
+from study.writing import write_file
 
 Sections = list[tuple[str, str, str]]
 Place = tuple[float | None, float | None]
@@ -60,7 +60,7 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
         raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
     with open_result(file) as result, pictures.style():
         html, png = build(result, candidate, place)
-    return [_write(out, html.encode()), _write(picture_path, png)]
+    return [write_file(out, html), write_file(picture_path, png)]
 
 
 def build(result: Any, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
@@ -178,16 +178,3 @@ def _worth_a_curve(data: Data) -> list[int]:
     station = len(data.shape) - 3
     stations = [station] if data.shape[station] >= 4 and not data.by_poses else []
     return [p for p in range(station) if data.shape[p] > 1] + stations
-
-
-def _write(path: Path, content: bytes) -> Path:
-    """Write beside ``path`` and rename: a reader never sees half a page."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        text = f"{path}: cannot be written: {error.strerror}; choose another place with -o"
-        raise StudyError(CANNOT_WRITE, text) from error
-    return path

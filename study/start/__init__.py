@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from study.exits import CANNOT_WRITE, USAGE, StudyError
+from study.writing import write_file
 
 HERE = Path(__file__).parent
 KINDS = {
@@ -101,11 +102,7 @@ def _filled(template: str, words: dict[str, str]) -> str:
 
 def _write(texts: dict[Path, str]) -> None:
     for path, text in texts.items():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise StudyError(CANNOT_WRITE, f"{path}: cannot be written: {error.strerror}") from error
+        write_file(path, text, folders=True)
 
 
 def _about_mesh(options: argparse.Namespace, scene: Path) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,8 +14,13 @@ from study.storage.quantities import EFFECTS, INDICATORS, REASONS
 from study.storage.quantity import FINGERS, MODELS, Quantity
 
 MISSING = 0  # state of a case that has not been solved
-MESSAGE = 240  # bytes of a message
+MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
+MESSAGE_3 = 240  # as files of version 3 have them
 ROOT = "/study"
+SUMS = f"{ROOT}/checksums"  # a dataset for each part of a row, and these two:
+STATE, CLOSING = "code", "closing"  # of the states; of what is filled after all rows
+APART = ("cor_wrench",)  # columns so large that they are a part of a row by themselves
+TIMES = "times"  # a part that differs from run to run
 FIRST_SEEN = ("quality", "e_n")  # maps that viewers open at
 
 
@@ -37,7 +43,7 @@ class Dataset:
 
 @dataclass(frozen=True)
 class Column:
-    """One case's share of a dataset; ``counted`` columns enter the row's checksum, timings do not.
+    """One case's share of a dataset.
 
     ``flat`` ones stand in the order of the rows, those ``among`` some candidates are stored for these only.
     """
@@ -47,9 +53,14 @@ class Column:
     shape: tuple[int, ...]
     dtype: np.dtype
     fill: Any
-    counted: bool = True
     flat: bool = False
     among: str = ""
+
+    @property
+    def part(self) -> str:
+        """The part of the row whose checksum covers it."""
+        group, _, name = self.key.partition("/")
+        return TIMES if name.startswith("seconds_") else name if name in APART else group
 
 
 def columns_of(layout: Any) -> Iterator[Column]:
@@ -62,7 +73,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         elif q.group == "maps":
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", (), f8, np.nan)
         else:
-            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, q.group != "work", among=q.among)
+            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, among=q.among)
     for name in EFFECTS:
         for part, dtype, fill in (("level", "i1", -1), ("indicator", "<f8", np.nan), ("reason", "i1", -1)):
             yield Column(f"effects/{name}_{part}", f"{ROOT}/effects/{name}_{part}", (), np.dtype(dtype), fill)
@@ -70,7 +81,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         for q in PATCH:
             shape = (FINGERS, layout.faces, *q.shape)
             yield Column(q.key, f"{ROOT}/{q.key}", shape, f8, np.nan, flat=True)
-    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
+    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{layout.message}"), b"")
 
 
 def datasets_of(layout: Any) -> Iterator[Dataset]:
@@ -86,10 +97,9 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, attributes, scales + _labels(q, c))
     state = {"long_name": "state of the case", "meaning": "0 missing, 1 done, 2 failed", "units": ""}
     yield Dataset(f"{ROOT}/status/code", layout.shape, np.dtype("u1"), MISSING, state, layout.names)
-    crc = {"long_name": "crc32 of the row, timings left out", "units": ""}
-    yield Dataset(f"{ROOT}/status/crc", layout.shape, np.dtype("<u4"), 0, crc, layout.names)
     tries = {"long_name": "times this case was begun", "units": ""}
     yield Dataset(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"), 0, tries, layout.names)
+    yield from _checksums(layout)
     for name in FIRST_SEEN:
         q, order = described[f"maps/{name}"], layout.seen
         shape, scales = (tuple(given[i] for i in order) for given in (layout.shape, layout.names))
@@ -107,6 +117,22 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         shape = tuple(lengths[name] for name in axes) + d.shape
         scales = axes if not d.shape else ()
         yield Dataset(f"{ROOT}/derived/{d.name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
+
+
+def _checksums(layout: Any) -> Iterator[Dataset]:
+    """Checksums of the parts of every row, of its state, and of what is filled after all rows."""
+    u4 = np.dtype("<u4")
+    if layout.version == 3:
+        about = {"long_name": "crc32 of the row, timings left out", "units": ""}
+        yield Dataset(f"{ROOT}/status/crc", layout.shape, u4, 0, about, layout.names)
+        return
+    for part in layout.parts:
+        about = {"long_name": f"crc32 of the case's {part}", "units": ""}
+        yield Dataset(f"{SUMS}/{part}", layout.shape, u4, 0, about, layout.names)
+    about = {"long_name": "crc32 of the state of the case", "units": ""}
+    yield Dataset(f"{SUMS}/{STATE}", layout.shape, u4, zlib.crc32(bytes([MISSING])), about, layout.names)
+    about = {"long_name": f"crc32 of {', '.join(layout.closing)}", "units": ""}
+    yield Dataset(f"{SUMS}/{CLOSING}", (len(layout.closing),), u4, 0, about, (CLOSING,))
 
 
 def _sample_datasets(layout: Any) -> Iterator[Dataset]:

@@ -14,25 +14,25 @@ from typing import Any
 
 import numpy as np
 
-from study.storage.datasets import MESSAGE as MESSAGE
+from study.storage.datasets import CLOSING, MESSAGE, MESSAGE_3, Column, Dataset, columns_of, datasets_of
 from study.storage.datasets import MISSING as MISSING
 from study.storage.datasets import ROOT as ROOT
-from study.storage.datasets import Column, Dataset, columns_of, datasets_of
 from study.storage.finger_quantities import PATCH
 from study.storage.grid import grid_datasets
 from study.storage.quantities import definitions, quantities
 from study.storage.quantity import FINGERS, MODELS, NEEDS, Quantity
 from study.storage.wall_quantities import ALONG, AROUND
 
-PROGRAM, VERSION = "softjaw", 3
-READABLE = (2, 3)  # 2 lacks the grid for ParaView and the report
+PROGRAM, VERSION = "softjaw", 4
+READABLE = (3, 4)  # 3 has one checksum for a whole row, and none of its state, its timings and what is not in rows
 DONE, FAILED = 1, 2
 LABEL, SESSIONS, REPORT = 80, 256, 8192
-SESSION = np.dtype(
+SESSION_3 = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
      ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
      ("command", "S400"), ("petsc_options", "S400")]
 )  # fmt: skip
+SESSION = np.dtype([*((name, SESSION_3[name]) for name in SESSION_3.names or ()), ("crc", "<u4")])
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,28 @@ class Layout:
     front: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
+    version: int = VERSION
+
+    @property
+    def message(self) -> int:
+        """Bytes of a message."""
+        return MESSAGE if self.version > 3 else MESSAGE_3
+
+    @property
+    def session(self) -> np.dtype:
+        """Type of a row of the provenance."""
+        return SESSION if self.version > 3 else SESSION_3
+
+    @cached_property
+    def parts(self) -> dict[str, tuple[int, ...]]:
+        """Parts of a row that have a checksum, and the positions of their columns."""
+        names = dict.fromkeys(column.part for column in self.columns)
+        return {name: tuple(i for i, c in enumerate(self.columns) if c.part == name) for name in names}
+
+    @property
+    def closing(self) -> tuple[str, ...]:
+        """What is filled after all rows and has a checksum, by its dataset's name below ``/study``."""
+        return (*(f"derived/{d.name}" for d in self.derived), "report")
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -140,17 +162,27 @@ class Layout:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
         if self.probes:
             parts |= {"probe": len(self.probes), "variation": len(self.variations)}
+        if self.version > 3:
+            parts[CLOSING] = len(self.closing)
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """All columns of a row, in the order of the checksum."""
+        """All columns of a row, in the order of the checksums."""
         return tuple(columns_of(self))
 
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
         """All datasets of the study but axes, texts and sessions."""
         return tuple(datasets_of(self))
+
+    def dataset(self, path: str) -> Dataset:
+        """The dataset at a path of `datasets`."""
+        return self._by_path[path]
+
+    @cached_property
+    def _by_path(self) -> dict[str, Dataset]:
+        return {d.path: d for d in self.datasets}
 
     @cached_property
     def grid(self) -> tuple[Dataset, ...]:
@@ -162,7 +194,7 @@ class Layout:
         """Size of the file, rounded up generously for what HDF5 adds."""
         datasets = (*self.datasets, *self.grid)
         count = len(datasets) + len(self.axes) + 16
-        return sum(d.nbytes for d in datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
+        return sum(d.nbytes for d in datasets) + SESSIONS * self.session.itemsize + REPORT + 4096 * count + 2**16
 
     @property
     def chosen(self) -> dict[str, tuple[int, ...]]:
@@ -194,7 +226,7 @@ class Layout:
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
-def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
+def layout_from_options(axes: Sequence[Any], text: str, version: int = VERSION) -> Layout:
     """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
     try:
         options = json.loads(text)
@@ -216,7 +248,7 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
         return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
-                      front, probes, variations)  # fmt: skip
+                      front, probes, variations, version)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

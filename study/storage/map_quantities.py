@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from study.flags import flag_definitions
 from study.storage.quantity import Quantity
 from study.storage.wall_quantities import WALL
 
@@ -139,20 +140,7 @@ MAPS = (
         "flags",
         "",
         "flags of the case",
-        "Sum of: 1 a contact carries no torque, 2 a contact carries no force"
-        " along an axis; contact frame: 4 normal averaged over a cycle, 8 no face on the line through the centre of"
-        " pressure, 16 no corners, 32 mixed orientation, 64 overhanging normals, 128 corners of some faces wound"
-        " against their normals, which were taken; 256 contacts more than 5 degrees from antipodal;"
-        " 512 solved with nodal gaps, because weighted ones had no solution; 1024 the line that joins the"
-        " contacts leaves a friction cone: the grasp slips; 2048 the fingers' pads run into each other beside the"
-        " object; 4096 the mesh is coarse for this contact: the front overlaps the object by more than a tenth of"
-        " the travel, fewer than six elements carry load or only one along its length or its width, or"
-        " trilinear elements are too stiff for foam with a Poisson's ratio above 0.45; 8192 the wall has snapped in:"
-        " on the way to this case the force fell while the fingers closed, or grew less than half as fast as before"
-        " on average; 16384 the pads push the object along its axis with more than friction can hold: it slides"
-        " out; 32768 the wall's stress is above its yield strength: the dent stays; 65536 a limit surface could not"
-        " be fitted, the ellipsoid from three motions stands in; 131072 the foam lost ellipticity: strains may"
-        " localise.",
+        flag_definitions(),
     ),
     *(
         Quantity(

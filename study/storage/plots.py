@@ -54,5 +54,6 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
     collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in layout.quantities}]
     collections += ["patch"] * layout.patches + ["derived"] * bool(layout.derived)
+    collections += ["checksums"] * (layout.version > 3)
     found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
     return found

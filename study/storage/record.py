@@ -1,20 +1,18 @@
-"""The row of one case as an ordered list of arrays, and its checksum."""
+"""The row of one case as an ordered list of arrays."""
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from study.storage.layout import MESSAGE, Layout
+from study.storage.layout import Layout
 from study.storage.quantities import EFFECTS
 from study.storage.quantity import MODELS
 from study.storage.result import CaseResult
 
 
-def text_bytes(text: str, length: int = MESSAGE) -> bytes:
+def text_bytes(text: str, length: int) -> bytes:
     """UTF-8 of at most ``length`` bytes, on one line, without a broken last letter."""
     return " ".join(text.split()).encode()[:length].decode(errors="ignore").encode()
 
@@ -22,7 +20,7 @@ def text_bytes(text: str, length: int = MESSAGE) -> bytes:
 def blank(layout: Layout, message: str = "") -> list[np.ndarray]:
     """A row without values, as a failed case leaves it."""
     row = [np.full(c.shape, c.fill, c.dtype) for c in layout.columns]
-    row[-1] = np.array(text_bytes(message), layout.columns[-1].dtype)
+    row[-1] = np.array(text_bytes(message, layout.message), layout.columns[-1].dtype)
     return row
 
 
@@ -65,8 +63,3 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
     return given
 
 
-def crc32(layout: Layout, row: int, values: Sequence[np.ndarray]) -> int:
-    """Checksum of everything that is stored of a row but timings."""
-    stored = zip(layout.columns, values, layout.places(row), strict=True)
-    counted = [np.asarray(value, c.dtype) for c, value, place in stored if c.counted and place is not None]
-    return zlib.crc32(b"".join(value.tobytes() for value in counted))

@@ -19,6 +19,7 @@ from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
 from study.scene.errors import SceneError
 from study.storage.layout import DONE, FAILED, MISSING, ROOT
 from study.storage.store import ResultWriter, create, open_result, rows_of
+from study.writing import remove
 
 SIGNATURE, END = b"\x89HDF\r\n\x1a\n", struct.Struct("<40xQ")  # version 0, which this program writes: size at byte 40
 BROKEN = (StudyError, SceneError, ValueError, KeyError, TypeError, RuntimeError, OSError)  # of HDF5, whatever it finds
@@ -96,7 +97,7 @@ def _completed(path: Path, target: Path) -> Iterator[Path]:
     except OSError as error:
         raise StudyError(CANNOT_WRITE, f"{target}: cannot be written ({error.strerror or error})") from error
     finally:
-        copy.unlink(missing_ok=True)
+        remove(copy)
 
 
 def _whole(path: Path) -> int:
@@ -116,28 +117,32 @@ def _examine(path: Path, copy: Path) -> Findings:
     ):
         raise _hopeless(path, "what is left of its structure cannot be read")
     try:
-        with open_result(copy) as result:
-            layout, codes = result.layout, result.status.ravel()
+        with open_result(copy, unchecked=True) as result:
+            layout, marked = result.layout, result.codes.ravel()
             packed = any(result.file.plain(dataset.path).chunks for dataset in layout.datasets)
             lost = _lost_part(result, path.stat().st_size)
-        torn = [row for row, _, values in rows_of(copy, layout) if values is None]
+        codes, torn = np.full(marked.shape, MISSING), []
+        for row, state, values in rows_of(copy, layout):
+            codes[row], torn = state, torn + [row] * (values is None)
+        unmarked = int(np.sum(codes != marked))
     except BROKEN as error:
         raise _hopeless(path, str(error).removeprefix(f"{copy}: ")) from error
     leftovers = [path.with_name(path.name + end) for end in (".part", ".lock")]
-    flaw = f"damaged: {lost}, which is no part of a case and can be made again" if lost else ""
+    flaw = f"damaged: the states of {unmarked} cases, which their checksums still tell" if unmarked else ""
+    flaw = f"damaged: {lost}; it can be made again" if lost else flaw
     flaw = "repacked: a run could not write it in parallel" if packed else flaw
     return Findings(path.stat().st_size, copy.stat().st_size, codes, torn, flaw, [p for p in leftovers if p.exists()])
 
 
 def probe(copy: str) -> None:
     """Read whatever a repair reads, in a process of its own: over zeros HDF5 may crash or turn for ever."""
-    with suppress(*BROKEN), open_result(copy) as result:
+    with suppress(*BROKEN), open_result(copy, unchecked=True) as result:
         _lost_part(result, 2**63)
         list(rows_of(Path(copy), result.layout))
 
 
 def _lost_part(result: Any, size: int) -> str:
-    """The first thing beside the rows that is not in the file any more; empty where all of it is."""
+    """The first thing beside the rows that is not as it was written; empty where all of it is."""
     layout = result.layout
     fixed = [f"{ROOT}/{name}" for name in ("scene", "definitions", "provenance/sessions")]
     for name in [*fixed, *(f"{ROOT}/axes/{axis}" for axis in layout.names), *(d.path for d in layout.grid)]:
@@ -147,14 +152,18 @@ def _lost_part(result: Any, size: int) -> str:
             return name
         if found.size and int(found.id.get_offset() or 0) + found.nbytes > size:
             return name
-    return ""
+    if not result.header_good:
+        return "its axes, scene or definitions"
+    return next((name for name in layout.closing if not result.closing_good(name)), "")
 
 
 def _rewrite(path: Path, copy: Path, fresh: Path) -> None:
     """A new file of the same scene with the good rows of the damaged one."""
     try:
-        with open_result(copy) as result:
-            layout, plan = result.layout, _plan(result)
+        with open_result(copy, unchecked=True) as result:
+            layout, plan, digest = result.layout, _plan(result), result.digest
+        if plan.header.digest != digest:
+            raise ValueError("its scene, or the mesh that it names, is not the one that was solved")
         create(fresh, plan.layout, plan.header)
         with open_result(fresh) as made:
             same = replace(layout, surface=made.layout.surface).options() == made.layout.options()
@@ -166,7 +175,9 @@ def _rewrite(path: Path, copy: Path, fresh: Path) -> None:
                 writer.copy(row, values, state)
         writer.close()
     except BROKEN as error:
-        fresh.unlink(missing_ok=True)
+        remove(fresh)
+        if getattr(error, "code", 0) == CANNOT_WRITE:
+            raise
         raise _hopeless(path, str(error)) from error
 
 

@@ -10,12 +10,13 @@ import h5py
 import numpy as np
 
 from study.exits import CANNOT_WRITE, StudyError
-from study.storage.datasets import FIRST_SEEN
+from study.storage import checksums
+from study.storage.datasets import CLOSING, FIRST_SEEN, STATE, SUMS
 from study.storage.guarded import GuardedFile
-from study.storage.layout import DONE, FAILED, MISSING, ROOT, SESSION, Layout
+from study.storage.layout import DONE, FAILED, MISSING, ROOT, Layout
 from study.storage.quantity import MODELS
 from study.storage.reading import Result
-from study.storage.record import blank, crc32, text_bytes
+from study.storage.record import blank, text_bytes
 from study.storage.skeleton import LIBVER, report_bytes
 
 
@@ -34,7 +35,8 @@ class ResultWriter:
         self._columns = [self._file[c.path] for c in layout.columns]
         keys = [c.key for c in layout.columns]
         self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST_SEEN}
-        self._code, self._crc, self._attempts = (self._file[f"{ROOT}/status/{n}"] for n in ("code", "crc", "attempts"))
+        self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
+        self._sums = {part: self._file[f"{SUMS}/{part}"] for part in (*layout.parts, STATE, CLOSING)}
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session = 0
 
@@ -54,7 +56,12 @@ class ResultWriter:
     def forget(self, row: int) -> None:
         """Make a failed or torn row a missing one that was never tried."""
         self._code[self._index(row)] = MISSING
+        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
         self._attempts[self._index(row)] = 0
+
+    def tidy(self, row: int) -> None:
+        """Make a missing row that a killed process had stored, but not marked, like any other missing one."""
+        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
 
     def write(self, row: int, values: Sequence[np.ndarray]) -> None:
         """Store a solved case; ``values`` as from ``study.storage.record.record``."""
@@ -72,6 +79,8 @@ class ResultWriter:
         index = self._index(row)
         if self._code[index] == DONE:
             raise ValueError(f"row {row} is done already and must not be written again")
+        if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
+            self._attempts[index] = 1
         places = self.layout.places(row)
         for column, dataset, value, place in zip(self.layout.columns, self._columns, values, places, strict=True):
             if place is None:
@@ -82,7 +91,9 @@ class ResultWriter:
                 _write_block(dataset, place, value)
         for position, dataset in self._maps.items():
             dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
-        self._crc[index] = crc32(self.layout, row, values)
+        sums = {**checksums.of_parts(self.layout, row, values), STATE: checksums.OF_STATE[state]}
+        for part, crc in sums.items():
+            _write_block(self._sums[part], index, np.array(crc, "<u4"))
         self._code[index] = state
 
     def _index(self, row: int) -> tuple[int, ...]:
@@ -102,26 +113,32 @@ class ResultWriter:
 
     def write_report(self, text: str) -> None:
         """Write the report, cut where it is too long; by one rank, after all rows."""
-        self._file[f"{ROOT}/report"][()] = report_bytes(text)
+        self._file[f"{ROOT}/report"][()] = found = report_bytes(text)
+        self._close("report", found)
 
     def write_derived(self, name: str, values: Any) -> None:
         """Fill a derived dataset; by one rank, after all rows."""
         dataset = self._file[f"{ROOT}/derived/{name}"]
-        dataset[...] = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
+        dataset[...] = found = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
+        self._close(f"derived/{name}", found)
+
+    def _close(self, name: str, values: np.ndarray) -> None:
+        self._sums[CLOSING][self.layout.closing.index(name)] = checksums.of_array(values)
 
     def begin_session(self, **fields: Any) -> None:
         """Add a row to the provenance; by one rank."""
         used = self._sessions[()]["start"] != b""
         self.session = min(int(used.sum()), len(used) - 1)
-        self._sessions[self.session] = np.zeros((), SESSION)
+        self._sessions[self.session] = np.zeros((), self.layout.session)
         self.update_session(**fields)
 
     def update_session(self, **fields: Any) -> None:
         """Change fields of this run's row of the provenance; by one rank."""
         row = self._sessions[self.session]
         for name, value in fields.items():
-            kind = SESSION[name]
+            kind = row.dtype[name]
             row[name] = text_bytes(value, kind.itemsize) if kind.kind == "S" else value
+        row["crc"] = checksums.of_session(row)
         self._sessions[self.session] = row
 
     def close(self) -> None:

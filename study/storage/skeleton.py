@@ -13,13 +13,15 @@ import numpy as np
 
 from friction.motion import fibonacci_twists
 from study.exits import CANNOT_WRITE, StudyError
-from study.storage import grid
-from study.storage.guarded import reason
-from study.storage.layout import LABEL, PROGRAM, REPORT, ROOT, SESSION, SESSIONS, VERSION, Dataset, Header, Layout
+from study.storage import checksums, grid
+from study.storage.datasets import CLOSING, SUMS
+from study.storage.guarded import GuardedFile, reason
+from study.storage.layout import LABEL, PROGRAM, REPORT, ROOT, SESSIONS, Dataset, Header, Layout
 from study.storage.plots import groups
 from study.storage.provenance import SAMPLING
 from study.storage.record import text_bytes
 from study.storage.vtkhdf import head
+from study.writing import remove
 
 LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")
@@ -39,11 +41,13 @@ def create(path: Path, layout: Layout, header: Header) -> None:
     try:
         with h5py.File(part, "w", libver=LIBVER) as file:
             _write_skeleton(file, layout, header)
+        with h5py.File(part, "r+", libver=LIBVER) as file:
+            _write_checksums(file, GuardedFile(part, file), layout)
         with part.open("r+b") as handle:
             os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
             os.fsync(handle.fileno())
     except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
-        part.unlink(missing_ok=True)
+        remove(part)
         if not isinstance(error, OSError) and "write" not in str(error):
             raise
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
@@ -65,13 +69,14 @@ def _reserve(path: Path, need: int) -> None:
     except OSError as error:
         raise StudyError(CANNOT_WRITE, f"{path}: {need / 1e6:.1f} MB cannot be reserved: {error.strerror}") from error
     finally:
-        trial.unlink(missing_ok=True)
+        remove(trial)
 
 
 def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
-    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
+    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=layout.version)
     study = file.create_group(ROOT)
     study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
+    study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the front, before its value is known
     _write_attribute(study, "axes", list(layout.names))
     for name, attributes in groups(layout).items():
         group = study.create_group(name)
@@ -91,6 +96,14 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
     _write_texts(study, layout, header)
     if layout.grid:
         _write_grid(file, layout, header)
+
+
+def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> None:
+    """Checksums of what stands in the new file already."""
+    if layout.version > 3:
+        file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
+        for i, name in enumerate(layout.closing):
+            file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
 
 
 def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
@@ -115,7 +128,7 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
-    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, layout.session))
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
     labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))

@@ -19,20 +19,24 @@ import h5py
 import numpy as np
 
 from study.exits import OTHER_FILE, StudyError
+from study.storage import checksums
+from study.storage.checksums import broken_rows, broken_states
 from study.storage.guarded import GuardedFile, opened
-from study.storage.layout import DONE, MISSING, ROOT, VERSION, Header, Layout
+from study.storage.layout import MISSING, VERSION, Header, Layout
 from study.storage.reading import Result
-from study.storage.record import crc32
 from study.storage.result_writer import ResultWriter
 from study.storage.skeleton import create
 
 __all__ = ["ResultWriter", "create", "open_result", "rows_of", "torn_rows", "verify"]
 
 
-def open_result(path: str | Path) -> Result:
-    """A result file for reading, also while a run is writing it; raise `StudyError` if it is none."""
+def open_result(path: str | Path, unchecked: bool = False) -> Result:
+    """A result file for reading, also while a run is writing it; raise `StudyError` if it is none.
+
+    ``unchecked`` reads what is there, whether it matches its checksums or not.
+    """
     path = Path(path)
-    return opened(path, "result file", lambda file: Result(path, file), _go_through)
+    return opened(path, "result file", lambda file: Result(path, file, unchecked), _go_through)
 
 
 def _go_through(result: Result) -> None:
@@ -69,30 +73,26 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
                 text = f"{path}: was repacked and cannot be written in parallel any more; 'softjaw repair' undoes that"
                 raise StudyError(OTHER_FILE, text)
-
-
-def torn_rows(path: Path, layout: Layout) -> list[int]:
-    """Rows that are marked done but do not match their checksum."""
-    return [row for row, state, values in rows_of(path, layout) if state == DONE and values is None]
+        codes = result.codes.ravel()
+        wrong = broken_states(result.file, layout, codes, result.killed)
+        if lost := int(np.sum(codes[wrong] == MISSING)):
+            text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
+            raise StudyError(OTHER_FILE, f"{text}; 'softjaw repair' makes a file that can be gone on with")
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
-    """Every row that is done or failed: number, state, and values, or None where they do not match their checksum."""
-    expected = {d.path: d for d in layout.datasets}
+    """Every row of a file that is done or failed; see `study.storage.checksums.rows_of`."""
     with h5py.File(path, "r") as file:
-        guarded = GuardedFile(path, file)
-        found = {at: guarded.checked(at, d.shape, d.dtype) for at, d in expected.items()}
-        views = [_mapped(path, found[c.path], c.dtype) for c in layout.columns]
-        codes, crc = (guarded.values(found[f"{ROOT}/status/{name}"]).ravel() for name in ("code", "crc"))
-    for row in np.flatnonzero(codes != MISSING):
-        pairs = zip(views, layout.places(row), strict=True)
-        values = [None if place is None else view[place] for view, place in pairs]
-        yield int(row), int(codes[row]), values if crc32(layout, row, values) == crc[row] else None
+        yield from checksums.rows_of(GuardedFile(path, file), layout)
 
 
-def _mapped(path: Path, dataset: h5py.Dataset, dtype: np.dtype) -> np.ndarray:
-    if dataset.size == 0:
-        return np.empty(dataset.shape, dtype)
-    if dataset.chunks:  # a file that was repacked
-        return dataset[()].astype(dtype)
-    return np.memmap(path, dtype, "r", dataset.id.get_offset(), dataset.shape)
+def torn_rows(path: Path, layout: Layout) -> list[int]:
+    """Rows that are marked done or failed but do not match their checksums."""
+    if layout.version == 3:
+        return [row for row, _, values in rows_of(path, layout) if values is None]
+    with open_result(path, unchecked=True) as result:
+        codes = result.codes.ravel()
+        marked = np.flatnonzero(codes != MISSING)
+        torn = [broken_rows(result.file, layout, part, marked) for part in layout.parts]
+        states = broken_states(result.file, layout, codes, under_way=False)
+    return sorted({*np.concatenate(torn).tolist(), *(set(states.tolist()) & set(marked.tolist()))})

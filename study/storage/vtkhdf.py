@@ -6,15 +6,14 @@ for all steps). `write_grid` makes a file of its own; a result file has such a g
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from study.exits import CANNOT_WRITE, StudyError
 from study.storage.grid_arrays import shared_steps, topology
+from study.writing import beside
 
 LIBVER = ("earliest", "v110")
 Arrays = Mapping[str, np.ndarray]
@@ -46,16 +45,9 @@ def write_grid(
     StudyError
         If the file cannot be written.
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        with h5py.File(part, "w", libver=LIBVER) as file:
-            file.attrs["about"] = about
-            _write(file.create_group("VTKHDF"), points, cells, on_cells, on_points or {}, steps)
-        part.replace(path)
-    except (OSError, RuntimeError) as error:
-        part.unlink(missing_ok=True)
-        reason = getattr(error, "strerror", None) or error
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written: {reason}; choose another place") from error
+    with beside(path) as part, h5py.File(part, "w", libver=LIBVER) as file:
+        file.attrs["about"] = about
+        _write(file.create_group("VTKHDF"), points, cells, on_cells, on_points or {}, steps)
 
 
 def _write(

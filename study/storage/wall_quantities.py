@@ -15,7 +15,7 @@ WALL = (
              needs="wall"),
     Quantity("support_force", "N", "force of the support", "What the support has to bear in this frictionless contact:"
              " the pads push an object with sloping walls along its axis. Friction takes it in a grasp; where it is"
-             " more than mu F_N of both fingers can take, flag 16384 says so.", needs="wall"),
+             " more than mu F_N of both fingers can take, the flag 'slides out' says so.", needs="wall"),
     Quantity("place", "m", "deformed wall", f"Outer face in the object's frame at {AROUND} angles about the axis, in"
              f" equal steps from finger 1's, times {ALONG} places along the outline, in equal steps of its arc length"
              " from the bottom's middle or rim to the top; the angle runs slowest.", group="wall",

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from study.flags import flags_in
 from study.storage.finger_quantities import MONOMIALS
 from study.storage.quantity import MODELS
 from study.tables.columns import cell
-from study.tables.ranking import FLAGS
 
 STATES = ("missing", "done", "failed")
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
@@ -116,7 +116,7 @@ def as_json(result: Any, model: str = "curved") -> str:
     units |= {name: unit for name, unit, _ in FINGER}
     rows = []
     for case in cases(result, model):
-        place, words = case.pop("place"), [word for mask, word, _ in FLAGS if case["flags"] & mask]
+        place, words = case.pop("place"), [flag.word for flag in flags_in(case["flags"])]
         rows.append(place | {k: _plain(v) for k, v in case.items()} | {"flag_words": words})
     about = {"file": result.path.name, "model": model, "units": units, "meaning": MEANING}
     return json.dumps({**about, "cases": rows}, indent=1)

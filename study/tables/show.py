@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from study.flags import OF_FILE
 from study.storage.layout import DONE
 from study.tables.columns import DISPLAY, csv_text, with_unit
-from study.tables.ranking import BORNE, LOST, OF_FILE, borne_level, judged, passed_over, ranking
+from study.tables.ranking import BORNE, LOST, borne_level, judged, passed_over, ranking
 from study.tables.show_text import WINDOW, Columns, alike
 from study.tables.show_text import as_text as as_text
 from study.uncertainty.verdict import sure, verdict

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from study.flags import flag_words, flags_in
 from study.tables.columns import DISPLAY, PAPER, aligned, fitting, two_lines, wrapped
-from study.tables.ranking import FLAGS
 
 if TYPE_CHECKING:
     from study.tables.show import Table
@@ -52,7 +52,7 @@ def as_text(table: Table, width: int = PAPER) -> str:
 def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
     """What the words of the table mean, and what it does not show."""
     names = [name for name, _ in table.columns]
-    told = [f"{word}: {meaning}" for mask, word, meaning in FLAGS if flags & mask]
+    told = [f"{flag.word}: {flag.sentence}" for flag in flags_in(flags)]
     told += [f"window: {WINDOW_MEANS}"] * ("window" in names)
     kinds = {"_band": BAND_MEANS, "_error": f"{ERROR_MEANS}{', in %' * any(n.endswith('_band') for n in names)}"}
     told += [f"{ERROR}: {text}" for end, text in kinds.items() if any(n.endswith(end) for n in names)] or [NO_ERRORS]
@@ -154,7 +154,7 @@ def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
 
 def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
     if name == "flags":
-        return ", ".join(word for mask, word, _ in FLAGS if value & mask)
+        return flag_words(value)
     if not isinstance(value, float):
         text = str(value)
         return text if len(text) <= LABEL_WIDTH else f"{text[: LABEL_WIDTH - 3]}..."

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.exits import CANNOT_WRITE, USAGE, StudyError
+from study.writing import beside, write_file
 
 if TYPE_CHECKING:
     from study.view.model import View
@@ -100,19 +101,12 @@ def _write(name: str, path: Path, found: View, index: tuple[int, ...], quantity:
         from study.view.grids import write_grids
 
         return write_grids(found, index, path)
-    part = path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
-    try:
-        if name == "screenshot":
-            from study.view.window import save_picture
+    if name == "screenshot":
+        from study.view.window import save_picture
 
+        with beside(path) as part:
             save_picture(found, index, part, quantity, motion)
-        else:
-            from study.view.page import page
+        return [path]
+    from study.view.page import page
 
-            part.write_text(page(found, index, quantity, motion), encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
-    return [path]
+    return [write_file(path, page(found, index, quantity, motion))]

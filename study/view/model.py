@@ -9,9 +9,9 @@ import numpy as np
 
 from study.data import Data, number
 from study.exits import USAGE, StudyError
+from study.flags import flag_words
 from study.outline import read_scene, swept_object
 from study.storage.layout import DONE, FAILED
-from study.tables.ranking import FLAGS
 from study.view.surface import NOBODY, Cells, coloured, with_normals
 from study.view.wall import Wall, displacement, wall_of
 
@@ -154,8 +154,8 @@ class View:
             if (found := data.map(name)) is not None:
                 label, unit, factor = data.units(name)
                 lines.append(f"{label}: {number(found[index] * factor)} {unit}".rstrip())
-        flags = [text for mask, text, _ in FLAGS if int(data.flags[index]) & mask]
-        return [*lines, f"flags: {', '.join(flags)}"] if flags else lines
+        flags = flag_words(int(data.flags[index]))
+        return [*lines, f"flags: {flags}"] if flags else lines
 
 
 def _ball(radius: float) -> np.ndarray:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from study.flags import flag_words
 from study.pictures import span
 from study.storage.layout import DONE, FAILED
-from study.tables.ranking import FLAGS
 from study.view import limits
 from study.view.colours import CROSS, CROSSED, FORCE, NEUTRAL, OPEN, PAD, stops
 from study.view.model import View
@@ -135,8 +135,8 @@ def _remarks(view: View) -> dict[str, str]:
             i = view.index(c, k)
             if data.status[i] == FAILED:
                 found[f"{k} {c}"] = f"failed: {messages[i] or 'no reason was given'}"
-            elif words := [text for mask, text, _ in FLAGS if int(data.flags[i]) & mask and data.status[i] == DONE]:
-                found[f"{k} {c}"] = f"flags: {', '.join(words)}"
+            elif data.status[i] == DONE and (told := flag_words(int(data.flags[i]))):
+                found[f"{k} {c}"] = f"flags: {told}"
     return found
 
 

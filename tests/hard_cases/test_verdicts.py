@@ -15,6 +15,7 @@ from study.catalogue.scenes import case_scene, merged
 from study.catalogue.table import table_text
 from study.catalogue.verdict import FINITE, judge
 from study.exits import StudyError
+from study.flags import Flag
 from tests.study.launching import ROOT
 
 HARD = ROOT / "jobs" / "hard-cases.toml"
@@ -149,7 +150,7 @@ def test_what_is_wrong_is_found(found, keys, words):
 
 
 def test_lost_ellipticity_with_its_remark_is_no_silence():
-    told = ("foam lost ellipticity, strains may localise", "")
+    told = (Flag.UNSTABLE.sentence, "")
     assert wrong(solved(messages=told, checks=GOOD | {"acoustic": -0.1}), remark="ellipticity") == ""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from study.storage.layout import Derived, Header, Layout
 from study.storage.reading import StoredAxis
 from study.storage.store import create
+from tests.study.sealing import sealed
 
 SCENE = """
 [object]
@@ -80,7 +81,7 @@ def make(path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(
         for name, values in datasets.items():
             target = study[name.replace("__", "/")]
             target[...] = values(target[()]) if callable(values) else values
-    return path
+    return sealed(path)
 
 
 def without_result(code, message=""):

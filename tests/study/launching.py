@@ -14,7 +14,7 @@ from study.environment import launch_environment
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = Path(__file__).parent / "fake_run.py"
-NOT_COMPARED = ("study/work/", "study/provenance/", "study/status/attempts")
+NOT_COMPARED = ("study/work/", "study/checksums/times", "study/provenance/", "study/status/attempts")
 
 
 def command(ranks, *words):

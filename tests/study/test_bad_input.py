@@ -13,6 +13,7 @@ import pytest
 
 from study.cli import main
 from study.environment import launch_environment
+from study.flags import Flag
 from study.storage.store import open_result
 from tests.study.launching import ROOT, launch
 
@@ -230,7 +231,7 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     small, large, middle, beside = 0, 1, 0, 1
     assert np.isfinite(quality[large, middle]).all()
     good, ended, above = messages[small, middle]
-    assert good in ("", "the mesh is coarse for this contact")
+    assert good in ("", Flag.COARSE.sentence)
     assert "the force stays below 20 N" in ended
     assert ended.endswith("the last good force is 2 N")
     assert above.startswith("not tried, because the ladder of forces ended at 20 N")

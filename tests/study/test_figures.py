@@ -11,7 +11,7 @@ from study.cli import main
 from study.data import Data
 from study.exits import OTHER_FILE, StudyError
 from study.figures import JOBS, fig5, fig6, fig7, fig8, rendering
-from study.figures.command import chosen, draw, targets, write
+from study.figures.command import chosen, draw, targets
 from study.figures.table import FIGURES, Figure, find
 from study.storage.layout import DONE
 from study.storage.store import open_result
@@ -85,14 +85,6 @@ def test_failed_cases_are_told_of_where_a_figure_needs_them(tmp_path):
     with pytest.raises(StudyError, match=r"figure 7 is not drawn: 1 cases of \S+lost.hdf failed; 'softjaw status"):
         draw(figure, {"x": path, "y": lost}, tmp_path / "7.png")
     assert not (tmp_path / "7.png").exists()
-
-
-def test_a_picture_that_cannot_be_written_is_told(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(StudyError, match=r"cannot be written.*choose another place with -o"):
-        write(tmp_path / "file" / "7.png", PNG)
-    write(tmp_path / "new" / "7.png", PNG)
-    assert [path.name for path in (tmp_path / "new").iterdir()] == ["7.png"]
 
 
 def test_a_scene_that_cannot_be_solved_is_not_drawn(tmp_path, capsys, monkeypatch):

@@ -14,7 +14,8 @@ from lsfit.quartic import Quartic
 from scoring.contact import EllipsoidBody, SoftContact
 from scoring.pose import pose_volume
 from study.case import limit_surface
-from study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, NO_FIT, PROGRAMME, STANDS_IN
+from study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
+from study.flags import Flag
 from study.storage.quantity import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
@@ -88,11 +89,11 @@ def test_a_fit_that_fails_leaves_the_ellipsoid_and_a_flag(monkeypatch):
     [(_, [result])] = solved(OVAL, "limit_surface.samples=60", forces="[5]")
     solved.cache_clear()
     assert (np.array(result.values["limit_surface/certificate"]) == STANDS_IN).all()
-    assert result.values["maps/flags"] & NO_FIT
+    assert result.values["maps/flags"] & Flag.NO_FIT
     assert "could not be fitted" in result.message
     assert result.values["maps/misfit"] == result.values["maps/misfit_ellipsoid"]
     monkeypatch.undo()
-    assert not cases(OVAL, "limit_surface.samples=60", forces="[5]")[0]["maps/flags"] & NO_FIT
+    assert not cases(OVAL, "limit_surface.samples=60", forces="[5]")[0]["maps/flags"] & Flag.NO_FIT
 
 
 def test_sampled_wrenches_are_those_of_the_patch_times_mu():

@@ -14,9 +14,9 @@ import pytest
 from study import pipeline
 from study.case import solving
 from study.case.build import build_object
-from study.case.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
 from study.case.sweep import units
 from study.environment import launch_environment
+from study.flags import Flag
 from study.scene import parse_scene
 from study.storage.quantity import MODELS
 from study.storage.result import CaseFailure
@@ -228,7 +228,7 @@ def test_without_friction_nothing_is_held_and_a_flag_says_so():
         values = result.values
         for name in ("quality", "epsilon", "f_x_max", "f_y_max", "tau_z_max"):
             assert (np.asarray(values[f"maps/{name}"]) == 0.0).all()
-        assert values["maps/flags"] & ~COARSE == 1 | 2
+        assert values["maps/flags"] & ~Flag.COARSE == Flag.NO_TORQUE | Flag.NO_FORCE
         assert "carries no torque" in result.message
         assert values["maps/e_n"] == pytest.approx(held["maps/e_n"], rel=1e-12)  # a length, whatever mu is
         assert values["maps/S"] == held["maps/S"]
@@ -377,12 +377,12 @@ def test_a_changed_material_takes_effect_although_its_callers_were_compiled_befo
     assert travel() < 0.7 * soft
 
 
-@pytest.mark.parametrize(("angle", "expected"), [(0, 0), (4, NOT_ANTIPODAL), (45, NOT_ANTIPODAL | SLIPS)])
+@pytest.mark.parametrize(("angle", "expected"), [(0, 0), (4, Flag.ASKEW), (45, Flag.ASKEW | Flag.SLIPS)])
 def test_contacts_beside_each_other_are_flagged_although_their_normals_are_parallel(angle, expected):
     """Pads turned against a plate touch it towards opposite edges; mu = 0.8 holds up to 38.7 degrees."""
     plate = 'shape = "plane"\nthickness_mm = 20'
     [(_, [case])] = solved(plate, angles=f"[{angle}]", forces="[5]", elements="[12, 8, 4]")
-    assert case.values["maps/flags"] & (NOT_ANTIPODAL | SLIPS) == expected
+    assert case.values["maps/flags"] & (Flag.ASKEW | Flag.SLIPS) == expected
     if angle:
         assert case.values["maps/misalignment"] > np.radians(5)
 
@@ -391,5 +391,5 @@ def test_pads_that_would_run_into_each_other_are_flagged():
     """Two pads on a ball of 12 mm: together they travel further than the ball is thick."""
     ball = 'shape = "sphere"\nradius_mm = 6'
     [(_, ladder)] = solved(ball, forces="[1, 20]", elements="[20, 10, 6]")
-    assert [bool(case.values["maps/flags"] & PADS_MEET) for case in ladder] == [False, True]
+    assert [bool(case.values["maps/flags"] & Flag.OVERLAP) for case in ladder] == [False, True]
     assert [2 * case.values["maps/travel"] > 0.012 for case in ladder] == [False, True]

@@ -7,6 +7,7 @@ import h5py
 from study.storage.layout import REPORT
 from study.storage.plain_report import plain, plain_report
 from study.storage.store import open_result
+from tests.study.sealing import sealed
 from tests.study.view_files import make
 
 
@@ -29,7 +30,7 @@ def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
     path = make(tmp_path / "thing.hdf")
     with h5py.File(path, "r+") as file:
         file["study/status/code"][...] = 2
-    with open_result(path) as result:
+    with open_result(sealed(path)) as result:
         text = plain_report(result, None)
     assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
     assert "failed 11 x no reason was given" in text

@@ -106,8 +106,9 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     assert not list(shared_path.glob("*.part"))
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
-    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure", "status/crc",
-                 "quality_fitted/flat", "limit_surface/coefficients", "wrenches/wrench"):  # fmt: skip
+    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure",
+                 "checksums/patch", "quality_fitted/flat", "limit_surface/coefficients",
+                 "wrenches/wrench"):  # fmt: skip
         assert f"study/{name}" in expected
     assert once(differing, path, expected) == []
 

@@ -179,7 +179,7 @@ def test_a_real_file_that_was_cut_off_or_repacked_goes_on_to_the_same_bits(once,
 @pytest.mark.long
 @pytest.mark.launches
 def test_the_command_says_in_one_line_why_it_cannot(once, shared_path):
-    (shared_path / "x.hdf").write_text("my notes")
+    once((shared_path / "x.hdf").write_text, "my notes")
     code, _, errors = once(launch, 0, "-m", "study", "repair", shared_path / "x.hdf")
     assert code == OTHER_FILE
     assert errors.count("error: ") == len(errors.splitlines()) == 1

@@ -13,13 +13,13 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
 from study import pictures
 from study.data import Data, number
 from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from study.flags import Flag
 from study.outline import read_scene, shape_outline, slice_polygon
 from study.report import cases, object_view, words
 from study.report.curvature import difference_pictures
@@ -28,10 +28,9 @@ from study.report.writing import build, write_report
 from study.scene.shapes import EllipticCylinder, Sphere
 from study.storage.layout import Derived, Header, Layout
 from study.storage.reading import StoredAxis
-from study.storage.record import blank, crc32, record
+from study.storage.record import record
 from study.storage.result import CaseResult
-from study.storage.store import create, open_result
-from study.tables.ranking import TOO_STRONG
+from study.storage.store import ResultWriter, create, open_result
 from study.tables.show import best
 
 ROOT = Path(__file__).parent.parent.parent
@@ -89,16 +88,13 @@ def solved(layout, index, message="", **changes):
 def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", message="", labels=(), **changes):
     """A result file whose cases are done, missing, or failed with the text that ``state`` gives."""
     create(path, layout, Header("d" * 64, scene, title, "scene.toml", labels=labels))
-    with h5py.File(path, "r+") as file:
-        for row, index in enumerate(np.ndindex(layout.shape)):
-            if (what := state(index)) == "missing":
-                continue
-            done = what == "done"
-            values = record(layout, solved(layout, index, message, **changes)) if done else blank(layout, what)
-            for column, value in zip(layout.columns, values, strict=True):
-                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-            file["study/status/crc"][index] = crc32(layout, row, values)
-            file["study/status/code"][index] = 1 if done else 2
+    writer = ResultWriter(path, layout, None)
+    for row, index in enumerate(np.ndindex(layout.shape)):
+        if (what := state(index)) == "done":
+            writer.write(row, record(layout, solved(layout, index, message, **changes)))
+        elif what != "missing":
+            writer.fail(row, what)
+    writer.close()
     return path
 
 
@@ -339,7 +335,7 @@ def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
         worse, better = sorted(data.order(0), key=lambda i: data.at("quality", i))
         assert "but cannot be used" not in words.verdict(data, 0.8)
         data = Data(result)
-        data.flags[better] = TOO_STRONG
+        data.flags[better] = Flag.TOO_STRONG
         assert data.best == worse
         assert "One grasp scores higher at this force" in (told := words.verdict(data, 0.8))
         assert "but cannot be used: too strong." in told

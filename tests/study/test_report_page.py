@@ -21,6 +21,7 @@ from study.view.model import View
 from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.formula_results import make
+from tests.study.sealing import sealed
 
 pytestmark = [
     pytest.mark.long,
@@ -40,6 +41,7 @@ def page(tmp_path_factory, comm):
         with h5py.File(path, "r+") as file:
             file["study/status/message"][view_files.FAILED] = REASON.encode()
             file["study/status/code"][0, 0, 0] = 0
+        sealed(path)
         with pytest.MonkeyPatch.context() as patched:
             for name in RANK:
                 patched.delenv(name, raising=False)

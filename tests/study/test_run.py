@@ -240,7 +240,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     ],
 )
 def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(once, shared_path, place, ranks):
-    (shared_path / "a_file").write_text("")
+    once((shared_path / "a_file").write_text, "")
     code, _, errors = once(study, ranks, shared_path / place)
     assert code == 5, errors
     assert errors.count("error: ") == 1

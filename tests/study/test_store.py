@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
+import zlib
 from collections import namedtuple
 from dataclasses import replace
 
@@ -21,9 +21,9 @@ from study.storage.plots import axes_of, groups, view_slice
 from study.storage.quantities import MAPS, quantities
 from study.storage.quantity import MODELS, NEEDS
 from study.storage.reading import StoredAxis
-from study.storage.record import blank, crc32, record, text_bytes
+from study.storage.record import blank, record, text_bytes
 from study.storage.result import CaseResult
-from study.storage.store import create, open_result, torn_rows, verify
+from study.storage.store import ResultWriter, create, open_result, torn_rows, verify
 from tests.study.fake_run import fake_result
 
 HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))
@@ -47,13 +47,9 @@ def path(tmp_path):
 
 def put(path, layout, row, values):
     """A done row, written without MPI."""
-    with h5py.File(path, "r+") as file:
-        index = np.unravel_index(row, layout.shape)
-        for column, value, place in zip(layout.columns, values, layout.places(row), strict=True):
-            if place is not None:
-                file[column.path][place] = value.astype(file[column.path].dtype)
-        file["study/status/crc"][index] = crc32(layout, row, values)
-        file["study/status/code"][index] = 1
+    writer = ResultWriter(path, layout, None)
+    writer.write(row, values)
+    writer.close()
 
 
 def test_what_was_written_is_read(path):
@@ -196,18 +192,19 @@ def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
     verify(tmp_path / "s.hdf", layout, HEADER)
 
 
-def test_damage_in_a_done_row_is_found_and_timings_do_not_count(path):
+def test_damage_in_a_done_row_is_found(path):
     layout = small()
     result = CaseResult({"maps/e_n": [1.0, 2.0, 3.0], "work/seconds_total": 2.0})
-    for row in (0, 7, 29):
+    for row in (0, 3, 7, 11, 29):
         put(path, layout, row, record(layout, result))
     assert torn_rows(path, layout) == []
     with h5py.File(path, "r+") as file:
         file["study/work/seconds_total"][0, 0, 0] = 5.0
         file["study/e_n/flat"][0, 0, 1] = 7.0  # not a done row
         file["study/status/message"][1, 0, 1] = b"other"
+        file["study/status/code"][0, 1, 0] = 2
         file["study/patch/area"][29, 1, 3] = 0.0
-    assert torn_rows(path, layout) == [7, 29]
+    assert torn_rows(path, layout) == [0, 3, 7, 29]
 
 
 def test_wrenches_are_stored_for_the_candidates_that_were_named(tmp_path):
@@ -405,18 +402,29 @@ def test_the_keys_in_which_another_scene_differs_are_named(tmp_path):
     assert "cannot be read" in said("no toml")
 
 
-def test_a_file_of_the_version_before_is_read_but_not_gone_on_with(path):
+def test_a_file_of_the_version_before_is_read_and_compared_but_not_gone_on_with(tmp_path):
+    path, layout = tmp_path / "before.hdf", small(version=3)
+    create(path, layout, HEADER)
+    values = record(layout, CaseResult({"maps/e_n": [1.0, 2.0, 3.0], "work/seconds_total": 2.0}, message="a note"))
+    counted = [v for c, v in zip(layout.columns, values, strict=True) if not c.key.startswith("work/")]
     with h5py.File(path, "r+") as file:
-        file.attrs["layout_version"] = 2
-        options = json.loads(file["study"].attrs["options"])
-        file["study"].attrs["options"] = json.dumps({k: v for k, v in options.items() if k not in ("surface", "front")})
-        for name in ("report", "map", "title"):
-            del file[f"study/{name}"]
+        for column, value in zip(layout.columns, values, strict=True):
+            file[column.path][7 if column.flat else (1, 0, 1)] = value.astype(file[column.path].dtype)
+        file["study/status/crc"][1, 0, 1] = zlib.crc32(b"".join(v.tobytes() for v in counted))
+        file["study/status/code"][1, 0, 1] = 1
+        assert "checksums" not in file["study"]
     with open_result(path) as read:
-        assert read.map("e_n", "curved").shape == (5, 2, 3)
-        assert read.report == ""
+        assert read.map("e_n", "flat")[1, 0, 1] == 2.0
+        assert read.messages[1, 0, 1] == "a note"
+        assert read.patch(7)["area"].shape == (2, 4)
     with pytest.raises(StudyError, match="can be read, but not gone on with: choose another file"):
         verify(path, small(), HEADER)
+    with h5py.File(path, "r+") as file:
+        file["study/e_n/flat"][1, 0, 1] = 2.5
+    for ask in (lambda r: r.map("e_n", "curved"), lambda r: r.messages, lambda r: r.patch(7)):
+        with open_result(path) as read, pytest.raises(StudyError, match="checksum") as refused:
+            ask(read)
+        assert refused.value.code == OTHER_FILE
 
 
 def test_the_report_says_that_it_is_not_written_yet(path):

@@ -232,7 +232,7 @@ def test_images_of_the_best_grasp_are_no_rivals():
     assert verdict(None, [0, 1, 2], [(0,)] * 3) == ""
 
 
-def test_show_compare_export_and_lookup_take_bands_from_the_file(shared_path):
+def test_show_compare_export_and_lookup_take_bands_from_the_file(tmp_path):
     axes = grid_axes(angles=[0.0])
     over = tuple(axis.name for axis in axes)
     bands = [Derived(f"{name}_band", units, "band", "", over) for name, units in (("e_n", "m"), ("quality", ""))]
@@ -241,7 +241,7 @@ def test_show_compare_export_and_lookup_take_bands_from_the_file(shared_path):
     quality = np.broadcast_to(np.linspace(1.0, 2.0, shape[0])[:, None, None], shape)
     given = {"derived__quality_band": 0.1 * quality, "derived__quality_band_mesh": np.full(shape, 0.1),
              "derived__e_n_band": np.full(shape, 1e-3), "derived__e_n_band_mesh": np.full(shape, 0.01)}  # fmt: skip
-    path = make(shared_path / "b.hdf", axes=axes, derived=(*bands, *parts), quality__curved=quality, **given)
+    path = make(tmp_path / "b.hdf", axes=axes, derived=(*bands, *parts), quality__curved=quality, **given)
     with open_result(path) as result, open_result(path) as other:
         table = best(result)
         text = as_text(table, 200)

@@ -17,6 +17,7 @@ from study.case.solving import solver
 from study.data import Data
 from study.execution.plan import make_plan, memory, plan_text
 from study.execution.wall_cost import wall_size
+from study.flags import Flag
 from study.outline import read_scene, undeformed
 from study.report import cases, wall_words, words, writing
 from study.report.levels import level_picture, rule
@@ -24,12 +25,13 @@ from study.report.wall_shape import Cut, shape_picture
 from study.report.window import window_picture
 from study.scene import parse_scene
 from study.storage.layout import DONE
-from study.storage.record import blank, crc32, record
-from study.storage.store import create, open_result
+from study.storage.record import record
+from study.storage.store import ResultWriter, create, open_result
 from study.tables.overview import RULE, scene_text
-from study.tables.ranking import TOO_STRONG, TOO_WEAK, borne_level, judged, ranking
+from study.tables.ranking import borne_level, judged, ranking
 from study.tables.show import as_csv, as_json, best
 from study.tables.show_text import as_text
+from tests.study.sealing import sealed
 from tests.study.test_report import Page
 
 SCENE = """
@@ -55,36 +57,19 @@ normal_force_n = [1, 3]
 """
 
 
-class Filled:
-    """As much of a writer as derived datasets need."""
-
-    def __init__(self, layout, file):
-        self.layout, self.file = layout, file
-
-    def codes(self):
-        return self.file["study/status/code"][()].ravel()
-
-    def read(self, path):
-        return self.file[f"study/{path}"][()]
-
-    def write_derived(self, name, values):
-        self.file[f"study/derived/{name}"][...] = values
-
-
 def write(path, scene, results):
     """A result file of these cases by row; the others failed."""
     plan = make_plan(scene, "can.toml")
     layout = plan.layout
     create(path, layout, plan.header)
-    with h5py.File(path, "r+") as file:
-        for row, index in enumerate(np.ndindex(layout.shape)):
-            done = row in results
-            values = record(layout, results[row]) if done else blank(layout, "the wall gave way")
-            for column, value in zip(layout.columns, values, strict=True):
-                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-            file["study/status/crc"][index] = crc32(layout, row, values)
-            file["study/status/code"][index] = DONE if done else 2
-        window.finalise(Filled(layout, file), scene)
+    writer = ResultWriter(path, layout, None)
+    for row in range(layout.rows):
+        if row in results:
+            writer.write(row, record(layout, results[row]))
+        else:
+            writer.fail(row, "the wall gave way")
+    window.finalise(writer, scene)
+    writer.close()
     return path
 
 
@@ -118,7 +103,7 @@ def changed(path, folder, name, values, index=...):
     shutil.copy(path, other)
     with h5py.File(other, "r+") as file:
         file[f"study/{name}"][index] = values
-    return other
+    return sealed(other)
 
 
 def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
@@ -182,7 +167,7 @@ def test_show_has_dents_stress_and_the_window_of_forces(can):
     assert told["force"] == 3.0
     assert told["units"]["wall_stress"] == "Pa"
     assert {"dent", "wall_stress", "force_low", "force_high", "safety_factor", "flags"} <= told["grasps"][0].keys()
-    assert [g["flags"] & (TOO_WEAK | TOO_STRONG) for g in told["grasps"]] == [0, 0]  # flags as the file has them
+    assert [g["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for g in told["grasps"]] == [0, 0]  # as in the file
     assert "force_low [N]" in as_csv(strong).splitlines()[0]
 
 
@@ -206,9 +191,9 @@ def test_cases_outside_their_window_are_judged_by_the_force():
         map=lambda name, model=None: maps[name], derived=lambda name: np.array([3.0]),
     )  # fmt: skip
     flags = judged(result)
-    assert flags.tolist() == [[TOO_WEAK, 0, 0, TOO_STRONG]]
+    assert flags.tolist() == [[Flag.TOO_WEAK, 0, 0, Flag.TOO_STRONG]]
     assert borne_level(np.full((1, 4), DONE), flags) == 2
-    assert borne_level(np.full((1, 4), DONE), flags | TOO_WEAK) is None
+    assert borne_level(np.full((1, 4), DONE), flags | Flag.TOO_WEAK) is None
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
     layout.derived = []
     assert judged(result).tolist() == [[0, 0, 0, 0]]

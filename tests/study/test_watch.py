@@ -13,6 +13,7 @@ from study.storage.layout import DONE, FAILED, MISSING
 from study.tables import watch_view
 from study.tables.watch import INTERRUPTED, watch
 from tests.study.formula_results import grid_axes, make
+from tests.study.sealing import sealed
 
 SIZE = 4 * 6 * 4  # cases of the file
 
@@ -41,6 +42,7 @@ class Run:
             messages = np.where(codes == FAILED, b"no contact at this force", b"")
             stored = file["study/status/message"]
             stored[...] = messages.reshape(4, 6, 4).astype(stored.dtype)
+        sealed(self.path)
 
 
 def watched(run, stream):

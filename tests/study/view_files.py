@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-import h5py
 import numpy as np
 
 from study.storage.layout import Header, Layout
 from study.storage.reading import StoredAxis
-from study.storage.record import blank, crc32, record
+from study.storage.record import record
 from study.storage.result import CaseResult
-from study.storage.store import create
+from study.storage.store import ResultWriter, create
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
@@ -91,14 +90,11 @@ def make(path, scene=SCENE, patches=True, failed=FAILED):
     """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
     layout = Layout(axes(), int(np.prod(GRID)), patches=patches)
     create(path, layout, Header("d" * 64, scene, "<b>thing</b>", "scene.toml"))
-    with h5py.File(path, "r+") as file:
-        for row, index in enumerate(np.ndindex(layout.shape)):
-            if index == (0, 0, 1):
-                continue
-            lost = index == failed
-            values = blank(layout, "no </script> convergence") if lost else record(layout, solved(layout, index))
-            for column, value in zip(layout.columns, values, strict=True):
-                file[column.path][row if column.flat else index] = value.astype(file[column.path].dtype)
-            file["study/status/crc"][index] = crc32(layout, row, values)
-            file["study/status/code"][index] = 2 if lost else 1
+    writer = ResultWriter(path, layout, None)
+    for row, index in enumerate(np.ndindex(layout.shape)):
+        if index == failed:
+            writer.fail(row, "no </script> convergence")
+        elif index != (0, 0, 1):
+            writer.write(row, record(layout, solved(layout, index)))
+    writer.close()
     return path

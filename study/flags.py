@@ -1,0 +1,111 @@
+"""Flags of a case: the bit in the file, the word in a table, the sentence in the stored message, all in one place.
+
+Lower packages raise small flags of their own; `raised` gives them their bits of the file by their names.
+"""
+
+from __future__ import annotations
+
+from enum import IntFlag
+
+DEGREES_90 = "more than 90 deg from the contact normal"
+
+
+class Flag(IntFlag):
+    """What the reader of a case should know; flags add up.
+
+    ``word`` is what a column of a table has room for, ``sentence`` what a message says of it (without a semicolon,
+    which parts sentences), ``more`` what its definition in the file adds.
+    """
+
+    word: str
+    sentence: str
+    more: str
+
+    def __new__(cls, bit: int, word: str, sentence: str, more: str = "") -> Flag:
+        """A bit with its texts."""
+        made = int.__new__(cls, bit)
+        made._value_ = bit
+        made.word, made.sentence, made.more = word, sentence, more
+        return made
+
+    NO_TORQUE = 1 << 0, "no torque", "a contact carries no torque about its normal"
+    NO_FORCE = 1 << 1, "no force", "a contact carries no force along one of its axes"
+    CYCLE = 1 << 2, "cycle", "the contact normal alternated between faces, their mean was taken"
+    HOLE = 1 << 3, "hole", "no face on the line through the centre of pressure along the contact normal"
+    NO_CORNERS = 1 << 4, "no corners", "the faces of a patch have no corners, the nearest one gave the contact frame"
+    ORIENTATION = 1 << 5, "mixed", (
+        "normals of a patch point to opposite sides, its normal force and frame cannot be trusted"
+    )  # fmt: skip
+    OVERHANG = 1 << 6, "overhang", f"some loaded faces of a patch are turned {DEGREES_90}"
+    WINDING = 1 << 7, "winding", "some faces are wound against their normals, which were taken"
+    ASKEW = 1 << 8, "askew", "contacts more than 5 deg from antipodal"
+    NODAL = 1 << 9, "nodal", "solved with nodal gaps, because weighted ones had no solution"
+    SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
+    OVERLAP = 1 << 11, "overlap", "the pads run into each other beside the object, which is not simulated"
+    COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
+        "the front overlaps the object by more than a tenth of the travel, fewer than six elements carry load or only"
+        " one along its length or its width, or trilinear elements are too stiff for foam with a Poisson's ratio above"
+        " 0.45"
+    )  # fmt: skip
+    SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
+        "the force fell while the fingers closed, or grew less than half as fast as before on average"
+    )  # fmt: skip
+    SLIDES_OUT = 1 << 14, "slides out", (
+        "the pads push the object along its axis with more than friction can hold, so it slides out"
+    )  # fmt: skip
+    YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the dent stays"
+    NO_FIT = 1 << 16, "no fit", "a limit surface could not be fitted, the ellipsoid from three motions stands in"
+    UNSTABLE = 1 << 17, "unstable", "the foam lost ellipticity, strains may localise"
+    # of no file: derived where a file tells the window of forces
+    TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's weight"
+    TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
+
+
+DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG
+OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
+
+
+def raised(flag: IntFlag) -> Flag:
+    """Bits of the file for a flag of a lower package, whose members have the same names here.
+
+    >>> from friction.frame import FrameFlag
+    >>> raised(FrameFlag.HOLE | FrameFlag.ORIENTATION) == Flag.HOLE | Flag.ORIENTATION
+    True
+    """
+    found = Flag(0)
+    for member in flag:
+        found |= Flag[str(member.name)]
+    return found
+
+
+def flags_in(value: int) -> list[Flag]:
+    """The flags that add up to a value, the lowest bit first; bits that mean nothing are left out.
+
+    >>> [flag.word for flag in flags_in(8 + 1024)]
+    ['hole', 'slips']
+    """
+    return [flag for flag in Flag if value & flag]
+
+
+def flag_words(value: int) -> str:
+    """Flags as a cell of a table.
+
+    >>> flag_words(8 + 1024)
+    'hole, slips'
+    """
+    return ", ".join(flag.word for flag in flags_in(value))
+
+
+def flag_sentences(value: int) -> str:
+    """What a stored message says of a case with these flags.
+
+    >>> flag_sentences(1)
+    'a contact carries no torque about its normal'
+    """
+    return "; ".join(flag.sentence for flag in flags_in(value))
+
+
+def flag_definitions() -> str:
+    """What the bits of a file mean, for the file itself."""
+    told = (f"{int(f)} {f.sentence}{f': {f.more}' * bool(f.more)}" for f in Flag if f & OF_FILE)
+    return f"Sum of: {'; '.join(told)}."

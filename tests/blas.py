@@ -1,0 +1,43 @@
+"""Which kernels of OpenBLAS this CPU can run, and which are in use: ``python -m tests.blas`` prints the former.
+
+OpenBLAS chooses its kernel by the CPU, and sums then end in other bits. The environment variable OPENBLAS_CORETYPE
+asks for another kernel; it reaches every copy: numpy's, scipy's and the system's that PETSc and MUMPS call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+from pathlib import Path
+
+NEEDS = {"Haswell": {"avx2", "fma"}, "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"}, "Nehalem": {"sse4_2"}}
+NAMES = [f"{prefix}openblas_get_corename{suffix}" for prefix in ("", "scipy_") for suffix in ("", "64_")]
+
+
+def usable() -> list[str]:
+    """Kernels of OpenBLAS that this CPU can run; none where it does not say what it can."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return []
+    flags = {flag for line in lines if line.startswith("flags") for flag in line.split()}
+    return [kernel for kernel, needs in NEEDS.items() if needs <= flags]
+
+
+def loaded() -> dict[str, str]:
+    """Kernel of every copy of OpenBLAS in this process, by its file, once all that computes is imported."""
+    for name in ("numpy", "scipy.linalg", "fem.petsc"):
+        importlib.import_module(name)
+    files = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "openblas" in line}
+    found = {}
+    for file in sorted(files):
+        library = ctypes.CDLL(file)
+        if name := next((name for name in NAMES if hasattr(library, name)), ""):
+            asked = getattr(library, name)
+            asked.restype = ctypes.c_char_p
+            found[file] = asked().decode()
+    return found
+
+
+if __name__ == "__main__":
+    print(*usable())

@@ -1,0 +1,299 @@
+"""Damaged result files: every reader gives the right numbers or refuses in a sentence, never a wrong number."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import suppress
+
+import h5py
+import numpy as np
+import pytest
+
+from study import pipeline
+from study.case import sweep
+from study.cli import main
+from study.execution.plan import make_plan
+from study.exits import OTHER_FILE, StudyError
+from study.lookup import GraspMap
+from study.scene import parse_scene
+from study.storage import guarded
+from study.storage.derived import finalise
+from study.storage.layout import DONE, MISSING
+from study.storage.record import record
+from study.storage.repair import repair
+from study.storage.store import ResultWriter, create, open_result, torn_rows, verify
+
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
+SCENE = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 100
+mass_g = 50
+[gripper]
+elements = [4, 4, 2]
+[candidates]
+stations_mm = [-5, 0]
+angles_deg = [0]
+[load]
+normal_force_n = [1, 2]
+"""
+COMMANDS = {
+    "status": ("status",),
+    "status --json": ("status", "--json"),
+    "show": ("show",),
+    "show --csv": ("show", "--csv", "--force", "1"),
+    "export --csv": ("export", "--csv"),
+    "export --json": ("export", "--json"),
+}
+MANY = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished file of four cases, as a run on one rank writes it."""
+    path = tmp_path_factory.mktemp("whole") / "a.hdf"
+    scene = parse_scene(SCENE)
+    plan = make_plan(scene, "cylinder.toml")
+    create(path, plan.layout, plan.header)
+    writer = ResultWriter(path, plan.layout, None)
+    writer.begin_session(start="2024-01-01T00:00:00+00:00", reason="running", ranks=1, host="here")
+    for unit in sweep.units(scene, lambda point: point.axis_symmetry):
+        for k, result in pipeline.solve_unit(unit):
+            for c, rows in enumerate(unit.rows):
+                writer.count_attempt(rows[k])
+                writer.write(rows[k], record(plan.layout, pipeline.image(result, unit, c)))
+    finalise(writer, scene)
+    writer.update_session(stop="2024-01-01T00:01:00+00:00", reason="complete", done=4)
+    writer.close()
+    return path
+
+
+@pytest.fixture
+def copy(whole, tmp_path):
+    return shutil.copy(whole, tmp_path / whole.name)
+
+
+@pytest.fixture
+def answers(whole, tmp_path, capfd):
+    """What every reader says of a file under one name: exit code and text, or the error's."""
+    other = shutil.copy(whole, tmp_path / "other.hdf")
+
+    def said(words):
+        code = main([str(word) for word in words])
+        output, errors = capfd.readouterr()
+        assert (code == 0) == (not errors), errors
+        return code, errors or output
+
+    def looked_up(path):
+        try:
+            found = GraspMap(path)
+        except StudyError as error:
+            return error.code, error.message
+        point = found.at(station=-0.002, angle=0, force=1.5)
+        maps = [(name, found.at(station=-0.005, angle=0, force=1).value(name)) for name in sorted(found.quantities)]
+        return 0, f"{point} {maps} {point.semi_axes()} {point.coefficients()}"
+
+    def ask(path, readers=(*COMMANDS, "compare", "lookup")):
+        for name in readers:
+            if name == "lookup":
+                yield name, looked_up(path)
+            elif name == "compare":
+                yield name, said(("compare", path, other, "--json"))
+            elif name == "report":
+                page = path.with_suffix(".html")
+                code, text = said(("report", path, "-o", page))
+                yield name, (code, text if code else page.read_text())
+            else:
+                yield name, said((COMMANDS[name][0], path, *COMMANDS[name][1:]))
+
+    return ask
+
+
+def data_blocks(path):
+    """Offset and length of the data of every dataset, by its name."""
+    with h5py.File(path) as file:
+        names = [*(f"study/axes/{name}" for name in file["study/axes"])]
+        file.visit(names.append)
+        nodes = {name: file[name] for name in names if isinstance(file[name], h5py.Dataset)}
+        return {name: (node.id.get_offset(), node.nbytes) for name, node in nodes.items() if node.id.get_offset()}
+
+
+def flip(path, byte, bit):
+    with path.open("r+b") as file:
+        file.seek(byte)
+        value = file.read(1)[0] ^ (1 << bit)
+        file.seek(byte)
+        file.write(bytes([value]))
+
+
+def zero(path, offset, length):
+    with path.open("r+b") as file:
+        file.seek(offset)
+        file.write(bytes(length))
+
+
+def judge(found, expected, path):
+    """Every reader's answer is that of the whole file, or a refusal; how many refused."""
+    refused = 0
+    for name, (code, text) in found:
+        if code == OTHER_FILE:
+            assert str(path) in text, (name, text)
+            assert "Traceback" not in text, (name, text)
+            refused += 1
+        else:
+            assert (code, text) == expected[name], name
+    return refused
+
+
+@pytest.fixture
+def without_trial(monkeypatch):
+    """Without the child process that tries a file first: where its structure is sound, it only takes time."""
+    monkeypatch.setattr(guarded, "trouble", lambda attempt: "")
+
+
+@pytest.mark.parametrize("count", [16, pytest.param(300, marks=MANY)])
+@pytest.mark.usefixtures("without_trial")
+def test_a_flipped_bit_in_any_dataset_is_refused_or_changes_no_number(copy, answers, count):
+    expected, sound = dict(answers(copy)), copy.read_bytes()
+    blocks, random = [b for b in data_blocks(copy).values() if b[1]], np.random.default_rng(7)
+    refused = 0
+    for _ in range(count):
+        offset, length = blocks[random.integers(len(blocks))]
+        flip(copy, offset + int(random.integers(length)), int(random.integers(8)))
+        refused += judge(answers(copy), expected, copy)
+        copy.write_bytes(sound)
+    assert refused > count  # most of them hit what somebody reads
+    assert dict(answers(copy)) == expected
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(100, marks=MANY)])
+def test_a_flipped_bit_in_any_byte_of_the_file_is_refused_or_changes_no_number(copy, answers, count):
+    expected, sound = dict(answers(copy)), copy.read_bytes()
+    random = np.random.default_rng(8)
+    for _ in range(count):
+        flip(copy, int(random.integers(len(sound))), int(random.integers(8)))
+        judge(answers(copy), expected, copy)
+        copy.write_bytes(sound)
+
+
+@pytest.mark.parametrize(("length", "count"), [(512, 4), *(pytest.param(n, 60, marks=MANY) for n in (64, 512, 4096))])
+def test_a_block_of_zeros_is_refused_or_changes_no_number(copy, answers, length, count):
+    expected, sound = dict(answers(copy)), copy.read_bytes()
+    blocks, random = [b for b in data_blocks(copy).values() if b[1]], np.random.default_rng(length)
+    for _ in range(count):
+        offset, size = blocks[random.integers(len(blocks))]
+        zero(copy, (offset + int(random.integers(size))) // length * length, length)
+        judge(answers(copy), expected, copy)
+        copy.write_bytes(sound)
+
+
+READ = [  # datasets, and who must notice
+    ("study/e_n/curved", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
+    ("study/quality/curved", ["show", "export --csv", "lookup"]),
+    ("study/status/code", [*COMMANDS, "compare", "lookup"]),
+    ("study/status/message", ["status", "export --csv"]),
+    ("study/fingers/pose_origin", ["export --csv", "export --json"]),
+    ("study/limit_surface/coefficients", ["export --csv", "lookup"]),
+    ("study/derived/force_low", ["show", "lookup"]),
+    ("study/axes/station", [*COMMANDS, "compare", "lookup"]),
+    ("study/axes/normal_force", [*COMMANDS, "compare", "lookup"]),
+    ("study/scene", [*COMMANDS, "compare", "lookup"]),
+    ("study/provenance/sessions", ["status", "status --json"]),
+    ("study/checksums/maps", ["show", "lookup"]),
+    ("study/checksums/code", [*COMMANDS, "compare", "lookup"]),
+]
+
+
+@pytest.mark.parametrize(("name", "readers"), READ)
+@pytest.mark.usefixtures("without_trial")
+def test_whoever_reads_a_damaged_dataset_refuses(copy, answers, name, readers):
+    offset, length = data_blocks(copy)[name]
+    flip(copy, offset + min(3, length - 1), 5)
+    for reader, (code, text) in answers(copy, readers):
+        assert code == OTHER_FILE, (reader, text)
+        assert "damaged (" in text, (reader, text)
+
+
+@pytest.mark.parametrize("name", ["study/status/code", "study/checksums/code", "both"])
+def test_lost_states_are_no_missing_cases(copy, answers, name):
+    blocks = data_blocks(copy)
+    for found in ("study/status/code", "study/checksums/code") if name == "both" else (name,):
+        zero(copy, *blocks[found])
+    for reader, (code, text) in answers(copy):
+        assert code == OTHER_FILE, (reader, text)
+
+
+def test_a_run_does_not_begin_a_file_anew_whose_states_are_lost_and_repair_finds_them(copy, whole):
+    plan = make_plan(parse_scene(SCENE), "cylinder.toml")
+    verify(copy, plan.layout, plan.header)
+    zero(copy, *data_blocks(copy)["study/status/code"])
+    with pytest.raises(StudyError, match="states of 4 cases are lost") as refused:
+        verify(copy, plan.layout, plan.header)
+    assert refused.value.code == OTHER_FILE
+    assert "4 of 4 cases good" in repair(copy)
+    repair(copy, write=True)
+    with open_result(copy.with_suffix(".repaired.hdf")) as made, open_result(whole) as sound:
+        assert (made.status == DONE).all()
+        assert np.array_equal(made.map("e_n", "curved"), sound.map("e_n", "curved"))
+
+
+def test_a_scene_that_is_damaged_is_not_solved_as_if_it_were_whole(copy):
+    offset, _ = data_blocks(copy)["study/scene"]
+    content = copy.read_bytes()
+    digit = content.index(b"semi_axis_a_mm = 25", offset) + len("semi_axis_a_mm = ")
+    flip(copy, digit, 0)
+    with pytest.raises(StudyError, match="not the one that was solved"):
+        repair(copy, write=True)
+
+
+def test_what_a_killed_run_leaves_is_missing_and_no_damage(copy):
+    """Stored, but not yet marked: the one moment in which state and checksum may differ."""
+    with h5py.File(copy, "r+") as file:
+        file["study/status/code"][0, 0, 0] = MISSING
+    with open_result(copy) as result, pytest.raises(StudyError, match="the state of case 0 does not match"):
+        assert result.status.any()
+    layout = make_plan(parse_scene(SCENE)).layout
+    writer = ResultWriter(copy, layout, None)
+    writer.begin_session(start="2024-01-02T00:00:00+00:00", reason="running", ranks=1)
+    writer.close()
+    with open_result(copy) as result:
+        assert result.status.ravel().tolist() == [MISSING, DONE, DONE, DONE]
+    assert torn_rows(copy, layout) == []
+
+
+def test_a_row_that_is_begun_anew_while_somebody_reads_is_missing(copy):
+    with open_result(copy) as result:
+        codes = result.status.copy()
+    with h5py.File(copy, "r+") as file:
+        file["study/e_n/curved"][0, 0, 0] = 1.0  # as a run that solves it again writes it
+        file["study/status/code"][0, 0, 0] = MISSING
+    with open_result(copy) as result:
+        result.__dict__["status"] = codes  # read just before
+        assert result.map("e_n", "curved")[0, 0, 1] > 0
+        assert result.status.ravel().tolist() == [MISSING, DONE, DONE, DONE]
+
+
+@pytest.mark.parametrize("name", ["patch/pressure", "fingers/frame_axes"])
+def test_a_report_of_a_damaged_file_is_refused(copy, answers, name):
+    zero(copy, *data_blocks(copy)[f"study/{name}"])
+    ((_, (code, text)),) = answers(copy, ["report"])
+    assert code == OTHER_FILE, text
+    assert text.startswith(f"error: {copy}: damaged (")
+    assert len(text.splitlines()) == 1
+    assert not copy.with_suffix(".html").exists()
+
+
+@pytest.mark.long
+def test_a_report_shows_no_wrong_number(copy, answers):
+    expected, sound = dict(answers(copy, ["report"])), copy.read_bytes()
+    blocks, random = [b for b in data_blocks(copy).values() if b[1]], np.random.default_rng(11)
+    for _ in range(25):
+        offset, length = blocks[random.integers(len(blocks))]
+        flip(copy, offset + int(random.integers(length)), int(random.integers(8)))
+        judge(answers(copy, ["report"]), expected, copy)
+        with suppress(FileNotFoundError):
+            copy.with_suffix(".html").unlink()
+        copy.write_bytes(sound)

@@ -1,0 +1,179 @@
+"""Flags: every bit that any code can set has a word and a sentence, and every message and reader tells it."""
+
+from __future__ import annotations
+
+import ast
+import html
+import importlib
+import json
+from pathlib import Path
+
+import pytest
+
+import study
+from friction.frame import FrameFlag
+from scoring.score import ScoreFlag
+from study import pipeline
+from study.case import sweep
+from study.cli import main
+from study.execution.plan import make_plan
+from study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
+from study.lookup import GraspMap
+from study.scene import parse_scene
+from study.storage.datasets import MESSAGE
+from study.storage.map_quantities import MAPS
+from study.storage.record import record
+from study.storage.store import ResultWriter, create, open_result
+from study.tables.show_text import FLAGS_WIDTH
+
+ROOT = Path(study.__file__).parent.parent
+BITWISE = (ast.BitOr, ast.BitAnd)
+PARTS = (ast.Name, ast.Attribute, ast.BinOp, ast.Constant)
+TABLE = sum(Flag)  # all bits that have a row
+OF_LOWER = {member.name for kind in (FrameFlag, ScoreFlag) for member in kind if member}
+
+
+def modules_with_flags():
+    """Modules of the study in which flags of a case may be put together, told apart or named."""
+    for file in sorted((ROOT / "study").rglob("*.py")):
+        if file.name != "flags.py" and "flag" in file.read_text().lower():
+            yield pytest.param(file, id=str(file.relative_to(ROOT)))
+
+
+def bits_combined_in(file):
+    """Integers that a module combines bit by bit, by the expression that gives them."""
+    space = vars(importlib.import_module(".".join(file.relative_to(ROOT).with_suffix("").parts)))
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, BITWISE):
+            for part in (n for n in ast.walk(node) if isinstance(n, PARTS)):
+                try:
+                    found = eval(compile(ast.Expression(part), str(file), "eval"), dict(space))
+                except Exception:  # a local name
+                    continue
+                if isinstance(found, int) and not isinstance(found, bool | FrameFlag | ScoreFlag):
+                    yield ast.unparse(part), int(found)
+
+
+@pytest.mark.parametrize("file", list(modules_with_flags()))
+def test_every_bit_that_the_study_combines_has_a_row(file):
+    assert not {name: value for name, value in bits_combined_in(file) if 0 < value & ~TABLE}
+
+
+def test_the_search_for_bits_finds_a_bit_without_a_row(tmp_path, monkeypatch):
+    module = tmp_path / "stray_bits.py"
+    module.write_text("STRAY = 1 << 40\ndef flags(found, a):\n    found |= STRAY * a\n    return found | (1 << 41)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("tests.study.test_flags.ROOT", tmp_path)
+    assert {value for _, value in bits_combined_in(module)} >= {1 << 40, 1 << 41}
+
+
+def test_flags_of_lower_packages_have_rows_of_the_same_names():
+    for kind in (FrameFlag, ScoreFlag):
+        members = [member for member in kind if member]
+        assert raised(kind(sum(members))) == sum(Flag[member.name] for member in members)
+
+
+def test_every_row_is_reachable():
+    used = "".join(file.read_text() for file in (ROOT / "study").rglob("*.py") if file.name != "flags.py")
+    assert [flag.name for flag in Flag if flag.name not in OF_LOWER and f"Flag.{flag.name}" not in used] == []
+
+
+def test_words_fit_their_column_and_sentences_their_message():
+    assert len({flag.word for flag in Flag}) == len({flag.sentence for flag in Flag}) == len(Flag)
+    for flag in Flag:
+        assert flag.value.bit_count() == 1
+        assert 0 < len(flag.word) <= FLAGS_WIDTH
+        assert flag.sentence
+        assert ";" not in flag.sentence + flag.word
+    assert len(flag_sentences(OF_FILE).encode()) < MESSAGE - 400  # probes may add theirs
+
+
+def test_the_definition_in_the_file_tells_every_bit_of_a_file_and_no_other():
+    text = next(q for q in MAPS if q.name == "flags").definition
+    assert text == flag_definitions()
+    for flag in Flag:
+        assert (f" {int(flag)} {flag.sentence}" in text) == bool(flag & OF_FILE)
+
+
+@pytest.mark.parametrize("value", [0, *map(int, Flag), OF_FILE, TABLE, 8 + 256])
+def test_a_value_is_told_bit_by_bit(value):
+    assert sum(flags_in(value)) == value
+    assert flag_words(value) == ", ".join(flag.word for flag in flags_in(value))
+    assert [part for part in flag_sentences(value).split("; ") if part] == [flag.sentence for flag in flags_in(value)]
+
+
+CYLINDER = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 25
+length_mm = 100
+[gripper]
+elements = [4, 4, 2]
+[candidates]
+stations_mm = [0]
+angles_deg = [0]
+[load]
+normal_force_n = [1]
+"""
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """One coarse case of the pipeline, and its unit."""
+    given = parse_scene(CYLINDER)
+    unit = sweep.units(given, lambda point: point.axis_symmetry)[0]
+    return unit, next(iter(pipeline.solve_unit(unit)))[1]
+
+
+def test_the_message_of_a_case_tells_its_flags(solved):
+    _, case = solved
+    assert case.values["maps/flags"] & Flag.COARSE
+    assert case.message == flag_sentences(case.values["maps/flags"])
+
+
+@pytest.fixture(scope="module")
+def all_flags(solved, tmp_path_factory):
+    """A file of one case with every flag that a file holds."""
+    unit, _ = solved
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "flags", lambda *_: OF_FILE)
+        case = next(iter(pipeline.solve_unit(unit)))[1]
+    plan = make_plan(unit.scene, "cylinder.toml")
+    path = tmp_path_factory.mktemp("flags") / "all.hdf"
+    create(path, plan.layout, plan.header)
+    writer = ResultWriter(path, plan.layout, None)
+    writer.write(0, record(plan.layout, case))
+    writer.close()
+    return path
+
+
+def test_a_stored_message_tells_every_flag_to_its_end(all_flags):
+    with open_result(all_flags) as result:
+        assert int(result.map("flags").item()) == OF_FILE
+        assert result.messages.item() == flag_sentences(OF_FILE)
+
+
+@pytest.mark.usefixtures("every_rank_speaks")
+def test_every_reader_tells_every_flag(all_flags, capsys, monkeypatch):
+    def said(*words):
+        assert main([*words]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    monkeypatch.setenv("COLUMNS", "400")
+    file = str(all_flags)
+    table, state, csv = said("show", file), said("status", file, "--csv"), said("show", file, "--csv")
+    exported = json.loads(said("export", file, "--json"))["cases"][0]
+    page = all_flags.with_suffix(".html")
+    said("report", file, "-o", str(page))
+    shown = html.unescape(page.read_text())
+    point = GraspMap(all_flags).at(station=0, angle=0, force=1)
+    assert point.flags == exported["flags"] == OF_FILE
+    assert str(OF_FILE) in csv
+    for flag in flags_in(OF_FILE):
+        assert f"{flag.word}: {flag.sentence}" in table
+        assert flag.sentence in state
+        assert flag.word in exported["flag_words"]
+        assert flag.sentence in exported["message"]
+        assert flag.sentence in str(point)
+        assert f"{flag.word}: {flag.sentence}" in shown

@@ -1,0 +1,158 @@
+"""Places that cannot be written: every command that writes says so in one sentence and ends with the same code."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from matplotlib.figure import Figure
+
+from study.cli import main
+from study.cost.command import SIZES
+from study.environment import launch_environment
+from study.exits import CANNOT_WRITE, StudyError
+from study.figures import command as figures
+from study.report import writing as report
+from study.storage import repair as repairing
+from study.storage.layout import Header
+from study.writing import beside, make_folders, write_file
+from tests.study.launching import ROOT, launch
+from tests.study.view_files import make
+
+pytestmark = pytest.mark.usefixtures("every_rank_speaks")
+
+PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
+COMMANDS = {
+    "report": ("report", "FILE", "-o", "PLACE/x.html"),
+    "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
+    "view: picture": ("view", "FILE", "--screenshot", "PLACE/x.png"),
+    "view: grids": ("view", "FILE", "--vtkhdf", "PLACE/x.vtkhdf"),
+    "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
+    "init": ("init", "bottle", "-o", "PLACE/x"),
+    "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
+    "cost": ("cost", SMOKE, "-o", "PLACE/x.hdf", "--time-limit", "1", "--set", "gripper.elements=[4, 2, 2]"),
+    "figure": ("figure", "4c", "-o", "PLACE/x.png"),
+}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("file") / "a.hdf")
+
+
+@contextmanager
+def read_only(folder, files):
+    """A folder with files in which nothing can be written any more, not by root either."""
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "tmpfs", folder], capture_output=True).returncode == 0
+    if not mounted and os.geteuid() == 0:
+        pytest.skip("no right to mount a file system, and to root no folder is closed")
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    if mounted:
+        subprocess.run(["mount", "-o", "remount,ro", folder], check=True)
+    else:
+        folder.chmod(0o555)
+    yield folder
+    if mounted:
+        subprocess.run(["umount", "-l", folder], check=True)
+    else:
+        folder.chmod(0o755)
+
+
+@pytest.fixture(scope="module", params=["below a file", "read-only"])
+def place(request, tmp_path_factory):
+    """A folder in which nothing can be written."""
+    folder = tmp_path_factory.mktemp("place")
+    if request.param == "read-only":
+        with read_only(folder, {}):
+            yield folder
+    else:
+        (folder / "file").write_text("")
+        yield folder / "file"
+
+
+def refused(code, errors, place):
+    assert code == CANNOT_WRITE, errors
+    assert "Traceback" not in errors
+    assert errors.count("error: ") == 1
+    assert str(place) in errors
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_that_writes_says_what_it_cannot_write(file, place, command, capfd, monkeypatch):
+    drawn = SimpleNamespace(name="4c", scenes=(), file="4c.png", gaps=False, draw=lambda: (Figure(), "drawn"))
+    for name in SIZES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(figures, "chosen", lambda names: [drawn])  # without solving and drawing anything
+    monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
+    code = main([word.replace("FILE", str(file)).replace("PLACE", str(place)) for word in COMMANDS[command]])
+    refused(code, capfd.readouterr().err, place)
+    assert list(file.parent.iterdir()) == [file]
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("words", [("run", SMOKE, "-o"), ("figure", "4c", "--results")])
+def test_a_run_says_what_it_cannot_write(tmp_path, words):
+    with read_only(tmp_path, {}):
+        code, _, errors = launch(0, "-m", "study", *words, tmp_path / "x.hdf")
+    refused(code, errors, tmp_path)
+
+
+@pytest.mark.parametrize("left", [0.9, 1.0])
+def test_a_repair_says_what_it_cannot_write(file, tmp_path, capfd, monkeypatch, left):
+    """What it would remove after a failure cannot be reached there either."""
+    plan = lambda result: SimpleNamespace(layout=result.layout, header=Header(result.digest, result.scene))  # noqa: E731
+    monkeypatch.setattr(repairing, "_plan", plan)
+    content = bytearray(file.read_bytes())
+    content[content.index(b"no </script> convergence")] = 0  # the message of a case
+    with read_only(tmp_path, {"a.hdf": content[: int(left * len(content))]}):
+        code = main(["repair", str(tmp_path / "a.hdf"), "--write"])
+    refused(code, capfd.readouterr().err, tmp_path)
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("command", ["show", "status", "export", "schema", "compare"])
+def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
+    words = {"export": (file, "--csv"), "schema": (), "compare": (file, file)}.get(command, (file,))
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-m", "study", command, *words], stdout=full, stderr=subprocess.PIPE,
+                              text=True, cwd=ROOT, env=launch_environment())  # fmt: skip
+    assert done.returncode == CANNOT_WRITE, done.stderr
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_file_is_whole_or_not_there(tmp_path):
+    path = tmp_path / "a.txt"
+    write_file(path, "old")
+    with suppress(ZeroDivisionError), beside(path) as part:
+        part.write_text(f"half {1 / 0}")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+    assert write_file(tmp_path / "b" / "c.txt", b"new", folders=True).read_bytes() == b"new"
+
+
+def test_a_device_is_written_to_and_not_replaced(tmp_path):
+    assert write_file(Path("/dev/null"), "gone") == Path("/dev/null")
+    assert Path("/dev/null").is_char_device()
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE) as reader:
+        write_file(pipe, "through")
+        assert reader.communicate(timeout=30)[0] == b"through"
+    assert pipe.is_fifo()
+
+
+def test_a_file_in_the_way_of_a_folder_is_named_as_such(tmp_path):
+    (tmp_path / "a").write_text("")
+    for folder in (tmp_path / "a", tmp_path / "a" / "b"):
+        with pytest.raises(NotADirectoryError):
+            make_folders(folder)
+    with pytest.raises(StudyError, match="Not a directory") as refused:
+        write_file(tmp_path / "a" / "b", "", folders=True)
+    assert refused.value.code == CANNOT_WRITE
