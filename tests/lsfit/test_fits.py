@@ -11,10 +11,11 @@ from scipy.optimize import brentq
 from friction.motion import cor_grid, cor_twists, fibonacci_twists
 from friction.wrench import friction_limits, friction_wrench
 from lsfit.body import ExactSurface, body_volume
-from lsfit.certificate import certify, lowest_eigenvalues, smallest_eigenvalue
+from lsfit.certificate import certify
 from lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
 from lsfit.flag import FitError, FitFlag
 from lsfit.geometry import directions
+from lsfit.lowest import lowest_eigenvalues, smallest_eigenvalue
 from lsfit.misfit import misfit
 from lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
 from lsfit.round import ball_coefficients
