@@ -10,6 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
+ENDLESS = 1e-12  # value of a polynomial at a sample from which it counts as zero there: nowhere near its surface
+
 
 @njit(cache=True)
 def fill_monomials(w, E, out):  # pragma: no cover - compiled
@@ -83,7 +85,7 @@ def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
     value = radius = angle = 0.0
     for n in range(m):
         value += abs(P[n] - 1.0)
-        if P[n] > 0.0:
+        if P[n] > ENDLESS:
             radius += abs((1.0 / math.sqrt(math.sqrt(P[n])) if degree == 4 else P[n] ** (-1.0 / degree)) - 1.0)
         else:
             radius += np.inf

@@ -27,8 +27,11 @@ from scoring.reach import Reach, reach
 FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.80665
+_SLIPS = "slides along x", "slides along y", "turns about its normal"
 _KINDS = {"up_to": "linf", "fixed": "fixed"}
 _NOTHING = 1e-9  # relative size below which a part of a wrench counts as rounding
+_LIMIT = 1e-6  # how near to the limit a load is neither held nor not, as factors are good to some 1e-8
+_STILL = 1e-6  # share of the largest motion, or of the difference of two, up to which there is none
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,9 @@ class TaskResult:
     lowest_factor : float
         Smallest multiple that is held [-]; 0 unless fixed normal forces need a load to balance them.
     holds : bool
-        Whether the load itself is held.
+        Whether the load itself is held; so it counts at the limit.
+    at_limit : bool
+        Whether that is undecided: the load is within 1e-6 of the limit, or in the ``gap``.
     motion : (6,) array
         Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size.
     limits : tuple of str
@@ -55,6 +60,7 @@ class TaskResult:
     gap: float
     lowest_factor: float
     holds: bool
+    at_limit: bool
     motion: FloatArray
     limits: tuple[str, ...]
 
@@ -128,8 +134,11 @@ def hold_task(
     lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     factor = max(found.lower, 0.0)
     u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
-    holds = bool(factor >= 1 and lowest <= 1)
-    return TaskResult(factor, max(found.upper - factor, 0.0), lowest, holds, -u, _limits(contacts, C, found.u))
+    gap = max(found.upper - factor, 0.0)
+    holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
+    inside = factor > 1 + _LIMIT and lowest < 1 - _LIMIT
+    outside = factor + gap < 1 - _LIMIT or lowest > 1 + _LIMIT
+    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, found.u))
 
 
 def least_grip_force(
@@ -188,27 +197,31 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     balanced = np.linalg.norm(s * off_w - off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum()
     if balanced and s >= 0 and np.linalg.norm(rest) > _NOTHING * np.linalg.norm(b):
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
-        balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1
+        balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT
     s = s if balanced and s >= 0 else 0.0
     u = off_w if not small_w else off_b
     return s, Reach(s, s, u / max(abs(u @ w), 1e-300))
 
 
 def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tuple[str, ...]:
-    """What the contacts do when the object escapes: its motion there, weighed by the loads it works against."""
+    """What the contacts do when the object escapes: its motion there, weighed by the loads it works against.
+
+    Motions along two or three axes that weigh the same are all named.
+    """
     felt = np.array([Ci.T @ u for Ci in C])  # along N, x, y and about N
     felt[:, 1:] *= [_axes(contact) for contact in contacts]
     size = np.linalg.norm(felt, axis=1)
     said = []
     for part, friction in zip(felt, np.linalg.norm(felt[:, 1:], axis=1), strict=True):
-        if np.linalg.norm(part) <= 1e-6 * size.max():
+        if np.linalg.norm(part) <= _STILL * size.max():
             said.append("stays in place")
-        elif part[0] + friction <= 1e-6 * size.max():
+        elif part[0] + friction <= _STILL * size.max():
             said.append("lets go")
-        elif friction <= 1e-6 * size.max():
+        elif friction <= _STILL * size.max():
             said.append("is pushed back along its normal")
         else:
-            said.append(("slides along x", "slides along y", "turns about its normal")[np.abs(part[1:]).argmax()])
+            along = np.abs(part[1:]) >= (1 - _STILL) * np.abs(part[1:]).max()
+            said.append(" and ".join(name for name, most in zip(_SLIPS, along, strict=True) if most))
     return tuple(said)
 
 
