@@ -31,7 +31,7 @@ _SLIPS = "slides along x", "slides along y", "turns about its normal"
 _KINDS = {"up_to": "linf", "fixed": "fixed"}
 _NOTHING = 1e-9  # relative size below which a part of a wrench counts as rounding
 _LIMIT = 1e-6  # how near to the limit a load is neither held nor not, as factors are good to some 1e-8
-_STILL = 1e-6  # share of the largest motion, or of the difference of two, up to which there is none
+_STILL = 1e-4  # share of the largest motion up to which there is none, or no difference: motions are good to some 1e-5
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class TaskResult:
     Parameters
     ----------
     safety_factor : float
-        Largest multiple of the load that is held [-], as proved; 0 if none is.
+        Largest multiple of the load that is held [-], as proved; 0 if none is, up to 1e-9 of what the contacts bear.
     gap : float
         How much larger it could be at most [-].
     lowest_factor : float
@@ -51,9 +51,10 @@ class TaskResult:
     at_limit : bool
         Whether that is undecided: the load is within 1e-6 of the limit, or in the ``gap``.
     motion : (6,) array
-        Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size.
+        Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size. Where
+        limit surfaces have corners, as polytopes have, there may be several, and this is one of them.
     limits : tuple of str
-        What each contact does then.
+        What each contact does then; of loads that weigh the same all are named.
     """
 
     safety_factor: float
@@ -132,7 +133,8 @@ def hold_task(
     C = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
     w = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
     lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
-    factor = max(found.lower, 0.0)
+    strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
+    factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
     u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
     gap = max(found.upper - factor, 0.0)
     holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
@@ -183,10 +185,10 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     """Multiples of ``w`` among the wrenches of contacts with given normal forces."""
     bodies = [contact.body for contact in contacts]
     U = _span([Ci[:, 1:] * _axes(contact) for Ci, contact in zip(C, contacts, strict=True)])
-    b = C[:, :, 0].sum(axis=0)
+    b, nothing = C[:, :, 0].sum(axis=0), _NOTHING * float(np.abs(C[:, :3, 0]).sum())
     off_w, off_b = (a - U @ (U.T @ a) for a in (w, b))
     small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
-    if small_w and np.linalg.norm(off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum():
+    if small_w and np.linalg.norm(off_b) <= nothing:
         C, w = U.T @ C, U.T @ w
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
@@ -194,8 +196,8 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
     s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
     rest = s * w - b
-    balanced = np.linalg.norm(s * off_w - off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum()
-    if balanced and s >= 0 and np.linalg.norm(rest) > _NOTHING * np.linalg.norm(b):
+    balanced = np.linalg.norm(s * off_w - off_b) <= nothing
+    if balanced and s >= 0 and np.linalg.norm(rest) > nothing:
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
         balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT
     s = s if balanced and s >= 0 else 0.0
@@ -204,13 +206,12 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
 
 
 def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tuple[str, ...]:
-    """What the contacts do when the object escapes: its motion there, weighed by the loads it works against.
-
-    Motions along two or three axes that weigh the same are all named.
-    """
+    """What the contacts do when the object escapes: its motion there, weighed by the loads it works against."""
     felt = np.array([Ci.T @ u for Ci in C])  # along N, x, y and about N
     felt[:, 1:] *= [_axes(contact) for contact in contacts]
     size = np.linalg.norm(felt, axis=1)
+    if size.max() <= _NOTHING * np.linalg.norm(C) * np.linalg.norm(u):
+        return ("stays in place",) * len(contacts)  # what they feel of a motion that they cannot stop is rounding
     said = []
     for part, friction in zip(felt, np.linalg.norm(felt[:, 1:], axis=1), strict=True):
         if np.linalg.norm(part) <= _STILL * size.max():
