@@ -100,6 +100,8 @@ def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | N
 
 def _groups(coefficients: FloatArray, E: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
     """Sets of variables, as masks ``(d,)``, that share no monomial with the others."""
+    if coefficients.all():
+        return [np.ones(E.shape[1], dtype=bool)]
     used = (E[coefficients != 0] > 0).astype(float)
     joined = np.linalg.matrix_power(used.T @ used + np.eye(E.shape[1]), E.shape[1]) > 0
     return list(np.unique(joined, axis=0))

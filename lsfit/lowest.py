@@ -19,6 +19,8 @@ from lsfit.geometry import directions, half_sphere_monomials
 
 FloatArray = NDArray[np.float64]
 SLOPE = 1e-12  # of the largest value: the gradient at which the search ends; the value is then good to its square
+FINE = 2000  # directions in which curvature is sampled, whose valleys are narrower than those of the value
+LOW = 40  # samples from which a smallest value is searched besides those that are lower than their neighbours
 SHORT = 1e-9  # step at which the search ends: it changes the value by its square
 NEAR = 0.1  # of the range of starts: how far from the lowest one is still worth polishing
 
@@ -51,7 +53,7 @@ def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
     """Smallest value on the unit sphere of the quartic form with coefficients ``v (k,)``, and where, ``(d,)``."""
     n = _count(dimension)
     P = half_sphere_monomials(dimension, n) @ v
-    u = directions(dimension, n)[_lowest(P, dimension)]
+    u = directions(dimension, n)[_lowest(P, dimension) | (P <= np.partition(P, LOW)[LOW])]
     D, E, third = derivative(dimension, 4), exponents(dimension, 4), exponents(dimension, 3)
     Q = hessian_tensor(v, dimension).reshape(dimension**2, dimension**2)
     value, size, trust = monomials(u, E) @ v, np.abs(P).max(), np.full(len(u), 0.3)
@@ -96,7 +98,7 @@ def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
     """
     d = dimension
     Q = hessian_tensor(v, d).reshape(d * d, d * d)
-    u = directions(d, _count(d))
+    u = directions(d, FINE)
     field = lowest_eigenvalues(((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d))
     u = u[_lowest(field, d)]
     for _ in range(8):
@@ -149,8 +151,8 @@ def lowest_eigenvalues(H: FloatArray) -> FloatArray:
 
 
 def _count(dimension: int) -> int:
-    """Number of sampled directions."""
-    return 400 if dimension <= 3 else 2000
+    """Number of directions in which the value is sampled."""
+    return 400 if dimension <= 3 else FINE
 
 
 def _lowest(value: FloatArray, dimension: int) -> NDArray[np.bool_]:
