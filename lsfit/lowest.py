@@ -101,7 +101,7 @@ def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
     u = directions(d, FINE)
     field = lowest_eigenvalues(((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d))
     u = u[_lowest(field, d)]
-    for _ in range(8):
+    for _ in range(30):
         H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
         values, vectors = np.linalg.eigh(H)
         u, z = vectors[:, :, 0], u
