@@ -194,7 +194,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
     lowest = np.linalg.eigvalsh(A)[0]
     if lowest >= floor:
-        return A, flag | (FitFlag.BOUNDED if lowest <= floor + AT_BOUND else FitFlag.CLEAN)
+        return A, flag if lowest > floor + AT_BOUND else flag | FitFlag.BOUNDED
     a = least_in_cone(N, b, triangle, floor)
     return (place @ a).reshape(r, r), flag | FitFlag.BOUNDED
 
