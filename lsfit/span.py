@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from lsfit.flag import FitError, FitFlag
-from lsfit.lowest import smallest_value
+from lsfit.lowest import lies_above, smallest_value
 from lsfit.quartic_surface import Quartic
 from lsfit.samples import FLAT, THIN
 from lsfit.surface import Image, LimitSurface
@@ -124,12 +124,14 @@ def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
             f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
             f"{len(Y)} samples; lower lam, raise beta, or give more samples"
         )
+    least = (FAR * np.linalg.norm(Y, axis=1).max()) ** -surface.degree
     if isinstance(surface, Quartic):
+        if lies_above(surface.coefficients, surface.dimension, least):
+            return
         P, u = smallest_value(surface.coefficients, surface.dimension)
     else:
         values, V = np.linalg.eigh(surface.A)
         P, u = float(values[0]), V[:, 0]
-    least = (FAR * np.linalg.norm(Y, axis=1).max()) ** -surface.degree
     if P < least:
         reach = FAR * (least / max(P, 1e-300)) ** (1 / surface.degree)
         raise CollapsedFitError(
