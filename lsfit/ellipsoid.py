@@ -11,13 +11,16 @@ from scipy.optimize import nnls
 
 from lsfit.flag import FitFlag
 from lsfit.form import exponents, monomials
-from lsfit.samples import checked_wrenches, principal_frame
+from lsfit.samples import FLAT, NOTHING, checked_wrenches, principal_frame
 from lsfit.sos import least_in_cone, quadratic_parts
-from lsfit.surface import LevelSet, checked_factors, rows
+from lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
 from lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 FAR = 10.0  # largest reach of a fitted ellipsoid, as a multiple of the samples' largest
+AT_BOUND = 1e-9  # of a coefficient that should be positive: up to here its ellipsoid counts as bounded by `FAR`
+HELD = 1e-12  # share of the largest eigenvalue of normal equations below which data say nothing
+WEAK = 1e-10  # share below which they say so little that the fit is flagged, whether it heeds them or not
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +80,9 @@ class Ellipsoid(LevelSet):
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, 3) -> (m,)``; infinite for loads along an axis that carries none."""
         w = rows(w, 3)
+        inside = (self.semi_axes == 0) & (np.abs(w) <= OUT_OF_SPAN * np.linalg.norm(w, axis=1, keepdims=True))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return (np.where((self.semi_axes == 0) & (w == 0), 0.0, w / self.semi_axes) ** 2).sum(axis=1)
+            return (np.where(inside, 0.0, w / self.semi_axes) ** 2).sum(axis=1)
 
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient ``2 w_i / e_i^2``, the direction of motion, ``(m, 3) -> (m, 3)``; 0 along an axis without load."""
@@ -109,10 +113,12 @@ def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> 
 
     Notes
     -----
-    A torque below ``1e-12 rho max(f)`` is the rounding of a contact that carries none; its semi-axis is 0. The
-    ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual patches.
+    A force or torque (by ``rho``) below `NOTHING` of the largest force is the rounding of a contact that carries none;
+    its semi-axis is 0. The ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual
+    patches.
     """
-    return Ellipsoid(np.array([f_x, f_y, tau_z if tau_z > 1e-12 * rho * max(f_x, f_y) else 0.0]))
+    least = NOTHING * max(f_x, f_y)
+    return Ellipsoid(np.array([x if x > least * unit else 0.0 for x, unit in ((f_x, 1), (f_y, 1), (tau_z, rho))]))
 
 
 def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
@@ -126,8 +132,8 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     Returns
     -------
     Ellipsoid
-        With the semi-axis 0 along components that no sample has. Samples that would make it endless (``a_i <= 0``)
-        give a semi-axis of `FAR` times their largest component, and the flag says so.
+        With the semi-axis 0 along components that no sample has. Samples that would make it endless (``a_i`` not above
+        `AT_BOUND`) give a semi-axis of `FAR` times their largest component, and the flag says so.
 
     Raises
     ------
@@ -137,13 +143,13 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     W = checked_wrenches(W, 3)
     B, _, flag = principal_frame(W)
     reach = np.abs(W).max(axis=0)
-    used = reach > 1e-9 * reach.max()
+    used = reach > FLAT * reach.max()
     X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
     right = 1 - floor * X.sum(axis=1)
     if B.shape[1] < used.sum() or len(W) < used.sum():  # squares may depend on each other: lean towards equal ones
         X, right = np.vstack([X, 1e-5 * np.eye(X.shape[1])]), np.append(right, np.full(X.shape[1], 1e-5))
     a, _ = nnls(X, right)
-    flag |= FitFlag.BOUNDED if (a == 0).any() else FitFlag.CLEAN
+    flag |= FitFlag.BOUNDED if (a <= AT_BOUND).any() else FitFlag.CLEAN
     axes = np.zeros(3)
     axes[used] = reach[used] / np.sqrt(a + floor)
     return Ellipsoid(axes, flag)
@@ -186,17 +192,22 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)
     floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
-    if np.linalg.eigvalsh(A)[0] >= floor:
-        return A, flag
+    lowest = np.linalg.eigvalsh(A)[0]
+    if lowest >= floor:
+        return A, flag if lowest > floor + AT_BOUND else flag | FitFlag.BOUNDED
     a = least_in_cone(N, b, triangle, floor)
     return (place @ a).reshape(r, r), flag | FitFlag.BOUNDED
 
 
 def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[FloatArray, FitFlag]:
-    """Solution of the normal equations ``N x = b`` that is nearest to ``start`` if there are many, and a flag."""
+    """Solution of the normal equations ``N x = b`` that is nearest to ``start`` if there are many, and a flag.
+
+    Directions below `HELD` are rounding and stay at the start. Between that and `WEAK` they are followed, but a part in
+    ``1e-16 / WEAK`` of the solution is rounding there, which the flag says too.
+    """
     size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
     values, V = np.linalg.eigh(N * np.outer(size, size))
-    held = values > 1e-12 * values[-1]
+    held = values > HELD * values[-1]
     V = size[:, None] * V[:, held]
     x = start + V @ ((V.T @ (b - N @ start)) / values[held])
-    return x, FitFlag.CLEAN if held.all() else FitFlag.UNDERDETERMINED
+    return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED

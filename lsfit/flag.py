@@ -9,6 +9,14 @@ class FitError(ArithmeticError):
     """A fit, or a measure of a fitted body, that could not be completed."""
 
 
+class OpenBodyError(FitError):
+    """A level set that is not closed: it has no volume, and no support in some direction."""
+
+
+class UndecidedError(FitError):
+    """A question that rounding would answer: the value that decides is too small to be told from zero."""
+
+
 class FitFlag(IntFlag):
     """What the reader of a fitted limit surface should know; flags add up."""
 

@@ -8,11 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.special import roots_gegenbauer
 
 from lsfit.flag import FitError
 from lsfit.form import exponents, monomials
-from lsfit.sums import shadow_sum
+from lsfit.sums import fill_floors
 
 FloatArray = NDArray[np.float64]
 
@@ -67,14 +69,14 @@ def _rule_monomials(dimension: int, n: int) -> FloatArray:
 
 
 def quartic_volume(coefficients: FloatArray, dimension: int) -> float:
-    """Volume ``1/d int P(u)^(-d / 4) du`` over the unit sphere, for a body that is round within a factor of a few.
+    """Volume ``1/d int P(u)^(-d / 4) du`` over the unit sphere, for a closed body, round within a factor of a few.
 
     Rules of growing order are tried until two agree, to 1e-12 in up to three dimensions and to 1e-6 beyond.
 
     Raises
     ------
     FitError
-        If they never agree to 1e-8 (1e-3), or ``P`` is not positive: the body is not bounded.
+        If they never agree to 1e-8 (1e-3).
     """
     orders, aim, limit = ((10, 14, 20, 28, 40, 56, 80, 112, 160), 1e-12, 1e-8)
     if dimension > 3:
@@ -84,8 +86,6 @@ def quartic_volume(coefficients: FloatArray, dimension: int) -> float:
         u, weight = sphere_rule(dimension, n)
         M = _rule_monomials(dimension, n) if dimension <= 3 else monomials(u, exponents(dimension, 4))
         P = M @ coefficients
-        if not P.min() > 0:
-            raise FitError(f"P is {P.min():.3g} along {u[np.argmin(P)].round(6)}: a body without end has no volume")
         # Roots are several times as fast as a power.
         V = float(weight @ (1 / np.sqrt(P * np.sqrt(P)) if dimension == 3 else P ** (-dimension / 4))) / dimension
         last, change = V, abs(V - last) / V
@@ -97,15 +97,11 @@ def quartic_volume(coefficients: FloatArray, dimension: int) -> float:
 
 
 def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degree: int) -> FloatArray:
-    """Map ``L (d, d)`` from a body that is nearly round onto ``P <= 1``, by the moments of its surface."""
+    """Map ``L (d, d)`` from a body that is nearly round onto a closed one, ``P <= 1``, by its surface's moments."""
     u = directions(dimension, 40 * dimension**2)
     L = np.eye(dimension)
     for _ in range(40):
-        X = u @ L.T
-        P = value(X)
-        if not P.min() > 0:
-            raise FitError(f"P is {P.min():.3g} along {X[np.argmin(P)]}: the level set is not closed")
-        r = P ** (-1 / degree)
+        r = value(u @ L.T) ** (-1 / degree)
         Y = u * r[:, None]
         C = np.linalg.cholesky(dimension * (Y.T @ Y) / len(u))
         L = L @ C
@@ -115,10 +111,11 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
 
 
 def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
-    """Area of the shadow of a convex quartic body in 3-D on the first two components.
+    """Area of the shadow of a closed quartic body in 3-D on the first two components.
 
-    The shadow is the level set of ``min over tau of P(x, y, tau)``, where the derivative along ``tau`` is a cubic with
-    one real root; its area is a periodic integral, for which equal steps converge fastest.
+    The shadow is the level set of ``min over tau of P(x, y, tau)``, whose area is a periodic integral: equal steps
+    converge fastest. Where the body is not convex the least value may jump from one valley to another, so that the
+    outline has corners; then the integral is divided there.
 
     Parameters
     ----------
@@ -126,16 +123,54 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
         In the order of ``exponents(3, 4)``.
     reach : (3,) array
         About the reach along the axes, by which the variables are divided.
+
+    Raises
+    ------
+    FitError
+        If the area is not found to 1e-9.
     """
-    E = exponents(3, 4)
-    c = coefficients * np.prod(reach**E, axis=1)
+    c = coefficients * np.prod(reach ** exponents(3, 4), axis=1)
     last = math.nan
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
-        area = np.pi / n * shadow_sum(c, E, _plane_monomials(n))
+        floors = _floors(c, _plane_monomials(n))
+        area = np.pi / n * float((1.0 / np.sqrt(floors[:, 2])).sum())
         if abs(area - last) <= 1e-13 * area:
             break
         last = area
+    else:
+        area = _cornered_area(c, floors)
     return area * float(reach[0] * reach[1])
+
+
+def _cornered_area(c: FloatArray, floors: FloatArray) -> float:
+    """The same area by pieces between the corners that equal steps of half a turn, ``floors (n, 3)``, have met."""
+
+    def at(phi: float) -> FloatArray:
+        return _floors(c, monomials([np.cos(phi), np.sin(phi), 1.0], exponents(3, 4)))[0]
+
+    n = len(floors)
+    p, q = floors[:, 0], np.append(floors[:, 1], -floors[0, 1])  # q is odd: half a turn changes its sign
+    ends = np.pi * np.array([[k, k + 1] for k in np.flatnonzero((q[:-1] > 0) != (q[1:] > 0)) if p[k] < 0]) / n
+    corners = [brentq(lambda phi: at(phi)[1], *pair) for pair in ends]
+    start, inside = (corners[0], corners[1:]) if corners else (0.0, [])
+    area, error = quad(
+        lambda phi: at(phi)[2] ** -0.5,
+        start,
+        start + np.pi,
+        points=inside or None,
+        epsabs=0.0,
+        epsrel=1e-12,
+        limit=400,
+    )[:2]
+    if not error <= 1e-9 * area:
+        raise FitError(f"the area of the shadow is known to {error / area:.1e} of itself only: the body is too uneven")
+    return area
+
+
+def _floors(c: FloatArray, M: FloatArray) -> FloatArray:
+    out = np.empty((len(M), 3))
+    fill_floors(c, exponents(3, 4), M, out)
+    return out
 
 
 @lru_cache

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsfit.samples import checked_motions
-from lsfit.sums import mean_errors
+from lsfit.sums import ENDLESS, mean_errors
 from lsfit.surface import LimitSurface
 
 __all__ = ["LimitSurface", "Misfit", "misfit"]
 
 FloatArray = NDArray[np.float64]
+ACROSS = 1e-9  # part of a unit motion from which its angle to a flat body's normals is not a right one
 
 
 class Misfit(NamedTuple):
@@ -35,7 +36,8 @@ def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
 
     Samples without a wrench say nothing about a surface and are left out. A flat model has the radius 0 (``Erad`` 1,
     ``E1`` infinite) for wrenches out of its span, and is normal to every motion out of it: its angle is the one
-    between the motion and the nearest of its normals. Where the polynomial is not positive the radius is infinite.
+    between the motion and the nearest of its normals. Where the polynomial is not above `ENDLESS` the radius is
+    infinite.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
         E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
         return Misfit(E1, Erad, math.degrees(angle))
     with np.errstate(divide="ignore"):
-        radius = np.maximum(P, 0.0) ** (-1 / model.degree)
+        radius = np.where(P > ENDLESS, P, 0.0) ** (-1 / model.degree)
     return Misfit(
         float(np.abs(P - 1).mean()),
         float(np.abs(radius - 1).mean()),
@@ -65,8 +67,8 @@ def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
     u = across + ahead * u
     size = np.linalg.norm(u, axis=1, keepdims=True)
-    u /= np.where(size > 0, size, 1.0)
+    u /= np.where(size > ACROSS, size, 1.0)
     # The half-angle form keeps its digits where the arc cosine of a number near one loses them. A motion against the
     # gradient is a right angle away from all that is normal to the span.
     angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
-    return np.where(size[:, 0] > 0, angle, np.pi / 2)
+    return np.where(size[:, 0] > ACROSS, angle, np.pi / 2)

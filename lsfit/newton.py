@@ -8,10 +8,10 @@ from numba import njit
 
 @njit(cache=True)
 def support_points(tensor, T, start, out):  # pragma: no cover - compiled
-    """Points ``out (m, d)`` of a convex quartic surface with the outward normals ``T (m, d)``, by Newton's method.
+    """Points ``out (m, d)`` of a closed quartic surface farthest along ``T (m, d)``, by Newton's method.
 
-    ``P(w) - t . w`` is convex and smallest where the gradient of ``P`` is ``t``: on the ray through the point of the
-    surface that is wanted. Steps are halved until the function falls.
+    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted, whether ``P`` is convex or
+    not. Steps are halved until the function falls; where the second derivative is not positive it is shifted.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def support_points(tensor, T, start, out):  # pragma: no cover - compiled
     T : (m, d) array
         Unit normals.
     start : (m, d) array
-        Points near the ones wanted, of any length.
+        Points near the ones wanted, of any length; the lowest valley near them is found.
 
     Returns
     -------
@@ -39,15 +39,18 @@ def support_points(tensor, T, start, out):  # pragma: no cover - compiled
         P = _second(tensor, w, H, g)
         converged = False
         for _ in range(200):
-            trace = 0.0
+            size, shift = 0.0, 1e-13
             for i in range(d):
-                trace += H[i, i]
-                s[i] = t[i] - g[i]
-                for j in range(d):
-                    A[i, j] = H[i, j]
-            for i in range(d):
-                A[i, i] += 1e-13 * trace
-            _solve(A, s)
+                size += abs(H[i, i])
+            while True:
+                for i in range(d):
+                    s[i] = t[i] - g[i]
+                    for j in range(d):
+                        A[i, j] = H[i, j]
+                    A[i, i] += shift * size
+                if _solve(A, s):
+                    break
+                shift = max(10.0 * shift, 1e-3)
             fall = 0.0
             for i in range(d):
                 fall += s[i] * (t[i] - g[i])
@@ -90,9 +93,11 @@ def _second(tensor, w, H, g):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _solve(A, b):  # pragma: no cover - compiled
-    """Solve ``A x = b`` in place by Gauss elimination of a positive matrix."""
+    """Solve ``A x = b`` in place by Gauss elimination; False where the symmetric matrix is not positive definite."""
     d = len(b)
     for k in range(d):
+        if not A[k, k] > 0.0:
+            return False
         for i in range(k + 1, d):
             f = A[i, k] / A[k, k]
             for j in range(k, d):
@@ -102,3 +107,4 @@ def _solve(A, b):  # pragma: no cover - compiled
         for j in range(k + 1, d):
             b[k] -= A[k, j] * b[j]
         b[k] /= A[k, k]
+    return True

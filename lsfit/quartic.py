@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from lsfit.certificate import Certificate, certify
 from lsfit.ellipsoid import FAR, nearest_solution
 from lsfit.flag import FitError, FitFlag
-from lsfit.geometry import half_sphere_monomials
+from lsfit.lowest import lies_above
 from lsfit.quartic_surface import Quartic
 from lsfit.round import Residuals, ball_coefficients, placed, round_samples
 from lsfit.sos import MARGIN, convex_least_squares
@@ -119,7 +119,7 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     if gram is None:
         by = "semidefinite programme"
         v, gram = convex_least_squares(N, b, ball, r, loose)
-    if (half_sphere_monomials(r, 200) @ v).min() < FAR**-4:
+    if not lies_above(v, r, FAR**-4):
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
         v, gram = convex_least_squares(N, b, ball, r, loose, 12 * FAR**-4)
     surface = placed(v, samples, samples.flag | flag)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsfit.closed import refuse_open
 from lsfit.flag import FitError, FitFlag
 from lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
 from lsfit.geometry import (
@@ -18,11 +19,13 @@ from lsfit.geometry import (
     round_frame,
     supported_shadow,
 )
+from lsfit.lowest import lowest_eigenvalues, neighbours
 from lsfit.newton import support_points
 from lsfit.surface import LevelSet, checked_factors, rows
 from lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +42,16 @@ class Quartic(LevelSet):
         What the reader should know.
     ball_map : (d, d) array, optional
         Map from a ball onto an ellipsoid near the body, where one is known.
+    units : (d,) array, optional
+        Sizes of the components in which all coefficients are equally exact, 1 if not given. Measures of the body ask
+        whether it is closed, and what is rounding is judged in these units (or in those of ``ball_map``).
     """
 
     coefficients: FloatArray
     exponents: NDArray[np.int64]
     flag: FitFlag = FitFlag.CLEAN
     ball_map: FloatArray | None = field(default=None, repr=False)
+    units: FloatArray | None = field(default=None, repr=False)
     degree = 4
 
     def __post_init__(self) -> None:
@@ -104,8 +111,20 @@ class Quartic(LevelSet):
 
     @cached_property
     def frame(self) -> FloatArray:
-        """Map ``L (d, d)`` from a body that is nearly round onto this one."""
-        return round_frame(self.value, self.dimension, 4) if self.ball_map is None else self.ball_map
+        """Map ``L (d, d)`` from a body that is nearly round onto this one.
+
+        Raises
+        ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
+        """
+        if self.ball_map is not None:
+            refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
+            return self.ball_map
+        units = np.ones(self.dimension) if self.units is None else self.units
+        own = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.exponents)
+        refuse_open(own.coefficients, self.dimension, np.diag(units))
+        return units[:, None] * round_frame(own.value, self.dimension, 4)
 
     @property
     def ellipsoid(self) -> TiltedEllipsoid:
@@ -120,7 +139,13 @@ class Quartic(LevelSet):
 
     @cached_property
     def shadow_area(self) -> float:
-        """Area of the shadow on the plane of the first two components, for a convex quartic."""
+        """Area of the shadow on the plane of the first two components; that of the hull in more than three dimensions.
+
+        Raises
+        ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
+        """
         if self.dimension == 3:
             return quartic_shadow(self.coefficients, np.linalg.norm(self.frame, axis=1))
         if self.dimension == 2:
@@ -128,12 +153,16 @@ class Quartic(LevelSet):
         return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
 
     def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``, for a convex quartic; to 1e-12 of itself.
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself.
+
+        Of a body that is not convex, the highest of the hills that sampled points of its surface lead to.
 
         Raises
         ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
         FitError
-            If a search stops short, which a quartic that is not convex may cause.
+            If a search stops short.
         """
         T = rows(t, self.dimension)
         return (T * self.support_points(T)).sum(axis=1)
@@ -144,34 +173,60 @@ class Quartic(LevelSet):
         return self.support(np.eye(self.dimension))
 
     def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of a convex surface where ``t`` is the outward normal, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
         T = rows(t, self.dimension) @ self.frame
         length = np.linalg.norm(T, axis=1)
-        T = T / np.where(length > 0, length, 1.0)[:, None]
-        Y = self._surface_points
-        start = np.empty_like(T)
-        for part in range(0, len(T), 10_000):
-            along = T[part : part + 10_000] @ Y.T
-            best = np.abs(along).argmax(axis=1)
-            start[part : part + 10_000] = Y[best] * np.sign(along[np.arange(len(best)), best])[:, None]
-        out = np.zeros_like(T)
         moving = length > 0
-        found = np.empty((int(moving.sum()), self.dimension))
-        failed = support_points(self._round.tensor, T[moving], start[moving], found)
+        T = T[moving] / length[moving, None]
+        owner, start = self._starts(T)
+        found = np.empty_like(start)
+        failed = support_points(self._round.tensor, T[owner], start, found)
         if failed:
-            raise FitError(f"{failed} of {len(T)} supports did not converge: the quartic may not be convex")
+            raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
+        if len(owner) > len(T):
+            order = np.lexsort(((found * T[owner]).sum(axis=1), owner))
+            found = found[order[np.append(np.diff(owner) > 0, True)]]
+        out = np.zeros((len(moving), self.dimension))
         out[moving] = found @ self.frame.T
         return out
+
+    def _starts(self, T: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Points of the surface from which to search, and which row of ``T`` each is for, in order.
+
+        The highest sample of a body that is convex; of others all nearly as high, or higher than their neighbours.
+        """
+        d, Y = self.dimension, self._surface_points
+        owner, place, sign = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+        for part in range(0, len(T), 10_000):
+            along = T[part : part + 10_000] @ Y.T
+            height = np.abs(along)
+            if self._is_dented:
+                tops = height >= height[:, neighbours(d, len(Y))].max(axis=2)
+                row, column = np.nonzero(tops | (height > 0.9 * height.max(axis=1, keepdims=True)))
+            else:
+                row, column = np.arange(len(along)), height.argmax(axis=1)
+            owner.append(part + row)
+            place.append(column)
+            sign.append(np.sign(along[row, column]))
+        return np.concatenate(owner), Y[np.concatenate(place)] * np.concatenate(sign)[:, None]
 
     def scaled(self, factors: ArrayLike) -> Quartic:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
         f = checked_factors(factors, self.dimension)
         ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
-        return Quartic(self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag, ball_map)
+        units = np.abs(f) if self.units is None else np.abs(f) * self.units
+        return Quartic(
+            self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag, ball_map, units
+        )
 
     @cached_property
     def _round(self) -> Quartic:
         return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
+
+    @cached_property
+    def _is_dented(self) -> bool:
+        """Whether a sampled direction has a negative curvature; several starts do no harm to a convex body."""
+        return bool(lowest_eigenvalues(self._round.hessian(directions(self.dimension, 200))).min() < 0)
 
     @cached_property
     def _surface_points(self) -> FloatArray:

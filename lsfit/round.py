@@ -114,4 +114,4 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     if np.linalg.cond(turn) > TILT:
         return Image(Quartic(v, E), samples.B, flag)
     coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
-    return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None)
+    return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None, reach)

@@ -10,6 +10,8 @@ from lsfit.flag import FitFlag
 FloatArray = NDArray[np.float64]
 UNIT = 1e-5  # how far the length of a unit motion may be from 1
 THIN = 1e-3  # below this ratio of their principal lengths, samples are called thin
+FLAT = 1e-9  # below this they count as flat; what lies between is told by the flag THIN
+NOTHING = 1e-12  # below this share of the largest, a wrench or a semi-axis is the rounding of none
 
 
 def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
@@ -44,7 +46,7 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
     return W, T / length[:, None]
 
 
-def sample_rank(W: ArrayLike, tolerance: float = 1e-9) -> int:
+def sample_rank(W: ArrayLike, tolerance: float = FLAT) -> int:
     """Dimension of the space that the samples span; below 3, no limit surface can be fitted to them alone.
 
     Parameters
@@ -59,7 +61,7 @@ def sample_rank(W: ArrayLike, tolerance: float = 1e-9) -> int:
 
 
 def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
-    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero.
+    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero, or the rounding of that (`NOTHING`).
 
     Raises
     ------
@@ -71,7 +73,7 @@ def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
         raise ValueError(f"W has shape {W.shape}: expected wrenches as rows, (m, {dimension or 'd'})")
     if not np.isfinite(W).all():
         raise ValueError(f"W[{int(np.argmin(np.isfinite(W).all(axis=1)))}] is not finite: drop it or correct it")
-    pressed = W.any(axis=1)
+    pressed = _pressed(W)
     if not pressed.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
     return W if pressed.all() else W[pressed]
@@ -89,7 +91,13 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
     if not abs(length - 1).max() <= UNIT:
         n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
         raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
-    return wrenches, T if len(wrenches) == len(T) else T[W.any(axis=1)]
+    return wrenches, T if len(wrenches) == len(T) else T[_pressed(W)]
+
+
+def _pressed(W: FloatArray) -> NDArray[np.bool_]:
+    """Which wrenches are not zero, ``(m,)``."""
+    size = np.einsum("md,md->m", W, W)
+    return size > NOTHING**2 * size.max()
 
 
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
@@ -105,7 +113,7 @@ def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
         Whether the samples are flat or thin.
     """
     U, values, V = np.linalg.svd(W, full_matrices=False)
-    r = int((values > 1e-9 * values[0]).sum())
+    r = int((values > FLAT * values[0]).sum())
     flag = FitFlag.CLEAN if r == W.shape[1] else FitFlag.RANK_DEFICIENT
     flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
     size = np.sqrt(len(W))

@@ -15,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.ellipsoid import full_ellipsoid
-from lsfit.flag import FitError, FitFlag
+from lsfit.ellipsoid import full_ellipsoid, nearest_solution
+from lsfit.flag import FitError
 from lsfit.form import exponents, monomial_gradients, monomials
 from lsfit.gram import GramCertificate, ball_gram, gram_certificate, gram_map
 from lsfit.interior import least_quadratic
 from lsfit.misfit import Misfit, misfit
 from lsfit.quartic_surface import Quartic
+from lsfit.round import ball_coefficients
 from lsfit.span import Scaling, SpanSamples, placed, refuse_runaway, span_samples
 from lsfit.surface import LimitSurface
 
@@ -94,13 +95,12 @@ def span_quartic(
     """Quartic of least squares, 126 coefficients in six dimensions, which is not always convex.
 
     For comparison: in six dimensions it is not convex for usual patches, so it is no limit surface and its body may be
-    endless; see `convex_span_quartic`.
+    endless; see `convex_span_quartic`. Samples that do not determine it, as fewer than 126 do not, give the one of all
+    best quartics that is nearest to a ball in the scaled coordinates, and a flag.
     """
     samples = span_samples(W, T, scaling)
-    H, g = _normal_equations(samples, gamma, ridge)
-    size = np.sqrt(H.diagonal())  # monomials of one size keep the digits of small components
-    v = np.linalg.lstsq(H / np.outer(size, size), g / size, rcond=1e-15)[0] / size
-    return _fit(Quartic(v, exponents(samples.rank, 4), _held(H)), samples, check=False)
+    v, flag = nearest_solution(*_normal_equations(samples, gamma, ridge), ball_coefficients(samples.rank))
+    return _fit(Quartic(v, exponents(samples.rank, 4), flag), samples, check=False)
 
 
 def convex_span_quartic(
@@ -135,7 +135,7 @@ def convex_span_quartic(
     n = A.shape[1]
     start *= (g @ start[:k]) / (start[:k] @ H @ start[:k])
     best = least_quadratic(np.pad(H, (0, n - k)), np.pad(g, (0, n - k)), A, start)
-    surface = Quartic(best.x[:k], E, _held(H))
+    surface = Quartic(best.x[:k], E, nearest_solution(H, g, ball_coefficients(samples.rank))[1])
     certificate = gram_certificate(best.X, surface.tensor, best.gap / (1 + abs(best.objective)))
     if not certificate.proves_convexity:
         raise FitError(
@@ -158,13 +158,6 @@ def _normal_equations(samples: SpanSamples, gamma: float, ridge: float) -> tuple
         across = (G - along[:, :, None] * T[:, None, :]).transpose(0, 2, 1).reshape(-1, len(E))
         H += gamma * across.T @ across
     return H, M.sum(axis=0)
-
-
-def _held(H: FloatArray) -> FitFlag:
-    """Whether the normal equations determine every coefficient, all monomials made one size."""
-    size = np.sqrt(H.diagonal())
-    values = np.linalg.eigvalsh(H / np.outer(size, size))
-    return FitFlag.CLEAN if values[0] > 1e-14 * values[-1] else FitFlag.UNDERDETERMINED
 
 
 def _fit(surface: LimitSurface, samples: SpanSamples, check: bool = True) -> SpanFit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from lsfit.flag import FitError, FitFlag
-from lsfit.geometry import directions
+from lsfit.lowest import lies_above, smallest_value
+from lsfit.quartic_surface import Quartic
+from lsfit.samples import FLAT, THIN
 from lsfit.surface import Image, LimitSurface
 from lsfit.tilted import TiltedEllipsoid
 
@@ -28,12 +31,14 @@ class SpanSamples(NamedTuple):
     """Samples in coordinates ``y`` of their span, ``w = B y``.
 
     ``Y (m, r)`` are the wrenches and ``T (m, r)`` the unit motions, which change by ``B'`` so that powers stay the
-    same; ``B (d, r)`` has as many columns as the span has dimensions.
+    same; ``B (d, r)`` has as many columns as the span has dimensions. ``flag`` tells whether the samples are flat, or
+    thin with all components made one size.
     """
 
     Y: FloatArray
     T: FloatArray
     B: FloatArray
+    flag: FitFlag
 
     @property
     def rank(self) -> int:
@@ -41,11 +46,11 @@ class SpanSamples(NamedTuple):
         return self.B.shape[1]
 
 
-def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolerance: float = 1e-9) -> SpanSamples:
+def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolerance: float = FLAT) -> SpanSamples:
     """Samples within their span, scaled.
 
     A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Motions that meet no
-    friction (zero wrench) are left out.
+    friction (no component above ``tolerance`` of its largest) are left out.
 
     Parameters
     ----------
@@ -71,43 +76,46 @@ def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolera
     largest = np.abs(W).max(axis=0, initial=0.0)
     if not largest.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    B = _map(W, largest, scaling, tolerance)
-    moving = np.abs(W).max(axis=1) > tolerance * largest.max()
+    B, flag = _map(W, largest, scaling, tolerance)
+    used = largest > tolerance * largest.max()
+    moving = (np.abs(W[:, used]) > tolerance * largest[used]).any(axis=1)
     Y, slip = W[moving] @ np.linalg.pinv(B).T, T[moving] @ B
-    return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B)
+    return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B, flag)
 
 
-def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float) -> FloatArray:
-    """Columns ``B (d, r)`` of the coordinates."""
+def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float) -> tuple[FloatArray, FitFlag]:
+    """Columns ``B (d, r)`` of the coordinates, and whether the samples are flat or thin."""
     used = np.flatnonzero(largest > tolerance * largest.max())
     scale = largest[used]
     # Rank is a property of the samples, not of the unit of a torque: judge it with all components of one size.
     _, values, V = np.linalg.svd(W[:, used] / scale, full_matrices=False)
     r = int((values > tolerance * values[0]).sum())
+    flag = FitFlag.RANK_DEFICIENT if r < W.shape[1] else FitFlag.CLEAN
+    flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
     B = np.zeros((W.shape[1], r))
     if r == len(used) and scaling != "whitened":
         B[used] = np.diag(scale if scaling == "maxima" else np.ones(r))
-        return B
+        return B, flag
     B[used] = scale[:, None] * V[:r].T
     if scaling == "none":
-        return np.linalg.qr(B)[0]
+        return np.linalg.qr(B)[0], flag
     if scaling == "maxima":
-        return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0)
-    return B * (values[:r] / np.sqrt(len(W)))
+        return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
+    return B * (values[:r] / np.sqrt(len(W))), flag
 
 
 def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
     """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
     d, r = samples.B.shape
-    flag = surface.flag | (FitFlag.RANK_DEFICIENT if r < d else FitFlag.CLEAN)
+    flag = surface.flag | samples.flag
     if isinstance(surface, TiltedEllipsoid):
         return TiltedEllipsoid.of_ball(samples.B @ surface.F, flag)
     if r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
-        return surface.scaled(np.diag(samples.B))
+        return replace(surface.scaled(np.diag(samples.B)), flag=flag)
     return Image(surface, samples.B, flag)
 
 
-def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
+def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
     """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``, or is nearly endless."""
     with np.errstate(divide="ignore"):
         median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
@@ -116,19 +124,18 @@ def refuse_runaway(surface: LimitSurface, Y: FloatArray) -> None:
             f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
             f"{len(Y)} samples; lower lam, raise beta, or give more samples"
         )
-    u = directions(Y.shape[1], 500)
-    # Shifted power iteration goes down to the smallest value on the sphere if the shift outweighs all curvature.
-    shift = surface.degree**2 * float(np.abs(surface.value(u)).max())
-    u = u[np.argsort(surface.value(u))[:5]]
-    for _ in range(30):
-        u = shift * u - surface.gradient(u)
-        u /= np.linalg.norm(u, axis=1, keepdims=True)
-    low = int(np.argmin(surface.value(u)))
-    P = float(surface.value(u)[low])
-    reach = np.inf if P <= 0 else P ** (-1 / surface.degree) / np.linalg.norm(Y, axis=1).max()
-    if reach > FAR:
+    least = (FAR * np.linalg.norm(Y, axis=1).max()) ** -surface.degree
+    if isinstance(surface, Quartic):
+        if lies_above(surface.coefficients, surface.dimension, least):
+            return
+        P, u = smallest_value(surface.coefficients, surface.dimension)
+    else:
+        values, V = np.linalg.eigh(surface.A)
+        P, u = float(values[0]), V[:, 0]
+    if P < least:
+        reach = FAR * (least / max(P, 1e-300)) ** (1 / surface.degree)
         raise CollapsedFitError(
-            f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u[low], 3).tolist()} (scaled "
+            f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "
             "coordinates), where no sample holds it: sample more motions, or spread them over all directions"
         )
 

@@ -10,6 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
+ENDLESS = 1e-12  # value of a polynomial at a sample from which it counts as zero there: nowhere near its surface
+
 
 @njit(cache=True)
 def fill_monomials(w, E, out):  # pragma: no cover - compiled
@@ -83,7 +85,7 @@ def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
     value = radius = angle = 0.0
     for n in range(m):
         value += abs(P[n] - 1.0)
-        if P[n] > 0.0:
+        if P[n] > ENDLESS:
             radius += abs((1.0 / math.sqrt(math.sqrt(P[n])) if degree == 4 else P[n] ** (-1.0 / degree)) - 1.0)
         else:
             radius += np.inf
@@ -102,24 +104,33 @@ def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def shadow_sum(c, E, M):  # pragma: no cover - compiled
-    """Sum of ``1 / sqrt(min over tau of P(x, y, tau))`` for monomials ``M (n, 15)`` at tau 1."""
-    total = 0.0
+def fill_floors(c, E, M, out):  # pragma: no cover - compiled
+    """Write ``min over tau of P(x, y, tau)`` for monomials ``M (n, 15)`` at tau 1, ``-> out (n, 3)``.
+
+    The derivative along tau is a cubic, ``s^3 + p s + q = 0`` for ``tau = s - a_3 / (4 a_4)``. The least value is at
+    its root farthest on the side of ``-q``; ``p`` and ``q`` come first in ``out``. For a convex polynomial ``p`` is not
+    negative; where it is, ``q = 0`` means two valleys of equal depth.
+    """
     a = np.empty(5)
     for n in range(len(M)):
         a[:] = 0.0
         for j in range(len(c)):
             a[E[j, 2]] += c[j] * M[n, j]
-        # tau = s - a_3 / (4 a_4) leaves s^3 + p s + q = 0, with p >= 0 as the polynomial is convex.
         shift = a[3] / (4.0 * a[4])
-        p = max(a[2] / (2.0 * a[4]) - 3.0 * shift**2, 0.0)
+        p = a[2] / (2.0 * a[4]) - 3.0 * shift**2
         q = 2.0 * shift**3 - a[2] * shift / (2.0 * a[4]) + a[1] / (4.0 * a[4])
-        u = (abs(q) / 2.0 + math.sqrt(q**2 / 4.0 + p**3 / 27.0)) ** (1.0 / 3.0)
-        tau = -shift
-        if u > 0.0:
-            tau += (p / (3.0 * u) - u) * (1.0 if q > 0.0 else -1.0)
-        total += 1.0 / math.sqrt((((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0])
-    return total
+        inner = q**2 / 4.0 + p**3 / 27.0
+        s = 0.0
+        if inner >= 0.0:
+            u = (abs(q) / 2.0 + math.sqrt(inner)) ** (1.0 / 3.0)
+            if u > 0.0:
+                s = u - p / (3.0 * u)
+        else:
+            reach = math.sqrt(-p / 3.0)
+            s = 2.0 * reach * math.cos(math.acos(min(abs(q) / (2.0 * reach**3), 1.0)) / 3.0)
+        tau = -shift - (s if q > 0.0 else -s)
+        out[n, 0], out[n, 1] = p, q
+        out[n, 2] = (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]
 
 
 @njit(cache=True)

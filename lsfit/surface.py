@@ -15,6 +15,7 @@ __all__ = ["FitError", "FitFlag", "Image", "LevelSet", "LimitSurface"]
 
 FloatArray = NDArray[np.float64]
 ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface itself
+OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the body does not carry it
 
 
 class LimitSurface(Protocol):
@@ -182,8 +183,10 @@ class Image(LevelSet):
         """``P(w)``, ``(m, d) -> (m,)``; infinite where the body does not extend."""
         W = rows(w, self.dimension)
         Y = self._inner(W)
-        away = np.linalg.norm(W - Y @ self.B.T, axis=1) > 1e-9 * np.linalg.norm(W, axis=1)
-        return np.where(away, np.inf, self.inner.value(Y))
+        P = self.inner.value(Y)
+        if self.rank < self.dimension:
+            P[np.linalg.norm(W - Y @ self.B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
+        return P
 
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P`` within the span, ``(m, d) -> (m, d)``."""

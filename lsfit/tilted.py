@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsfit.flag import FitFlag
-from lsfit.surface import LevelSet, checked_factors, rows
+from lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
 
 FloatArray = NDArray[np.float64]
+
+DEFINITE = 1e-12
+"""Smallest eigenvalue of a positive definite matrix once its diagonal is 1; rounding makes up to some 1e-15 of 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +24,7 @@ class TiltedEllipsoid(LevelSet):
     Parameters
     ----------
     A : (d, d) array
-        Symmetric and positive definite; for a flat ellipsoid the pseudo-inverse of ``F F'``.
+        Symmetric and positive definite, to a margin of `DEFINITE`; for a flat ellipsoid the pseudo-inverse of ``F F'``.
     F : (d, r) array, optional
         Image of the unit ball: the body is ``{F y : |y| <= 1}``. Needed only for a flat ellipsoid, ``r < d``.
     flag : FitFlag
@@ -99,7 +102,7 @@ class TiltedEllipsoid(LevelSet):
         P = (Y**2).sum(axis=1)
         if self.rank < self.dimension:
             away = np.linalg.norm(W - Y @ self._map.T, axis=1)
-            P[away > 1e-9 * np.linalg.norm(W, axis=1)] = np.inf
+            P[away > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
         return P
 
     def gradient(self, w: ArrayLike) -> FloatArray:
@@ -131,10 +134,15 @@ def _ball_map(A: FloatArray) -> FloatArray:
     if (diagonal <= 0).any():
         raise ValueError(f"A has the diagonal {diagonal.tolist()}: an ellipsoid needs a positive definite matrix")
     size = 1 / np.sqrt(diagonal)
-    try:
-        C = np.linalg.cholesky(A * np.outer(size, size))
-    except np.linalg.LinAlgError:
+    even = A * np.outer(size, size)
+    lowest = float(np.linalg.eigvalsh(even)[0])
+    if lowest < -DEFINITE:
         raise ValueError(
             f"A has the eigenvalues {np.linalg.eigvalsh(A).tolist()}: an ellipsoid needs them all positive"
-        ) from None
-    return size[:, None] * np.linalg.inv(C).T
+        )
+    if lowest < DEFINITE:
+        raise ValueError(
+            f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, less than rounding can tell from zero: whether "
+            "the ellipsoid is closed is undecided; give its semi-axes (TiltedEllipsoid.of_ball)"
+        )
+    return size[:, None] * np.linalg.inv(np.linalg.cholesky(even)).T

@@ -78,7 +78,7 @@ def grasp_score(
         found = pose_volume(*contacts, *lengths)
         volumes = found.linf, found.l1, "pose", found.relative_error
     epsilons = _epsilons(contacts, *lengths) if with_epsilon else (math.nan, math.nan)
-    flag = contact_flag([contact.body for contact in contacts])
+    flag = contact_flag([contact.body for contact in contacts], contact_length)
     return Score(volumes[0], volumes[1], epsilons[0], flag, epsilons[1], *volumes[2:])
 
 

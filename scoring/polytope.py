@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
+FLAT = 1e-12
 
 
 def graspit_vertices(semi_axes: ArrayLike) -> FloatArray:
@@ -41,12 +42,14 @@ def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
 
 
 def hull_volume(points: FloatArray) -> float:
-    """Volume of the hull of points ``(m, d)``; 0 where they are flat."""
-    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if extent[-1] <= 1e-12 * extent[0]:
+    """Volume of the hull of points ``(m, d)``; 0 where they are flat, thinner than `FLAT` of their longest extent."""
+    centred = points - points.mean(axis=0)
+    _, extent, axes = np.linalg.svd(centred, full_matrices=False)
+    if len(points) <= points.shape[1] or extent[-1] <= FLAT * extent[0]:
         return 0.0
+    even = centred @ axes.T / extent  # Qhull loses facets of points that are much longer than wide
     try:
-        return float(ConvexHull(points).volume)
+        return float(ConvexHull(even).volume * extent.prod())
     except QhullError:
         # Joggled input always gives a hull; its volume is off by 1e-6 to 1e-5.
-        return float(ConvexHull(points, qhull_options="QJ").volume)
+        return float(ConvexHull(even, qhull_options="QJ").volume * extent.prod())

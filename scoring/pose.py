@@ -29,13 +29,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.contact import Body, SoftContact
+from scoring.contact import Body, PolytopeBody, SoftContact
 from scoring.fibre import Fibre, Span, fibre_of
 from scoring.plane import joint_pairs, mixed_area
 
 FloatArray = NDArray[np.float64]
 ROUNDING = 1e-13
 TURN = 1e-9  # keeps a direction off sides that are parallel to it, where the share of least force is not unique
+
+
+class _Ellipsoid(NamedTuple):
+    """Image of an ellipsoid under ``w -> factors * w``."""
+
+    body: Body
+    factors: FloatArray
+    degree: int = 2
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        return self.body.support(np.asarray(t) * self.factors)
 
 
 class PoseVolume(NamedTuple):
@@ -90,6 +101,7 @@ def cone_volume(
     with_l1: bool = True,
 ) -> PoseVolume:
     """Volumes for contacts given by their wrench maps ``(6, 4)``; parameters as in `pose_volume`."""
+    (C1, body1), (C2, body2) = _evened(C1, body1), _evened(C2, body2)
     spans = _spans(C1, body1, C2, body2)
     if spans is None:
         return PoseVolume(0.0, 0.0, 0.0)
@@ -126,6 +138,20 @@ def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int, with_l1
         return np.array([linf, math.nan])
     edges = K1 * two.ridge(level, delta) + one.ridge(level, -delta) * K2
     return np.array([linf, edges / 15 + joint_pairs(n1, n2, delta) / 20])
+
+
+def _evened(C: FloatArray, body: Body) -> tuple[FloatArray, Body]:
+    """Wrench map and body in loads that reach to 1, or are divided by their wrench's size if there are none.
+
+    What is thin enough to count as flat must not depend on the unit of length.
+    """
+    polytope = hasattr(body, "vertices")
+    if not polytope and getattr(body, "degree", None) != 2:
+        return C, body  # no other body is thickened
+    reach = body.support(np.eye(3))
+    scale = np.where(reach > 0, reach, 1 / np.linalg.norm(C[:, 1:], axis=0))
+    even = PolytopeBody(np.asarray(body.vertices) / scale) if polytope else _Ellipsoid(body, 1 / scale)
+    return C * np.append(1.0, scale), even
 
 
 def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Span, Span] | None:

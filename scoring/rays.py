@@ -28,6 +28,7 @@ from scoring.contact import Body, SoftContact
 
 FloatArray = NDArray[np.float64]
 GOLDEN = 1.1347241384015194  # root of x^7 = x + 1
+FLAT = 1e-12  # share of the largest component or direction up to which there are no wrenches along one
 GAP = 1e-6  # of the reach at which the programmes stop
 
 
@@ -152,10 +153,10 @@ def _rounded(C: FloatArray, bodies: Sequence[Body], kind: str) -> tuple[FloatArr
     """Wrench maps in coordinates in which the space is about round, and the volume of their unit; 0 if it is flat."""
     loads = np.hstack([Ci * np.append(1.0, body.support(np.eye(3))) for Ci, body in zip(C, bodies, strict=True)])
     size = np.linalg.norm(loads, axis=1)
-    if (size == 0).any():
+    if (size <= FLAT * size.max()).any():
         return C, 0.0
     axes, s, _ = np.linalg.svd(loads / size[:, None])
-    if len(s) < 6 or s[5] <= 1e-12 * s[0]:
+    if len(s) < 6 or s[5] <= FLAT * s[0]:
         return C, 0.0
     det = 1.0
     for L in (size[:, None] * axes * s, None, None):

@@ -76,7 +76,7 @@ def body_point(body: Body, t: FloatArray) -> FloatArray:
     """A point of the body farthest along ``t``, both ``(3,)``: a vertex, or the gradient of the support."""
     if (vertices := getattr(body, "vertices", None)) is not None:
         return vertices[np.argmax(vertices @ t)]
-    axes = np.maximum(body.support(np.eye(3)), 1e-12)
+    axes = _reach_of(body)
     size = np.linalg.norm(t * axes)
     if size == 0:
         return np.zeros(3)
@@ -84,6 +84,12 @@ def body_point(body: Body, t: FloatArray) -> FloatArray:
     h = body.support(np.vstack([t + step, t - step, t]))
     p = (h[:3] - h[3:6]) / (2e-5 * size) * axes
     return p * (h[6] / (p @ t)) if p @ t > 0 else p
+
+
+def _reach_of(body: Body) -> FloatArray:
+    """Reach along the axes ``(3,)``, by which directions are made even; 1 along one without any."""
+    axes = body.support(np.eye(3))
+    return np.where(axes > 0, axes, 1.0)
 
 
 class _CuttingPlanes:
@@ -95,7 +101,7 @@ class _CuttingPlanes:
         self.far = _FAR / np.linalg.norm(w)
         self.rows: list[FloatArray] = []
         for i, body in enumerate(bodies):
-            axes = np.maximum(body.support(np.eye(3)), 1e-12)
+            axes = _reach_of(body)
             for t in fibonacci_vertices(np.ones(3), 40) / axes:
                 self._add(i, body_point(body, t))
 

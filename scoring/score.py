@@ -13,6 +13,9 @@ from scoring.contact import Body, EllipsoidBody
 from scoring.epsilon import epsilon_l1, epsilon_linf
 from scoring.volume import volume_l1, volume_linf
 
+NOTHING = 1e-12
+"""Share of the largest load, torques divided by their length, up to which a load is the rounding of none."""
+
 
 class ScoreFlag(IntFlag):
     """Why a score is zero or smaller than the forces suggest; flags add up."""
@@ -91,26 +94,28 @@ def score(
     if hasattr(contact1, "volume") or hasattr(contact2, "volume"):
         bodies = (_as_body("contact1", contact1), _as_body("contact2", contact2))
         sizes = [size for body in bodies for size in (body.volume / rho, body.shadow_area)]
-        return Score(volume_linf(*sizes, d), volume_l1(*sizes, d), math.nan, contact_flag(bodies), math.nan)
+        return Score(volume_linf(*sizes, d), volume_l1(*sizes, d), math.nan, contact_flag(bodies, rho), math.nan)
     a, b = _scaled("contact1", contact1, rho), _scaled("contact2", contact2, rho)
     x = centre_of_mass / L
     sizes = [*_volume_and_shadow(a), *_volume_and_shadow(b)]
     arms = -d / 2 - x, d / 2 - x
-    flag = ScoreFlag.CLEAN
-    if a[2] == 0 or b[2] == 0:
-        flag |= ScoreFlag.NO_TORQUE
-    if 0 in (*a[:2], *b[:2]):
-        flag |= ScoreFlag.NO_FORCE
+    flag = _lacking(a, b)
     return Score(volume_linf(*sizes, d), volume_l1(*sizes, d), epsilon_linf(a, b, *arms), flag, epsilon_l1(a, b, *arms))
 
 
-def contact_flag(bodies: Sequence[Body]) -> ScoreFlag:
-    """What some contact does not carry at all."""
+def contact_flag(bodies: Sequence[Body], contact_length: float) -> ScoreFlag:
+    """What some contact does not carry at all, up to `NOTHING`; torques are divided by the length [m]."""
+    return _lacking(*((body.support(np.eye(3)) / [1.0, 1.0, contact_length]).tolist() for body in bodies))
+
+
+def _lacking(*contacts: Sequence[float]) -> ScoreFlag:
     flag = ScoreFlag.CLEAN
-    for body in bodies:
-        f_x, f_y, tau_z = body.support(np.eye(3))
-        flag |= ScoreFlag.NO_TORQUE if tau_z == 0 else ScoreFlag.CLEAN
-        flag |= ScoreFlag.NO_FORCE if f_x == 0 or f_y == 0 else ScoreFlag.CLEAN
+    for f_x, f_y, tau in contacts:
+        least = NOTHING * max(f_x, f_y, tau)
+        if tau <= least:
+            flag |= ScoreFlag.NO_TORQUE
+        if f_x <= least or f_y <= least:
+            flag |= ScoreFlag.NO_FORCE
     return flag
 
 

@@ -27,8 +27,11 @@ from scoring.reach import Reach, reach
 FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.80665
+_SLIPS = "slides along x", "slides along y", "turns about its normal"
 _KINDS = {"up_to": "linf", "fixed": "fixed"}
 _NOTHING = 1e-9  # relative size below which a part of a wrench counts as rounding
+_LIMIT = 1e-6  # how near to the limit a load is neither held nor not, as factors are good to some 1e-8
+_STILL = 1e-4  # share of the largest motion up to which there is none, or no difference: motions are good to some 1e-5
 
 
 @dataclass(frozen=True)
@@ -38,23 +41,27 @@ class TaskResult:
     Parameters
     ----------
     safety_factor : float
-        Largest multiple of the load that is held [-], as proved; 0 if none is.
+        Largest multiple of the load that is held [-], as proved; 0 if none is, up to 1e-9 of what the contacts bear.
     gap : float
         How much larger it could be at most [-].
     lowest_factor : float
         Smallest multiple that is held [-]; 0 unless fixed normal forces need a load to balance them.
     holds : bool
-        Whether the load itself is held.
+        Whether the load itself is held; so it counts at the limit.
+    at_limit : bool
+        Whether that is undecided: the load is within 1e-6 of the limit, or in the ``gap``.
     motion : (6,) array
-        Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size.
+        Motion by which the object escapes beyond the limit: velocity of the origin, then rotation, of any size. Where
+        limit surfaces have corners, as polytopes have, there may be several, and this is one of them.
     limits : tuple of str
-        What each contact does then.
+        What each contact does then; of loads that weigh the same all are named.
     """
 
     safety_factor: float
     gap: float
     lowest_factor: float
     holds: bool
+    at_limit: bool
     motion: FloatArray
     limits: tuple[str, ...]
 
@@ -126,10 +133,14 @@ def hold_task(
     C = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
     w = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
     lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
-    factor = max(found.lower, 0.0)
+    strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
+    factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
     u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
-    holds = bool(factor >= 1 and lowest <= 1)
-    return TaskResult(factor, max(found.upper - factor, 0.0), lowest, holds, -u, _limits(contacts, C, found.u))
+    gap = max(found.upper - factor, 0.0)
+    holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
+    inside = factor > 1 + _LIMIT and lowest < 1 - _LIMIT
+    outside = factor + gap < 1 - _LIMIT or lowest > 1 + _LIMIT
+    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, found.u))
 
 
 def least_grip_force(
@@ -174,10 +185,10 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     """Multiples of ``w`` among the wrenches of contacts with given normal forces."""
     bodies = [contact.body for contact in contacts]
     U = _span([Ci[:, 1:] * _axes(contact) for Ci, contact in zip(C, contacts, strict=True)])
-    b = C[:, :, 0].sum(axis=0)
+    b, nothing = C[:, :, 0].sum(axis=0), _NOTHING * float(np.abs(C[:, :3, 0]).sum())
     off_w, off_b = (a - U @ (U.T @ a) for a in (w, b))
     small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
-    if small_w and np.linalg.norm(off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum():
+    if small_w and np.linalg.norm(off_b) <= nothing:
         C, w = U.T @ C, U.T @ w
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
@@ -185,10 +196,10 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
     s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
     rest = s * w - b
-    balanced = np.linalg.norm(s * off_w - off_b) <= _NOTHING * np.abs(C[:, :3, 0]).sum()
-    if balanced and s >= 0 and np.linalg.norm(rest) > _NOTHING * np.linalg.norm(b):
+    balanced = np.linalg.norm(s * off_w - off_b) <= nothing
+    if balanced and s >= 0 and np.linalg.norm(rest) > nothing:
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
-        balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1
+        balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT
     s = s if balanced and s >= 0 else 0.0
     u = off_w if not small_w else off_b
     return s, Reach(s, s, u / max(abs(u @ w), 1e-300))
@@ -199,16 +210,19 @@ def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tu
     felt = np.array([Ci.T @ u for Ci in C])  # along N, x, y and about N
     felt[:, 1:] *= [_axes(contact) for contact in contacts]
     size = np.linalg.norm(felt, axis=1)
+    if size.max() <= _NOTHING * np.linalg.norm(C) * np.linalg.norm(u):
+        return ("stays in place",) * len(contacts)  # what they feel of a motion that they cannot stop is rounding
     said = []
     for part, friction in zip(felt, np.linalg.norm(felt[:, 1:], axis=1), strict=True):
-        if np.linalg.norm(part) <= 1e-6 * size.max():
+        if np.linalg.norm(part) <= _STILL * size.max():
             said.append("stays in place")
-        elif part[0] + friction <= 1e-6 * size.max():
+        elif part[0] + friction <= _STILL * size.max():
             said.append("lets go")
-        elif friction <= 1e-6 * size.max():
+        elif friction <= _STILL * size.max():
             said.append("is pushed back along its normal")
         else:
-            said.append(("slides along x", "slides along y", "turns about its normal")[np.abs(part[1:]).argmax()])
+            along = np.abs(part[1:]) >= (1 - _STILL) * np.abs(part[1:]).max()
+            said.append(" and ".join(name for name, most in zip(_SLIPS, along, strict=True) if most))
     return tuple(said)
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from lsfit.ellipsoid import Ellipsoid
-from lsfit.flag import FitError, FitFlag
+from lsfit.flag import FitFlag, OpenBodyError, UndecidedError
 from lsfit.form import exponents, monomials
 from lsfit.geometry import directions, quartic_volume, shadow_area, sphere_rule, supported_shadow
+from lsfit.lowest import smallest_eigenvalue, smallest_value
 from lsfit.misfit import misfit
 from lsfit.quartic import Quartic
 from lsfit.surface import Image
@@ -202,11 +203,64 @@ def test_errors_of_flat_bodies_are_numbers(surface):
     assert off.Erad == pytest.approx(1)
 
 
-def test_an_unbounded_quartic_is_refused():
-    flat = Quartic(coefficients(lambda w: (w[:, 0] ** 2 + w[:, 1] ** 2) ** 2), E)
-    for measure in ("volume", "semi_axes", "shadow_area"):
-        with pytest.raises(FitError, match=r"P is .* along"):
-            getattr(flat, measure)
+MEASURES = pytest.mark.parametrize("measure", ["volume", "semi_axes", "shadow_area", "ellipsoid"])
+
+
+@MEASURES
+def test_an_unbounded_quartic_is_refused(measure):
+    """A cylinder is not told from a body that is long or open; with its end left out it is open for sure."""
+    P = coefficients(lambda w: (w[:, 0] ** 2 + w[:, 1] ** 2) ** 2)
+    with pytest.raises(UndecidedError):
+        getattr(Quartic(P, E), measure)
+    for surely in (np.where(E[:, 2] > 0, 0.0, P), P - 1e-6 * fourth_powers().coefficients):
+        with pytest.raises(OpenBodyError):
+            getattr(Quartic(surely, E), measure)
+
+
+@MEASURES
+def test_how_thin_a_body_may_be_is_judged_in_its_units(measure):
+    """A thousandth in one direction, mixed with the others: closed only where coefficients have such digits."""
+    thin = rounded_box().scaled([1.0, 1.0, 1e-5])
+    again = Quartic(thin.coefficients, E, units=np.array([1.0, 1.0, 1e-5]))
+    for surface in (thin, again, again.scaled([1e-3, 1e4, 1.0])):
+        getattr(surface, measure)
+    with pytest.raises(UndecidedError):
+        getattr(Quartic(thin.coefficients, E), measure)
+    assert thin.volume == pytest.approx(1e-5 * rounded_box().volume, rel=1e-11)
+
+
+def dented(seed):
+    """A closed quartic with negative curvature somewhere."""
+    rng = np.random.default_rng(seed)
+    ball = squared(np.eye(3)).coefficients
+    while True:
+        v = ball + rng.uniform(1.0, 2.0) * rng.normal(size=15)
+        if smallest_value(v, 3)[0] > 0.02 and smallest_eigenvalue(v, 3) < -0.5:
+            return Quartic(v, E)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_shadow_of_a_body_that_is_not_convex(seed):
+    """The lowest value of the polynomial in tau counts, at one of the roots of its slope."""
+    surface, total, n = dented(seed), 0.0, 1500
+    for phi in np.pi * (np.arange(n) + 0.5) / n:
+        along = np.zeros(5)
+        np.add.at(along, E[:, 2], surface.coefficients * np.cos(phi) ** E[:, 0] * np.sin(phi) ** E[:, 1])
+        tau = np.roots(np.polyder(along[::-1]))
+        total += np.polyval(along[::-1], tau[np.abs(tau.imag) < 1e-7].real).min() ** -0.5
+    assert surface.shadow_area == pytest.approx(np.pi / n * total, rel=2e-6)
+    assert surface.scaled([2.0, 3.0, 0.1]).shadow_area == pytest.approx(6 * surface.shadow_area, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_support_of_a_body_that_is_not_convex(seed):
+    """No sampled point of the surface is farther out, and some are nearly as far."""
+    surface, rng = dented(seed), np.random.default_rng(seed)
+    u, t = rng.normal(size=(100_000, 3)), rng.normal(size=(30, 3))
+    reached = (t @ (u * surface.radius(u)[:, None]).T).max(axis=1)
+    gain = surface.support(t) / reached - 1
+    assert gain.min() > -1e-12
+    assert gain.max() < 0.02
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,181 @@
+"""Smallest value and smallest curvature of a quartic form on the unit sphere, searched from many starts and polished.
+
+On any great circle a quartic form is a trigonometric polynomial of degree 4: where it is at most ``M`` its second
+derivative is at most ``16 M`` (Bernstein). From a minimum it therefore rises by at most ``8 M h^2`` within the angle
+``h``, which bounds what samples no farther apart can have missed.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, cKDTree
+
+from lsfit.form import derivative, exponents, hessian_tensor, monomials
+from lsfit.geometry import directions, half_sphere_monomials
+
+FloatArray = NDArray[np.float64]
+SLOPE = 1e-12  # of the largest value: the gradient at which the search ends; the value is then good to its square
+FINE = 2000  # directions in which curvature is sampled, whose valleys are narrower than those of the value
+LOW = 40  # samples from which a smallest value is searched besides those that are lower than their neighbours
+SHORT = 1e-9  # step at which the search ends: it changes the value by its square
+NEAR = 0.1  # of the range of starts: how far from the lowest one is still worth polishing
+
+
+def lies_above(v: FloatArray, dimension: int, level: float) -> bool:
+    """Whether a quartic form with coefficients ``v (k,)`` exceeds ``level >= 0`` all over the unit sphere.
+
+    Samples settle it if what they can have missed does not matter, as they are or where the form is 1 along every axis;
+    otherwise the smallest value is searched.
+    """
+    if _bound(v, dimension) > level:
+        return True
+    E = exponents(dimension, 4)
+    along = v[E.max(axis=1) == 4]
+    if not along.min() > level:
+        return False
+    size = along**-0.25
+    even = _bound(v * np.prod(size**E, axis=1), dimension)
+    return bool(even > level * size.max() ** 4) or smallest_value(v, dimension)[0] > level
+
+
+def _bound(v: FloatArray, dimension: int) -> float:
+    """Lower bound of the form on the unit sphere."""
+    P = half_sphere_monomials(dimension, _count(dimension)) @ v
+    low = float(P.min())
+    return low - _missed(dimension) * max(float(P.max()), -low)
+
+
+def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
+    """Smallest value on the unit sphere of the quartic form with coefficients ``v (k,)``, and where, ``(d,)``."""
+    n = _count(dimension)
+    P = half_sphere_monomials(dimension, n) @ v
+    u = directions(dimension, n)[_lowest(P, dimension) | (P <= np.partition(P, LOW)[LOW])]
+    D, E, third = derivative(dimension, 4), exponents(dimension, 4), exponents(dimension, 3)
+    Q = hessian_tensor(v, dimension).reshape(dimension**2, dimension**2)
+    value, size, trust = monomials(u, E) @ v, np.abs(P).max(), np.full(len(u), 0.3)
+    for _ in range(60):
+        g = monomials(u, third) @ (D @ v).T
+        slope = g - (g * u).sum(axis=1, keepdims=True) * u
+        if ((np.abs(slope).max(axis=1) <= SLOPE * size) | (trust < SHORT)).all():
+            break
+        new = _descended(u, slope, value, Q, trust)
+        reached = monomials(new, E) @ v
+        lower = reached < value
+        u, value = np.where(lower[:, None], new, u), np.where(lower, reached, value)
+        trust = np.where(lower, np.minimum(2 * trust, 0.3), 0.2 * trust)
+    best = int(np.argmin(value))
+    return float(value[best]), u[best]
+
+
+def _descended(u: FloatArray, slope: FloatArray, value: FloatArray, Q: FloatArray, longest: FloatArray) -> FloatArray:
+    """Newton step ``(m, d)`` on the sphere, against the slope where the curvature has the wrong sign."""
+    d = u.shape[1]
+    H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+    across = np.eye(d) - u[:, :, None] * u[:, None, :]
+    curvature, axes = np.linalg.eigh(across @ (H - 4 * value[:, None, None] * np.eye(d)) @ across)
+    size = np.maximum(np.abs(curvature), 1e-8 * np.abs(Q).max() + 1e-300)
+    step = np.einsum("mij,mj,mkj,mk->mi", axes, 1 / size, axes, -slope)
+    step -= (step * u).sum(axis=1, keepdims=True) * u
+    length = np.linalg.norm(step, axis=1)
+    new = u + step * np.minimum(1, longest / np.maximum(length, 1e-300))[:, None]
+    return new / np.linalg.norm(new, axis=1, keepdims=True)
+
+
+def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
+    """Smallest eigenvalue of the second derivative over the unit sphere.
+
+    ``z' H(u) z`` is the same with ``u`` and ``z`` exchanged, so taking the softest direction in turn can only lower it;
+    this starts from every direction that is softer than its neighbours, and Newton's method finishes.
+
+    Parameters
+    ----------
+    v : (k,) array
+        Coefficients in the order of `lsfit.form.exponents`.
+    """
+    d = dimension
+    Q = hessian_tensor(v, d).reshape(d * d, d * d)
+    u = directions(d, FINE)
+    field = lowest_eigenvalues(((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d))
+    u = u[_lowest(field, d)]
+    for _ in range(30):
+        H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+        values, vectors = np.linalg.eigh(H)
+        u, z = vectors[:, :, 0], u
+    found = values[:, 0]
+    lowest = float(found.min())
+    near = found <= lowest + NEAR * (float(field.max()) - lowest)
+    tensor = Q.reshape(d, d, d, d)
+    return min([lowest, *(_polished(tensor, *pair) for pair in zip(z[near], u[near], strict=True))])
+
+
+def _polished(Q: FloatArray, u: FloatArray, z: FloatArray) -> float:
+    """Smallest eigenvalue at the stationary pair next to ``u`` and ``z``: ``H(u) z = s z``, ``H(z) u = s u``.
+
+    Taking turns gets there slowly where the curvature is flat; Newton's method does not. Every value at a unit ``u`` is
+    one that occurs, so a step that goes astray does no harm.
+    """
+    d = len(u)
+    lowest = np.inf
+    for _ in range(8):
+        mixed = np.einsum("ijkl,j,l->ik", Q, u, z)
+        Hu, Hz = np.einsum("ijkl,k,l->ij", Q, u, u), np.einsum("ijkl,k,l->ij", Q, z, z)
+        s = float(z @ Hu @ z)
+        J = np.zeros((2 * d + 2, 2 * d + 2))
+        J[:d, :d], J[:d, d:-2], J[d:-2, :d], J[d:-2, d:-2] = Hz, 2 * mixed, 2 * mixed.T, Hu
+        J[: 2 * d, : 2 * d] -= s * np.eye(2 * d)
+        J[:d, -2] = J[-2, :d] = u
+        J[d:-2, -1] = J[-1, d:-2] = z
+        step = np.linalg.lstsq(J, np.concatenate([s * u - Hz @ u, s * z - Hu @ z, [0.0, 0.0]]), rcond=1e-9)[0]
+        u, z = u + step[:d], z + step[d:-2]
+        u, z = u / np.linalg.norm(u), z / np.linalg.norm(z)
+        lowest = min(lowest, float(np.linalg.eigvalsh(np.einsum("ijkl,k,l->ij", Q, u, u))[0]))
+        if np.linalg.norm(step[:-2]) < 1e-8:
+            break
+    return lowest
+
+
+def lowest_eigenvalues(H: FloatArray) -> FloatArray:
+    """Smallest eigenvalues of symmetric matrices, ``(m, d, d) -> (m,)``; in 3-D from the roots of the cubic."""
+    if H.shape[1] != 3:
+        return np.linalg.eigvalsh(H)[:, 0]
+    mean = (H[:, 0, 0] + H[:, 1, 1] + H[:, 2, 2]) / 3
+    a, b, c = H[:, 0, 0] - mean, H[:, 1, 1] - mean, H[:, 2, 2] - mean
+    f, g, h = H[:, 1, 2], H[:, 0, 2], H[:, 0, 1]
+    p = np.sqrt((a * a + b * b + c * c + 2 * (f * f + g * g + h * h)) / 6) + 1e-300
+    det = (a * (b * c - f * f) - h * (h * c - f * g) + g * (h * f - b * g)) / (2 * p**3)
+    return mean + 2 * p * np.cos((np.arccos(np.clip(det, -1, 1)) + 2 * np.pi) / 3)
+
+
+def _count(dimension: int) -> int:
+    """Number of directions in which the value is sampled."""
+    return 400 if dimension <= 3 else FINE
+
+
+def _lowest(value: FloatArray, dimension: int) -> NDArray[np.bool_]:
+    """Which of the sampled directions have no lower neighbour, ``(n,)``."""
+    return value <= value[neighbours(dimension, len(value))].min(axis=1)
+
+
+@lru_cache
+def neighbours(dimension: int, count: int) -> NDArray[np.intp]:
+    """Nearest of the other `directions`, opposites being the same, ``(count, k)``."""
+    u = directions(dimension, count)
+    return cKDTree(np.vstack([u, -u])).query(u, 9 if dimension <= 3 else 11)[1][:, 1:] % count
+
+
+@lru_cache
+def _missed(dimension: int) -> float:
+    """How far the smallest value can be below that of the samples, as a share of the largest magnitude of these."""
+    if dimension > 3:
+        return np.inf
+    if dimension == 1:
+        return 0.0
+    u = directions(dimension, _count(dimension))
+    # The farthest direction from all samples is a normal of their hull.
+    h = math.acos(-ConvexHull(np.vstack([u, -u])).equations[:, -1].max())
+    rise = 8 * h**2
+    return rise / (1 - rise)

@@ -1,0 +1,105 @@
+"""The exact limit surface of a few points: its volume in closed form, and the bound of the error of its volume."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from friction.wrench import friction_wrench
+from lsfit.body import ExactSurface, hull_volume, tangent_volume
+from lsfit.geometry import directions
+from tests.generators import disc_polar, points_patch
+
+
+def body_of(patch, rho, count):
+    """Exact surface in ``(f_x, f_y, tau / rho) / S``."""
+    S = patch.load.sum()
+
+    def wrench(t):
+        return friction_wrench(patch, t / [1, 1, rho], 1.0)[:, [0, 1, 5]] / S / [1, 1, rho]
+
+    return ExactSurface(wrench, count=count)
+
+
+def discs(patch, rho):
+    """Every point's friction is an elliptic disc ``{B' y : |y| <= 1}``; the body is their sum."""
+    maps = []
+    for (x, y, _), n, load in zip(patch.centroid, patch.normal, patch.load, strict=True):
+        first = np.cross(n, [0.3, 0.9, 0.1])
+        first /= np.linalg.norm(first)
+        velocity = np.array([[1, 0, -y], [0, 1, x], [0, 0, 0]])
+        maps.append(load * np.array([first, np.cross(n, first)]) @ velocity / [1, 1, rho] / patch.load.sum())
+    return maps
+
+
+def sum_volume(maps, steps=120):
+    """Volume of a sum of elliptic discs by mixed volumes.
+
+    Two discs give area times width; a disc is the mean ``1/2 int_0^pi`` of its diameters, so three give the integral of
+    ``8 |det(a, b, c)|``, one of which is a support function.
+    """
+    areas = [np.pi * np.cross(*B) for B in maps]
+    V = sum(2 * np.linalg.norm(B @ area) for i, B in enumerate(maps) for j, area in enumerate(areas) if i != j)
+    phi = np.pi * (np.arange(steps) + 0.5) / steps
+    e = np.column_stack([np.cos(phi), np.sin(phi)])
+    for one, two, three in combinations(maps, 3):
+        across = np.cross((e @ one)[:, None], (e @ two)[None]).reshape(-1, 3)
+        V += 8 * (np.pi / steps / 2) ** 2 * np.linalg.norm(across @ three.T, axis=1).sum()
+    return V
+
+
+def random_points(rng, n):
+    """Points anywhere with loads of like size or over two decades, some with tilted normals."""
+    at, loads = rng.uniform(-1, 1, (n, 2)), rng.uniform(0.1, 1, n)
+    if rng.random() < 0.3:
+        loads = 10 ** rng.uniform(-2, 0, n)
+    if rng.random() < 0.3:
+        normals = np.column_stack([rng.uniform(-0.7, 0.7, (n, 2)), np.ones(n)])
+        return points_patch(at, loads, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    return points_patch(at, loads)
+
+
+def test_the_closed_form_is_that_of_the_sums():
+    """Two points: hulls of many samples approach it; its supports are those of friction."""
+    patch = points_patch([[-1, 0], [0.5, 0.4]], [1.0, 2.0])
+    body, t = body_of(patch, 2.0, 2000), np.random.default_rng(0).normal(size=(20, 3))
+    np.testing.assert_allclose(body.support(t), sum(np.linalg.norm(t @ B.T, axis=1) for B in discs(patch, 2.0)))
+    V = sum_volume(discs(patch, 2.0))
+    missing = [V / hull_volume(body.samples(n)) - 1 for n in (2000, 8000, 32_000)]
+    assert 0 < missing[2] < missing[1] / 3 < missing[0] / 9
+    assert missing[2] < 1e-3
+
+
+@pytest.mark.parametrize(("points", "count"), [(2, 60), (3, 40), (5, 15), (12, 2)])
+def test_the_bound_holds_for_few_and_many_points(points, count):
+    """Two points have plane faces, which samples in the direction of motion hardly meet."""
+    rng = np.random.default_rng(points)
+    for _ in range(count):
+        patch = random_points(rng, points)
+        rho = 2.0 if rng.random() < 0.5 else max(np.ptp(patch.centroid[:, :2], axis=0).max(), 1e-3)
+        body, V = body_of(patch, rho, 400), sum_volume(discs(patch, rho), 60)
+        assert abs(body.volume - V) <= body.volume_error * (1 + 1e-6)
+        T = directions(3, 400)
+        assert hull_volume(body.samples()) < V * (1 + 1e-6) < tangent_volume(T, body.samples()) * (1 + 2e-6)
+
+
+def test_the_bound_shrinks_with_the_samples():
+    errors = [(b := body_of(disc_polar(1, 20, 48), 2.0, n)).volume_error / b.volume for n in (500, 1000, 2000)]
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 1, atol=0.1)
+    assert errors[-1] < 6e-3
+
+
+def test_tangents_of_a_ball_enclose_it_and_those_of_a_box_are_the_box():
+    t = directions(3, 2000)
+    axes = np.array([1.0, 0.5, 1e-6])
+    ball = tangent_volume(t / axes, t * axes) / axes.prod()
+    assert 4 / 3 * np.pi < ball < 4 / 3 * np.pi * 1.003
+    touching = (np.eye(3) + 0.1 * np.roll(np.eye(3), 1, axis=1)) * axes
+    assert tangent_volume(np.eye(3), touching) == pytest.approx(8 * axes.prod(), rel=1e-12)
+
+
+def test_hulls_keep_their_digits_when_they_are_thin():
+    W = body_of(points_patch([[-1, 0], [1, 0.3], [0.2, 1]], [1.0, 2.0, 0.7]), 2.0, 200).samples()
+    V = hull_volume(W)
+    for thin in (1e-3, 1e-6, 1e-9):
+        assert hull_volume(W * [1, 1, thin]) == pytest.approx(V * thin, rel=1e-9)

@@ -1,0 +1,350 @@
+"""No decision hangs on rounding: turned samples and bodies, and changes of a few units in the last place.
+
+Turns of all three components are no turns of friction; they bring every zero of the data down to rounding.
+"""
+
+import collections
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from friction.motion import fibonacci_twists
+from friction.wrench import friction_limits, friction_wrench
+from lsfit.body import ExactSurface, hull_volume
+from lsfit.closed import Closed, closed
+from lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from lsfit.flag import FitError, FitFlag, OpenBodyError, UndecidedError
+from lsfit.form import exponents, substitute
+from lsfit.geometry import directions
+from lsfit.gram import ball_gram, gram_certificate, gram_map
+from lsfit.misfit import misfit
+from lsfit.quartic import Quartic, convex_quartic
+from lsfit.samples import normalised_samples, sample_rank
+from lsfit.six import convex_span_quartic, six_samples, span_quartic
+from lsfit.span import span_samples, sphere_motions
+from lsfit.surface import Image
+from lsfit.tilted import TiltedEllipsoid
+from lsfit.zhou import SIX_WEIGHTS, zhou_quartic
+from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
+
+TURNS = 200
+ULP = np.finfo(float).eps
+
+
+def turn(rng, d=3):
+    return Rotation.random(random_state=rng).as_matrix() if d == 3 else np.linalg.qr(rng.normal(size=(d, d)))[0]
+
+
+def shaken(rng, x):
+    """Every number up to four units in the last place away."""
+    return x * (1 + ULP * rng.integers(-4, 5, size=np.shape(x)))
+
+
+def unit(T):
+    return T / np.linalg.norm(T, axis=1, keepdims=True)
+
+
+def turned(rng, W, T=None):
+    R = turn(rng)
+    return (shaken(rng, W @ R.T),) if T is None else (shaken(rng, W @ R.T), unit(shaken(rng, T @ R.T)))
+
+
+def outcomes(decide, times=TURNS):
+    """How often a decision came out how, in seeded repetitions; errors are outcomes too."""
+    rng, found = np.random.default_rng(0), collections.Counter()
+    for _ in range(times):
+        try:
+            found[decide(rng)] += 1
+        except (FitError, ValueError) as error:
+            found[type(error)] += 1
+    return found
+
+
+def samples(patch, K=100, rho=2.0):
+    twist = fibonacci_twists(K, rho)
+    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
+
+
+# Closed bodies ------------------------------------------------------------------------------------------------------
+
+
+def powers(**coefficients):
+    """Quartic of x, y, z (and u, v) with coefficients such as ``xxyy=2``."""
+    names, d = "xyzuv", 1 + max("xyzuv".index(c) for name in coefficients for c in name)
+    E, v = exponents(d, 4), np.zeros(len(exponents(d, 4)))
+    for name, value in coefficients.items():
+        v[(E == [name.count(c) for c in names[:d]]).all(axis=1)] = value
+    return v
+
+
+FORMS = {
+    "ball": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=2, yyzz=2), Closed.YES),
+    "31 times as long as wide": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=1e-6), Closed.YES),
+    "cylinder": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=0), Closed.UNDECIDED),
+    "two parallel planes": (powers(xxxx=1, zzzz=0), Closed.UNDECIDED),
+    "zero on a cone": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=-2, yyzz=-2), Closed.UNDECIDED),
+    "all but closed": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=1e-15), Closed.UNDECIDED),
+    "hyperboloid": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=-1e-6), Closed.NO),
+    "saddle": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=-2.001), Closed.NO),
+    "plane ball": (powers(xxxx=1, xxyy=2, yyyy=1), Closed.YES),
+    "plane strip": (powers(xxxx=1, yyyy=0), Closed.UNDECIDED),
+    "five dimensions": (powers(xxxx=1, yyyy=1, zzzz=2, uuuu=1, vvvv=0.5), Closed.YES),
+    "open in the fifth": (powers(xxxx=1, yyyy=1, zzzz=2, uuuu=1, vvvv=0), Closed.UNDECIDED),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_whether_a_level_set_is_closed(name):
+    """Margin 1e-12 of the largest value on the sphere; a volume, a support and a shadow follow the same decision."""
+    form, expected = FORMS[name]
+    d = {5: 2, 15: 3, 70: 5}[len(form)]
+    E = exponents(d, 4)
+
+    def decide(rng):
+        return closed(shaken(rng, substitute(form, E, turn(rng, d))), d)[0]
+
+    assert outcomes(decide, TURNS if d < 5 else 10) == {expected: TURNS if d < 5 else 10}
+
+
+@pytest.mark.parametrize(("name", "outcome"), [
+    ("31 times as long as wide", float), ("cylinder", UndecidedError), ("hyperboloid", OpenBodyError),
+])  # fmt: skip
+@pytest.mark.parametrize("measure", ["volume", "shadow_area", "semi_axes"])
+def test_a_body_has_a_measure_in_every_position_or_in_none(name, outcome, measure):
+    form, E = FORMS[name][0], exponents(3, 4)
+
+    def decide(rng):
+        return type(getattr(Quartic(shaken(rng, substitute(form, E, turn(rng))), E), measure))
+
+    found = outcomes(decide, 60)
+    assert found == ({np.ndarray if measure == "semi_axes" else outcome: 60} if outcome is float else {outcome: 60})
+
+
+@pytest.mark.parametrize(("smallest", "outcome"), [(0.0, "undecided"), (1e-17, "undecided"), (1e-6, 3), (-1e-6, "no")])
+def test_whether_a_matrix_is_that_of_an_ellipsoid(smallest, outcome):
+    """Margin 1e-12 of the smallest eigenvalue once the diagonal is 1."""
+
+    def decide(rng):
+        R = turn(rng)
+        A = shaken(rng, R @ np.diag([1, 1, smallest]) @ R.T)
+        try:
+            return TiltedEllipsoid((A + A.T) / 2).rank
+        except ValueError as error:
+            return "undecided" if "undecided" in str(error) else "no"
+
+    assert outcomes(decide) == {outcome: TURNS}
+
+
+# Ranks and flags of fits --------------------------------------------------------------------------------------------
+
+LCG, DISC = samples(lcg_patch(3, 50)), samples(disc_polar(1, 20, 48))
+ONE, TWO = samples(points_patch([[0, 0]], [2.0])), samples(points_patch([[-1, 0], [1, 0]], [1, 1]))
+FIVE, TEN = ((x[:: 100 // n][:n] for x in LCG) for n in (5, 10))
+FIVE, TEN = tuple(FIVE), tuple(TEN)
+HYPERBOLOID = np.array(
+    [[np.hypot(1, z) * np.cos(p), np.hypot(1, z) * np.sin(p), z] for p in np.arange(12.0) for z in (-0.5, 0, 0.5)]
+)
+ENDLESS = np.array([[np.cos(p), np.sin(p), z] for p in np.arange(12.0) for z in (-0.5, 0.1, 0.5)])
+CLEAN, FLAT, FEW = FitFlag.CLEAN, FitFlag.RANK_DEFICIENT, FitFlag.UNDERDETERMINED
+FITTED, PROGRAMME = "least squares", "semidefinite programme"
+
+
+@pytest.mark.parametrize(("data", "rank"), [(LCG, 3), (ONE, 2), ((LCG[0] * [1, 1, 1e-6],), 3), ((LCG[0][:1],), 1)])
+def test_the_rank_of_samples(data, rank):
+    """Margin 1e-9 of the largest singular value; hulls are flat from 1e-12."""
+
+    def decide(rng):
+        W = turned(rng, data[0])[0]
+        return sample_rank(W), full_ellipsoid(W).rank, bool(hull_volume(W) > 0)
+
+    assert outcomes(decide) == {(rank, rank, rank == 3): TURNS}
+
+
+@pytest.mark.parametrize(("data", "gamma", "outcome"), [
+    (LCG, 0.01, (CLEAN, 3, FITTED)), (DISC, 0.0, (CLEAN, 3, FITTED)), (TWO, 0.0, (CLEAN, 3, PROGRAMME)),
+    (ONE, 0.01, (FLAT, 2, FITTED)), (TEN, 0.0, (FEW, 3, FITTED)), (FIVE, 0.0, (FEW, 3, FITTED)),
+])  # fmt: skip
+def test_the_flags_of_a_convex_quartic(data, gamma, outcome):
+    """Rank, sufficiency of the data (1e-12 and 1e-10 of the normal equations), and whether the programme was needed."""
+
+    def decide(rng):
+        fit = convex_quartic(*turned(rng, *data), gamma=gamma)
+        return fit.flag, fit.rank, fit.certificate.by
+
+    assert outcomes(decide, 100) == {outcome: 100}
+
+
+@pytest.mark.parametrize("data", [HYPERBOLOID, ENDLESS])
+def test_an_ellipsoid_that_the_samples_leave_open_is_flagged(data):
+    """The margin is that of the bound: samples of a cylinder would have the coefficient 0 along it, exactly."""
+    assert outcomes(lambda rng: full_ellipsoid(turned(rng, data)[0]).flag) == {FitFlag.BOUNDED: TURNS}
+    assert outcomes(lambda rng: axis_aligned_ellipsoid(shaken(rng, data)).flag) == {FitFlag.BOUNDED: TURNS}
+    assert outcomes(lambda rng: convex_quartic(turned(rng, data)[0], gamma=0).flag & FitFlag.BOUNDED, 20) == {
+        FitFlag.BOUNDED: 20
+    }
+
+
+def test_an_axis_that_no_load_reaches_is_zero():
+    """Margin 1e-12 of the largest force: a face on end carries nothing along its normal but rounding."""
+
+    def decide(rng):
+        phi = rng.uniform(-np.pi, np.pi)
+        normal = [np.cos(phi) * np.cos(np.pi / 2), np.cos(np.pi / 2) * np.sin(phi), 1.0]
+        face = points_patch(rng.normal(size=(1, 2)), [2.0], np.roll([normal], rng.integers(2), axis=1))
+        limits = friction_limits(face, shaken(rng, 0.5))
+        return three_motion_ellipsoid(limits.f_x, limits.f_y, 1e-17, shaken(rng, 0.01)).rank
+
+    assert set(outcomes(decide)) == {1, 2}
+    assert outcomes(lambda rng: three_motion_ellipsoid(1.0, shaken(rng, 6e-17), 1e-18, 0.01).rank) == {1: TURNS}
+    assert outcomes(lambda rng: three_motion_ellipsoid(1.0, shaken(rng, 1e-9), 1e-9, 0.01).rank) == {3: TURNS}
+
+
+def test_six_components_of_a_plane_patch_have_rank_three():
+    def decide(rng):
+        patch = rect_grid(2, 1, 6, 6)
+        twist = sphere_motions(60) / [1, 1, 1, 2, 2, 2]
+        W, T = six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
+        R = np.kron(np.eye(2), turn(rng))
+        scaling = ("maxima", "whitened", "none")[rng.integers(3)]
+        inside = span_samples(shaken(rng, W @ R.T), unit(T @ R.T), scaling)
+        return inside.rank, inside.flag
+
+    assert outcomes(decide) == {(3, FLAT): TURNS}
+
+
+def six(K):
+    patch = cylinder_grid(1, np.pi / 3, 2, 12, 12)
+    twist = sphere_motions(K) / [1, 1, 1, 2, 2, 2]
+    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
+
+
+@pytest.mark.parametrize("K", [30, 60, 100])
+def test_a_quartic_of_fewer_samples_than_coefficients_is_one_and_flagged(K):
+    """Of all best quartics the nearest to a ball: null directions lie at 1e-16, the others above 1e-8, the margin is
+    1e-12. Without a margin its coefficients changed by some per cent."""
+    W, T = six(K)
+    first = span_quartic(W, T).surface
+    found = []
+
+    def decide(rng):
+        found.append(span_quartic(shaken(rng, W), unit(shaken(rng, T))).surface)
+        return found[-1].flag
+
+    assert outcomes(decide, 20) == {FEW: 20}
+    size = np.abs(first.coefficients).max()
+    assert max(np.abs(s.coefficients - first.coefficients).max() for s in found) < 1e-7 * size
+
+
+def test_more_samples_than_coefficients_determine_them():
+    W, T = six(400)
+    assert outcomes(lambda rng: span_quartic(shaken(rng, W), unit(shaken(rng, T))).surface.flag, 10) == {CLEAN: 10}
+    assert outcomes(lambda rng: convex_span_quartic(shaken(rng, W), T).certificate.proves_convexity, 2) == {True: 2}
+
+
+def test_what_a_gram_matrix_proves():
+    """The margin is what rounding and the residual can take from an eigenvalue; without it nothing is proved."""
+    E = exponents(3, 4)
+    x, tensor = ball_gram(E), Quartic(ball_gram(E)[:15], E).tensor
+    Q = (gram_map(E) @ x).reshape(9, 9)
+    low = np.linalg.eigh(Q)[1][:, :1]
+
+    def decide(rng):
+        S = shaken(rng, Q)
+        S = (S + S.T) / 2
+        singular = S - np.linalg.eigvalsh(S)[0] * low @ low.T
+        return gram_certificate(S, tensor, 0.0).proves_convexity, gram_certificate(
+            singular, tensor, 0.0
+        ).proves_convexity
+
+    assert outcomes(decide) == {(True, False): TURNS}
+
+
+def test_sums_of_lengths_have_one_outcome():
+    assert outcomes(lambda rng: zhou_quartic(*turned(rng, *TWO), SIX_WEIGHTS, scaling="whitened").surface.flag, 10) == {
+        CLEAN: 10
+    }
+
+
+# Bodies -------------------------------------------------------------------------------------------------------------
+
+
+def test_loads_in_the_plane_of_a_flat_body_are_in_it():
+    """Margin 1e-9 of the load; one a thousandth across is out."""
+    w = 0.4 * directions(2, 20)
+
+    def decide(rng):
+        R = turn(rng)
+        B = R[:, :2] * [1.0, 0.5]
+        bodies = Image(Quartic([1.0, 0, 2, 0, 1], exponents(2, 4)), B), TiltedEllipsoid.of_ball(B)
+        inside = shaken(rng, w @ B.T)
+        return tuple(
+            (bool(body.holds(inside).all()), bool(body.holds(inside + 1e-3 * R[:, 2]).any())) for body in bodies
+        )
+
+    assert outcomes(decide) == {((True, False), (True, False)): TURNS}
+    flat = Ellipsoid([1.0, 0.5, 0.0])
+
+    def with_noise(rng):
+        return bool(flat.holds(np.column_stack([0.4 * w, 1e-17 * rng.normal(size=20)])).all())
+
+    assert outcomes(with_noise) == {True: TURNS}
+
+
+def test_a_full_body_has_no_outside_across():
+    """However thin: a map of condition 1e9 leaves more rounding than the margin of a flat body."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
+        body = Image(Quartic(FORMS["ball"][0], exponents(3, 4)), B)
+        assert np.isfinite(body.value(directions(3, 50) @ B.T)).all()
+
+
+def test_the_exact_surface_of_one_face_is_flat_and_that_of_two_is_not():
+    def decide(rng, count):
+        phi = rng.uniform(0, 2 * np.pi)
+        at = np.array([[0, 0], [np.cos(phi), np.sin(phi)]])[:count]
+        patch = points_patch(shaken(rng, at), shaken(rng, np.ones(count)))
+
+        def wrench(t):
+            return friction_wrench(patch, t, 1.0)[:, [0, 1, 5]]
+
+        body = ExactSurface(wrench, count=64)
+        return body.rank, bool(body.volume > 0), bool(body.holds([[0.1, 0.2, 0.0]])[0])
+
+    assert outcomes(lambda rng: decide(rng, 1)) == {(2, False, True): TURNS}
+    assert outcomes(lambda rng: decide(rng, 2)) == {(3, True, True): TURNS}
+
+
+def test_a_wrench_that_is_the_rounding_of_none_is_left_out():
+    """Margin 1e-12 of the largest: one such sample had a radius of 1e17."""
+    surface = convex_quartic(*ONE).surface
+    whole = misfit(surface, *ONE)
+
+    def decide(rng):
+        W = np.vstack([ONE[0], 1e-17 * rng.integers(0, 2) * rng.normal(size=(1, 3))])
+        return misfit(surface, W, np.vstack([ONE[1], [[0, 0, 1]]])) == whole
+
+    assert outcomes(decide) == {True: TURNS}
+
+
+def test_a_motion_against_a_flat_body_is_at_a_right_angle_to_its_normals():
+    """Margin 1e-9 of the part along a normal; what is left of none has any direction."""
+
+    def decide(rng):
+        B = turn(rng)[:, :2]
+        return round(misfit(TiltedEllipsoid.of_ball(B), [B[:, 0]], [-B[:, 0]]).Edir, 6)
+
+    assert outcomes(decide) == {90.0: TURNS}
+
+
+def test_a_polynomial_that_is_zero_at_a_sample_is_endless_there():
+    """Margin 1e-12, a radius of 1000."""
+    cylinder, E = FORMS["cylinder"][0], exponents(3, 4)
+
+    def decide(rng):
+        R = turn(rng)
+        surface = Quartic(shaken(rng, substitute(cylinder, E, R.T)), E)
+        return misfit(surface, [R[:, 2]], [R[:, 0]]).Erad
+
+    assert outcomes(decide) == {np.inf: TURNS}

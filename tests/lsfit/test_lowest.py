@@ -1,0 +1,113 @@
+"""Smallest value and smallest curvature of quartic forms: against dense searches that know nothing of them."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from lsfit.form import exponents, hessian_tensor, monomials, substitute
+from lsfit.lowest import lies_above, lowest_eigenvalues, smallest_eigenvalue, smallest_value
+from lsfit.quartic import convex_quartic
+from lsfit.round import ball_coefficients
+from lsfit.surface import Image
+
+
+def coefficients(P, d):
+    """Coefficients of a quartic given as a function."""
+    w = np.random.default_rng(0).normal(size=(4 * len(exponents(d, 4)), d))
+    return np.linalg.lstsq(monomials(w, exponents(d, 4)), P(w), rcond=None)[0]
+
+
+def unit(x):
+    return x / np.linalg.norm(x, axis=-1, keepdims=True)
+
+
+def random_convex(rng, d):
+    """Sums of fourth powers, balls with something added, and fits to few or noisy samples."""
+    kind = rng.integers(4)
+    if kind == 0:
+        A = rng.normal(size=(rng.integers(d, 3 * d + 1), d))
+        return coefficients(lambda w: ((w @ A.T) ** 4).sum(axis=1), d)
+    if kind == 1:
+        return ball_coefficients(d) + rng.uniform(0, 0.3) * rng.normal(size=len(exponents(d, 4)))
+    W = rng.normal(size=(60 if kind == 2 else 25, d))
+    if kind == 2:
+        W = unit(W) * (1 + 0.3 * rng.uniform(-1, 1, size=(60, 1)))
+    surface = convex_quartic(W, gamma=0).surface
+    return (surface.inner if isinstance(surface, Image) else surface).coefficients
+
+
+def dense_eigenvalue(v, d, rng, starts=60, turns=300):
+    """The softest of 20,000 directions, then the softest direction of that curvature, and so on."""
+    Q = hessian_tensor(v, d).reshape(d * d, d * d)
+
+    def hessian(u):
+        return ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+
+    u = unit(rng.normal(size=(20_000, d)))
+    u = u[np.argsort(lowest_eigenvalues(hessian(u)))[:starts]]
+    for _ in range(turns):
+        values, vectors = np.linalg.eigh(hessian(u))
+        u = vectors[:, :, 0]
+    return values[:, 0].min()
+
+
+@pytest.mark.parametrize(("d", "count"), [(2, 20), (3, 50), pytest.param(3, 2000, marks=pytest.mark.long), (4, 4)])
+def test_no_direction_is_softer_than_the_softest(d, count):
+    """The value found is always that of some direction, so it can only be too high."""
+    rng, too_high = np.random.default_rng(d), 0
+    for _ in range(count):
+        v = random_convex(rng, d)
+        too_high += smallest_eigenvalue(v, d) > dense_eigenvalue(v, d, rng) + 1e-9 * np.abs(v).max()
+    assert too_high == 0
+
+
+def random_form(rng, d, kind):
+    """Any sign; long and thin; nearly zero on a cone."""
+    E = exponents(d, 4)
+    if kind == 0:
+        return rng.normal(size=len(E))
+    if kind == 1:
+        A = rng.normal(size=(d + 2, d)) * np.geomspace(1, 10 ** rng.uniform(0, 1.5), d)
+        return coefficients(lambda w: ((w @ A.T) ** 4).sum(axis=1), d)
+    a = rng.normal(size=len(exponents(d, 2)))
+    return coefficients(lambda w: (monomials(w, exponents(d, 2)) @ a) ** 2 + 1e-3 * (w**4).sum(axis=1), d)
+
+
+@pytest.mark.parametrize(("d", "count"), [(1, 3), (2, 12), (3, 30), (4, 6), (6, 2)])
+def test_no_direction_has_a_smaller_value(d, count):
+    rng, E = np.random.default_rng(d), exponents(d, 4)
+    for k in range(count):
+        v = random_form(rng, d, k % 3)
+        value, at = smallest_value(v, d)
+        assert monomials(at, E)[0] @ v == pytest.approx(value, abs=1e-14 * np.abs(v).max())
+        u = unit(rng.normal(size=(20_000, d)))
+        P = monomials(u, E) @ v
+
+        def along(x, v=v):
+            return float(monomials(unit(x), E)[0] @ v)
+
+        options = {"xatol": 1e-9, "fatol": 1e-15, "maxiter": 400 * d}
+        best = min(minimize(along, u[i], method="Nelder-Mead", options=options).fun for i in np.argsort(P)[:2])
+        assert value <= best + 1e-12 * np.abs(P).max()
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_a_level_is_passed_from_one_side_only(d):
+    rng = np.random.default_rng(d)
+    for k in range(4):
+        v = random_form(rng, d, 1 + k % 2)
+        value = smallest_value(v, d)[0]
+        assert value > 0
+        assert lies_above(v, d, value * (1 - 1e-6))
+        assert not lies_above(v, d, value * (1 + 1e-6))
+    assert not lies_above(-ball_coefficients(d), d, 0.0)
+
+
+def test_the_smallest_values_turn_with_the_form():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        v = random_convex(rng, 3)
+        turned = substitute(v, exponents(3, 4), np.linalg.qr(rng.normal(size=(3, 3)))[0])
+        size = np.abs(v).max()
+        assert smallest_value(turned, 3)[0] == pytest.approx(smallest_value(v, 3)[0], abs=1e-12 * size)
+        assert smallest_eigenvalue(turned, 3) == pytest.approx(smallest_eigenvalue(v, 3), abs=1e-10 * size)

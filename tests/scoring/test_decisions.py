@@ -1,0 +1,250 @@
+"""No decision hangs on rounding: grasps in any position, with numbers changed by a few units in the last place."""
+
+import collections
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from scoring.boundary import ellipsoid_matrix
+from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from scoring.epsilon_search import epsilon, separating_wrench
+from scoring.grasp import grasp_score
+from scoring.graspit import graspit_score
+from scoring.inscribed import is_ellipsoid
+from scoring.polytope import graspit_vertices, hull_volume
+from scoring.pose import pose_volume
+from scoring.rays import ray_volume
+from scoring.score import ScoreFlag, contact_flag, score
+from scoring.task import hold_task, least_grip_force
+
+TURNS = 200
+ULP = np.finfo(float).eps
+LENGTHS = 0.2, 0.05
+A, FLAT, SLIPPERY = (0.8, 0.6, 0.015), (0.8, 0.6, 0.0), (0.0, 0.6, 0.015)
+BOX = np.stack(np.meshgrid([-0.8, 0, 0.8], [-0.6, 0, 0.6], [-0.015, 0, 0.015]), axis=-1).reshape(-1, 3)
+CLEAN, NO_TORQUE, NO_FORCE = ScoreFlag.CLEAN, ScoreFlag.NO_TORQUE, ScoreFlag.NO_FORCE
+
+
+def shaken(rng, x):
+    """Every number up to four units in the last place away."""
+    return np.asarray(x) * (1 + ULP * rng.integers(-4, 5, size=np.shape(x)))
+
+
+def pair(one, two, tilt=0.0, apart=0.06):
+    """Contacts on the x axis, their normals turned away from facing by an angle."""
+    bodies = [EllipsoidBody(b) if np.ndim(b) == 1 else PolytopeBody(b) for b in (one, two)]
+    c, s = np.cos(tilt), np.sin(tilt)
+    return [
+        SoftContact([side * apart / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
+        for side, body in zip((-1, 1), bodies, strict=True)
+    ]
+
+
+def moved(rng, contacts):
+    """The grasp somewhere else, and how it got there."""
+    R, p = Rotation.random(random_state=rng).as_matrix(), 0.1 * rng.normal(size=3)
+    there = []
+    for k in contacts:
+        if isinstance(k.body, EllipsoidBody):
+            body = EllipsoidBody(shaken(rng, k.body.semi_axes))
+        else:
+            body = PolytopeBody(shaken(rng, k.body.vertices))
+        there.append(SoftContact(shaken(rng, R @ k.position + p), shaken(rng, k.axes @ R.T), body))
+    return there, R, p
+
+
+def outcomes(decide, contacts, times=TURNS):
+    """How often a decision ``decide(contacts, R, p)`` came out how, in seeded positions."""
+    rng = np.random.default_rng(0)
+    return collections.Counter(decide(*moved(rng, contacts)) for _ in range(times))
+
+
+# Volumes and flags --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("contacts", "method", "flag", "volume"), [
+    (pair(A, A), "antipodal", CLEAN, True), (pair(A, A, 0.3), "pose", CLEAN, True),
+    (pair(BOX, BOX), "antipodal", CLEAN, True), (pair(BOX, BOX, 0.2), "pose", CLEAN, True),
+    (pair(BOX, A, 0.1), "pose", CLEAN, True), (pair(A, FLAT), "antipodal", NO_TORQUE, True),
+    (pair(FLAT, FLAT), "antipodal", NO_TORQUE, False), (pair(FLAT, FLAT, 0.2), "pose", NO_TORQUE, False),
+    (pair(SLIPPERY, SLIPPERY), "antipodal", NO_FORCE, False),
+    (pair((0.0, 0.0, 0.0), A), "antipodal", NO_FORCE | NO_TORQUE, False),
+    (pair(BOX * [1, 1, 0], BOX * [1, 1, 0]), "antipodal", NO_TORQUE, False),
+])  # fmt: skip
+def test_the_method_of_a_score_and_what_contacts_lack(contacts, method, flag, volume):
+    """Margins: 1e-4 of the angle to the line, 1e-12 of the largest load; volumes agree on both sides."""
+    found = []
+
+    def decide(k, R, p):
+        s = grasp_score(k, *LENGTHS, p, with_epsilon=False)
+        found.append((s.quality, s.quality_l1))
+        return s.method, s.flag, s.quality > 0
+
+    assert outcomes(decide, contacts) == {(method, flag, volume): TURNS}
+    assert np.ptp(found, axis=0).max() <= 1e-11 * np.max(found)
+
+
+def test_rounding_of_no_torque_is_no_torque():
+    """A flat body in another frame has a torque of 1e-17."""
+    for noise in (0.0, 1e-17, 6e-17):
+        for unit in (1.0, 1e3):
+            axes = 0.8, 0.6, unit * noise
+            assert contact_flag([EllipsoidBody(axes)], 0.05 * unit) == NO_TORQUE
+            assert score(axes, axes, 0.06 * unit, 0.2 * unit, 0.05 * unit).flag == NO_TORQUE
+    assert contact_flag([EllipsoidBody([0.8, 6e-17, 0.01])], 0.05) == NO_FORCE
+    assert contact_flag([EllipsoidBody([0.8, 1e-6, 1e-9])], 0.05) == CLEAN
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1e-9, 1e-6, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize(("one", "two"), [(A, (0.5, 0.9, 0.025)), (BOX, A), (BOX, graspit_vertices(A)), (FLAT, BOX)])
+def test_volumes_do_not_depend_on_the_unit_of_length(unit, one, two):
+    """What is flat enough to be given a thickness is judged in loads of one size: in metres a patch of nanometres was
+    20 % short of its L1 volume, and a polytope had 5000 times its volume."""
+    length = np.array([1, 1, unit])
+    metre = pose_volume(*pair(one, two, 0.3), *LENGTHS)
+    other = pose_volume(
+        *pair(np.multiply(one, length), np.multiply(two, length), 0.3, 0.06 * unit), *np.multiply(LENGTHS, unit)
+    )
+    assert (other.linf, other.l1) == pytest.approx((metre.linf, metre.l1), rel=1e-9)
+
+
+@pytest.mark.parametrize(("contacts", "full"), [(pair(A, A) + pair(A, A, 0.4), True), (pair(FLAT, FLAT) * 2, False)])
+def test_three_and_more_contacts_span_all_wrenches_or_do_not(contacts, full):
+    """Margin 1e-12 of the largest component or direction."""
+    times = 8 if full else 40
+    found = outcomes(lambda k, R, p: ray_volume(k, *LENGTHS, p, rays=16, corners=24).volume > 0, contacts, times)
+    assert found == {full: times}
+
+
+def test_hulls_are_flat_or_not():
+    """Margin 1e-12 of the longest extent; with GraspIt!'s sums 1e-10."""
+    rng = np.random.default_rng(0)
+    for _ in range(TURNS):
+        R = Rotation.random(random_state=rng).as_matrix()
+        assert hull_volume(shaken(rng, BOX * [1, 1, 0] @ R.T)) == 0
+        assert hull_volume(shaken(rng, BOX @ R.T)) == pytest.approx(8 * 0.8 * 0.6 * 0.015, rel=1e-12)
+    assert hull_volume(BOX * [1, 1, 1e-6]) == pytest.approx(8e-6 * 0.8 * 0.6 * 0.015, rel=1e-12)
+    flat = outcomes(lambda k, R, p: graspit_score(k, *LENGTHS, p).facets > 0, pair(FLAT, FLAT), 20)
+    assert flat == {False: 20}
+
+
+def test_which_bodies_are_ellipsoids():
+    """Margin 1e-9 of the squared support; principal axes along the components are told to 1e-14."""
+
+    class Turned:
+        degree = 2
+
+        def __init__(self, F, bump=0.0):
+            self.F, self.bump = F, bump
+
+        def support(self, t):
+            h = np.linalg.norm(np.atleast_2d(t) @ self.F, axis=1)
+            return h * (1 + self.bump * np.cos(5 * np.arctan2(*np.atleast_2d(t).T[:2])))
+
+    rng, found = np.random.default_rng(0), collections.Counter()
+    for _ in range(TURNS):
+        F = shaken(rng, Rotation.random(random_state=rng).as_matrix() * A)
+        root = ellipsoid_matrix(Turned(F))
+        found[is_ellipsoid(Turned(F)), is_ellipsoid(Turned(F, 1e-6))] += 1
+        np.testing.assert_allclose(root @ root, F @ F.T, atol=1e-12)
+    assert found == {(True, False): TURNS}
+
+
+# Epsilon ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("contacts", "closed"), [
+    (pair(A, A), True), (pair(A, FLAT), True), (pair(A, A, np.radians(30)), True), (pair(A, A, np.radians(32)), False),
+    (pair(FLAT, FLAT), False), (pair(SLIPPERY, SLIPPERY), False), (pair(A, A)[:1], False),
+])  # fmt: skip
+def test_whether_some_wrench_is_not_resisted_at_all(contacts, closed):
+    """Margin 1e-9 of the largest wrench, and of the singular values of what the contacts span."""
+
+    def decide(k, R, p):
+        C = np.array([contact.wrench_map(*LENGTHS, p) for contact in k])
+        D = np.array([contact.body.semi_axes[:, None] * Ci[:, 1:].T for contact, Ci in zip(k, C, strict=True)])
+        return separating_wrench(C[:, :, 0], D) is None
+
+    assert outcomes(decide, contacts, 100) == {closed: 100}
+
+
+def test_epsilon_goes_to_zero_where_nothing_decides():
+    """At the angle of friction 0 is on the boundary: neither side of the decision gives more than its tolerance."""
+    contacts = pair((0.8, 0.6, 0.15), (0.8, 0.6, 0.15), np.arctan(0.6))
+    found = outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4)
+    assert found == {True: 4}
+
+
+# Tasks --------------------------------------------------------------------------------------------------------------
+
+PULL, DOWN, LIMIT = [3.0, 0, 0, 0, 0, 0], [0, 0, -8.0, 0, 0, 0], [0, 0, -16.0, 0, 0, 0]
+ASIDE, ASKEW = [0, -5.0, -5.0, 0, 0, 0], [0, 0, -8.0, 0.1, 0, 0]
+T, ROUND = (0.8, 0.6, 0.01), (0.7, 0.7, 0.01)
+X, Y, ABOUT, OFF, BACK, STILL = (
+    "slides along x", "slides along y", "turns about its normal", "lets go", "is pushed back along its normal",
+    "stays in place",
+)  # fmt: skip
+BELOW = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), EllipsoidBody(T))]
+BOTH = pytest.mark.parametrize("normal", ["up_to", "fixed"])
+
+
+def there(load, R, p):
+    force = R @ load[:3]
+    return np.concatenate([force, R @ load[3:] + np.cross(p, force)])
+
+
+def held(contacts, load, grip, normal, times=40):
+    """Whether a load is held, whether that is undecided, and what the contacts do."""
+
+    def decide(k, R, p):
+        found = hold_task(k, grip, there(np.array(load), R, p), normal)
+        return found.holds, found.at_limit, found.limits
+
+    ((outcome, count),) = outcomes(decide, contacts, times).items()
+    assert count == times
+    return outcome
+
+
+@BOTH
+def test_a_load_is_held_or_not_or_at_the_limit(normal):
+    """Margin 1e-6 of the load: one at the limit counts as held and says so."""
+    assert held(pair(T, T), DOWN, 10, normal) == (True, False, (X, X))
+    assert held(pair(T, T), LIMIT, 10, normal) == (True, True, (X, X))
+    assert held(pair(T, T), np.multiply(LIMIT, 1 + 1e-4), 10, normal) == (False, False, (X, X))
+    assert held(pair(graspit_vertices(T), graspit_vertices(T)), DOWN, 10, normal)[:2] == (True, False)
+    assert held(BELOW, [0, 0, -10.0, 0, 0, 0], 10, normal) == (True, True, (BACK,))
+
+
+@BOTH
+def test_motions_that_weigh_the_same_are_all_named(normal):
+    """Margin 1e-4 of the larger one."""
+    both, turning = f"{X} and {Y}", f"{X} and {ABOUT}"
+    assert held(pair(ROUND, ROUND), ASIDE, 10, normal) == (True, False, (both, both))
+    assert held(pair(T, T), ASKEW, 10, normal) == (True, False, (turning, turning))
+
+
+@BOTH
+def test_what_contacts_cannot_feel_does_not_move_them(normal):
+    """A torque that flat contacts cannot take, a weight that one cannot: what they feel of it is rounding."""
+    assert held(pair(FLAT, FLAT), ASKEW, 10, normal) == (False, False, (STILL, STILL))
+    assert held(pair(T, T)[:1], DOWN, 10, normal) == (False, False, (STILL,))
+
+
+def test_fixed_normal_forces_that_balance_one_load_balance_it_in_every_position():
+    assert held(pair(T, T), PULL, 10, "fixed") == (False, False, (OFF, BACK))
+    assert held(pair(T, T), [2.0, 0, 0, 0, 0, 0], [8, 10], "fixed") == (True, True, (OFF, BACK))
+    assert held(pair(T, T), [2.0, 0, -20.0, 0, 0, 0], [8, 10], "fixed")[0] is False
+
+
+@pytest.mark.parametrize(("contacts", "load", "up_to", "fixed"), [
+    (pair(T, T), PULL, 3.0, np.inf), (pair(BOX, BOX), PULL, 3.0, np.inf), (pair(FLAT, FLAT), ASKEW, np.inf, np.inf),
+    (pair(T, T)[:1], PULL, np.inf, np.inf), (pair(T, T), LIMIT, 10.0, 10.0),
+])  # fmt: skip
+def test_the_grip_force_is_finite_or_not(contacts, load, up_to, fixed):
+    """Margin 1e-9 of what the contacts bear: 1e17 N were asked for in 24 of 40 positions where nothing helps."""
+    for normal, force in (("up_to", up_to), ("fixed", fixed)):
+        found = outcomes(
+            lambda k, R, p, n=normal: round(least_grip_force(k, there(np.array(load), R, p), normal=n), 5), contacts, 40
+        )
+        assert found == {force: 40}
