@@ -21,6 +21,7 @@ FINGER_POINTS = (25, 11)
 COARSE_POINTS = ((10, 5), (14, 7))
 DIGIT = 1e-9  # m and relative, to which estimates are rounded before they are ranked: ties go to the first unit
 HELD_OUT = 5  # cases that a choice is tried on
+HARD = 5  # one of so many units is harder than the second probe of a choice
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,14 @@ def spread(units: Sequence[Any], count: int) -> list[Any]:
     return _quantiles(_looked_at(units), count)
 
 
-def demanding(units: Sequence[Any], count: int) -> list[Any]:
-    """The unit whose contact asks most of a mesh, then `spread` of the others.
+def demanding(units: Sequence[Any]) -> list[Any]:
+    """The unit whose contact asks most of a mesh, and one that asks more than four of five do.
 
     That is where coarse beds of springs miss most of e_n at the lowest force: contacts that are small, or just reach a
-    second place.
+    second place. The hardest alone would not do: it may be one that no mesh resolves.
     """
-    seen = _looked_at(units)
-    hardest = max(seen, key=lambda s: (round(s.missed / DIGIT), -s.unit.index))
-    others = [s for s in seen if s is not hardest]
-    return [hardest.unit, *(_quantiles(others, count - 1) if others else [])]
+    seen = sorted(_looked_at(units), key=lambda s: (-round(s.missed / DIGIT), s.unit.index))
+    return [seen[i].unit for i in dict.fromkeys((0, max((len(seen) - 1) // HARD, min(1, len(seen) - 1))))]
 
 
 def held_out(scene: Scene, found: Sequence[Probe], count: int = HELD_OUT) -> list[Probe]:

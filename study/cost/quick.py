@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 FORMAL = 2.0  # highest order that is believed
 ALIKE = 1e-6  # errors that differ by less of themselves are equal
 FEWEST = 3  # meshes: two coarse ones can agree by chance
-PROBES, MOST_WEIGHT = 2, 40.0  # candidates, and no mesh more than so many times as heavy as the scene's own
+MOST_WEIGHT = 40.0  # no mesh is more than so many times as heavy as the scene's own
 
 
 def ladder(scene: Scene) -> list[Level]:
@@ -63,7 +63,7 @@ def _joined(pad: Level, wall: Level) -> Level:
 def quick_probes(scene: Scene) -> tuple[list[Probe], list[Probe], int]:
     """Probes at the lowest and the highest force, the cases that the choice is tried on, and all cases of the run."""
     units, forces = sweep.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
-    found = probes_at(scene, demanding(units, PROBES), tuple(dict.fromkeys((forces[0], forces[-1]))))
+    found = probes_at(scene, demanding(units), tuple(dict.fromkeys((forces[0], forces[-1]))))
     return found, held_out(scene, found), len(units) * len(forces)
 
 
