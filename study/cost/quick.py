@@ -78,9 +78,10 @@ class Judged:
     cases : list of str
         In words.
     error : (levels, cases) array
-        Relative distance of e_n from the limit of all meshes, and the doubt of that limit; NaN where that is not known.
+        Relative distance of e_n from the limit of all meshes, and the doubt of that limit: the largest of this mesh
+        and all finer ones. NaN where that is not known.
     good : (levels,) array of bool
-        Whether a mesh keeps the target and is not flagged, and so are all finer ones.
+        Whether a mesh keeps the target, and neither it nor a finer one is flagged.
     flagged : (levels,) array of bool
         Whether a mesh carries a flag that the finest does not.
     known : bool
@@ -129,13 +130,17 @@ def judge(levels: Sequence[Level], found: Sequence[Sequence[Measured]], target: 
         return Judged(kept, names, error, none, none, False, "; ".join(filter(None, told)))
     own = values[np.ix_(sound, sure)]
     end = limit([level.size for level in kept], own, FORMAL)
-    error[:, sure] = (np.abs(own - end.value) + end.doubt) / np.abs(end.value)
+    error[:, sure] = _no_luck((np.abs(own - end.value) + end.doubt) / np.abs(end.value))
     carried = flagged(flags[sound], last)[:, sure].any(axis=1)
     told += [f"{level.name} is flagged where the finest mesh is not" for level in np.array(kept, object)[carried]]
-    good = (np.nanmax(error, axis=1) <= target) & ~carried
+    good = (np.nanmax(error, axis=1) <= target) & ~_no_luck(carried)
     told.insert(0, f"no order seen: {end.remark}" if end.remark else f"observed order {end.order:.1f}")
-    suffix = np.logical_and.accumulate(good[::-1])[::-1]
-    return Judged(kept, names, error, suffix, carried, bool((sure | ~alive).all()), "; ".join(told))
+    return Judged(kept, names, error, good, carried, bool((sure | ~alive).all()), "; ".join(told))
+
+
+def _no_luck(errors: NDArray[Any]) -> NDArray[Any]:
+    """Errors ``(levels, ...)`` that are no smaller than those of any finer level: chance may make one small."""
+    return np.maximum.accumulate(errors[::-1])[::-1]
 
 
 def quick_choice(

@@ -84,8 +84,9 @@ def test_a_mesh_that_is_good_by_chance_is_not_taken():
 
     found = [[measured([1.0 + e])] for e in (0.001, 0.03, 0.0147, 0.0072, 0.0035)]
     judged = judge(levels(), found, 0.01)
-    assert judged.error[0, 0] < 0.01 < judged.error[1, 0]
+    assert judged.error[0, 0] == judged.error[1, 0] > 0.01
     assert judged.chosen == 3
+    assert judge(levels(3), found[:3], 0.01).best == 2  # and not the coarsest where none is good
 
 
 @pytest.mark.parametrize("flag", [COARSE_FLAG, ASKEW, 8])
