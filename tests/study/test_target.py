@@ -270,8 +270,12 @@ FINER = {"gripper.elements": [20, 10, 6], "gripper.element": "hex27"}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("text", [ROUND, BARREL, WAIST], ids=["cylinder", "barrel", "waist"])
-def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(text):
+@pytest.mark.parametrize(
+    ("text", "target"),
+    [(ROUND, 0.01), (BARREL, 0.01), (BARREL, 0.02), (WAIST, 0.02)],
+    ids=["cylinder 1 %", "barrel 1 %", "barrel 2 %", "waist 2 %"],
+)
+def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(text, target):
     """Five cases that no probe has, at random, on the mesh that was chosen and on a much finer one."""
     from study.case.sweep import units
     from study.cost.knobs import Level
@@ -280,7 +284,7 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
     from study.cost.quick import quick_choice, quick_probes
     from study.cost.study import new_study
 
-    own, target = scene(text, ["accuracy.e_n=0.01"]), 0.01
+    own = scene(text, [f"accuracy.e_n={target}"])
     found, others, cases = quick_probes(own)
     study = new_study(own, found, "", "")
     choice = quick_choice(own, study, found, others, cases, list)
@@ -289,6 +293,8 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
     if choice.met:
         assert choice.measured <= target
         assert not choice.held_out > target
+    else:
+        assert choice.predicted > target or "flagged" in choice.remark
     taken = {(p.unit.index, f) for p in found for f in p.forces}
     every = [(unit, f) for unit in units(own, lambda point: point.axis_symmetry) for f in own.load.normal_force]
     left = [(unit, f) for unit, f in every if (unit.index, f) not in taken]
