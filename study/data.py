@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from study.storage.layout import DONE, FAILED, MISSING, ROOT
-from study.tables.ranking import BORNE, LOST, borne_level, judged, ranking
+from study.tables.ranking import BORNE, LOST, TIE, borne_level, judged, ranking
 
 SHOWN = {
     "m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "Pa": ("kPa", 1e-3), "m^2": ("mm²", 1e6), "N m": ("N mm", 1e3),
@@ -18,7 +18,6 @@ SHOWN = {
 }  # fmt: skip
 OWN_UNITS = {"wall_stress": ("MPa", 1e-6)}  # maps whose numbers would be unwieldy in the unit of the others
 WIDE = 5e-3  # relative difference of widths that makes no place wider
-TIE = 1e-6  # relative difference of scores that is no difference: images of one grasp
 # What a check may be at most (or, for the last two, must exceed), and how the reader should take it.
 LIMITS = {
     "force_balance": 1e-6,

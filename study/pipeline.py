@@ -119,7 +119,7 @@ def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, B
     S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
     distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
     scores, score_flag = grasp_values(scene, obj, contacts, bounds)
-    areas = [float(c.patch.area[c.patch.pressure > 0].sum()) for c in contacts]
+    areas = [float(c.patch.area[c.loaded].sum()) for c in contacts]
     values = {
         "maps/tau_pure": min(c.tau_pure for c in contacts),
         "maps/S": S.mean(),

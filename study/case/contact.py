@@ -24,7 +24,9 @@ from study.storage.quantity import MODELS
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this misalignment a flag says so; at 5 degrees rounding decides nothing
+ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
+ALIKE = 1e-6  # rad, a slope, or of a length: what is nearer to a limit is undecided
+LOADED = 1e-9  # of the largest pressure, below which a face carries no load
 OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
@@ -84,11 +86,16 @@ class Contact:
         return self.finger.pose.rotation @ self.frame.axes[2]
 
     @property
+    def loaded(self) -> NDArray[np.bool_]:
+        """Which faces of the patch carry load ``(n,)``."""
+        return self.patch.pressure > LOADED * self.patch.pressure.max(initial=0.0)
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
         shape, law = self.state.pad.shape, self.state.pad.material
         (n, m, _), k = shape.elements, shape.per_side
-        loaded = self.patch.pressure.reshape(n, k, m, k) > 0
+        loaded = self.loaded.reshape(n, k, m, k)
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
         overlaps = self.state.checks.overlap > OVERLAP * self.state.travel
@@ -104,7 +111,7 @@ def angles(one: Contact, two: Contact) -> tuple[float, float]:
     """How far the contacts are from antipodal [rad]: between their normals, and between their line and each normal."""
 
     def between(u: FloatArray, v: FloatArray) -> float:
-        return float(np.arccos(np.clip(u @ v / (np.linalg.norm(u) * np.linalg.norm(v)), -1.0, 1.0)))
+        return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))  # an arc cosine near 1 knows 8 digits
 
     line = two.origin - one.origin
     return between(one.normal, -two.normal), max(between(one.normal, line), between(two.normal, -line))
@@ -116,9 +123,9 @@ def flags(contacts: Sequence[Contact], mu: float, score_flag: ScoreFlag) -> Flag
     normals, line = angles(one, two)
     between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
     found = raised(score_flag)
-    found |= Flag.ASKEW * (max(normals, line) > ANTIPODAL)
-    found |= Flag.SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
-    found |= Flag.OVERLAP * (one.free_front + two.free_front > between_fronts)
+    found |= Flag.ASKEW * (max(normals, line) > ANTIPODAL - ALIKE)
+    found |= Flag.SLIPS * (np.tan(min(line, 1.57)) > mu + ALIKE)
+    found |= Flag.OVERLAP * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
     found |= Flag.UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
     for c in contacts:
         found |= raised(c.frame.flag) | Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem.press import Pressed
+from study.case.margin import surely_below
 from study.scene import Scene
 from study.storage.quantities import EFFECTS, REASONS
 
@@ -28,8 +29,9 @@ def coupling_level(scene: Scene, contacts: Sequence[Any], walled: bool) -> tuple
         return level, left_out, REASONS.index("forced by the scene")
     if walled:
         return level, left_out, REASONS.index("the default level of this version")
-    below = "indicator below the target" if left_out <= SMALL else "left out, though the indicator is above the target"
-    return level, left_out, REASONS.index(below)
+    small = surely_below(left_out, SMALL)
+    reason = "indicator below the target" if small else "left out, though the indicator is above the target"
+    return level, left_out, REASONS.index(reason)
 
 
 def neglected_traction(state: Pressed, mu: float) -> float:

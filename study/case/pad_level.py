@@ -11,6 +11,7 @@ from fem.press import Settings
 from fem.spring_bed import SpringBed
 from study.case import model
 from study.case.build import pad_material
+from study.case.margin import surely_below
 from study.case.model import Finger
 from study.case.sheet_level import sheet_level
 from study.scene import Scene
@@ -57,10 +58,10 @@ def _nearly_linear(scene: Scene, finger: Finger) -> bool:
     choice = scene.gripper, symmetry, scene.accuracy.contact, False, sheet_level(scene).elastic
     pad = model.pad(*choice)
     squeezed = SpringBed(pad, finger.gap).travel(force) / pad.shape.size[2]
-    if departure(law, squeezed) > NEARLY_LINEAR:
+    if not surely_below(departure(law, squeezed), NEARLY_LINEAR):
         return False
     try:
         (state,) = linear_press(model.condensed_pad(*choice), finger.gap, settings=Settings()).ladder([force])
     except (ConvergenceError, CheckError):
         return False
-    return departure(law, state.checks.max_strain) <= NEARLY_LINEAR
+    return surely_below(departure(law, state.checks.max_strain), NEARLY_LINEAR)

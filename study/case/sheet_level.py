@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from fem.sheet import relative_compliance
 from study.case.build import pad_material, pad_shape, sheet
+from study.case.margin import surely_below
 from study.scene import Scene
 from study.scene.sections import Gripper
 
@@ -32,7 +33,7 @@ def sheet_level(scene: Scene) -> SheetLevel:
     compliance = _compliance(scene.gripper)
     if scene.effects.sheet != "auto":
         return SheetLevel(scene.effects.sheet == "elastic", compliance, "forced by the scene")
-    if compliance <= STIFF:
+    if surely_below(compliance, STIFF):
         return SheetLevel(False, compliance, "indicator below the target")
     return SheetLevel(True, compliance, "indicator above the target")
 

@@ -16,6 +16,7 @@ from fem.shell_stress import faces
 from fem.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
 from fem.wall_material import wall_material
 from study.case.build import outer_surface
+from study.case.margin import MARGIN, surely_below
 from study.flags import Flag
 from study.scene import Scene
 from study.scene.shape import Walled
@@ -69,7 +70,8 @@ def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
     dent, ratio = estimated_dent(body, held, scene, travel)
     if scene.effects.object != "auto":
         return Level(names[scene.effects.object], ratio, dent / travel, forced=True)
-    number = RIGID if dent < STIFF * travel else LINEAR if ratio <= SMALL_DENT else NONLINEAR
+    soft = NONLINEAR if not surely_below(ratio, SMALL_DENT) else LINEAR
+    number = RIGID if surely_below(dent, STIFF * travel) else soft
     return Level(number, ratio, dent / travel, forced=False)
 
 
@@ -127,9 +129,10 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
 def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
     found = Flag.SNAPPED * state.wall.snapped
-    found |= Flag.SLIDES_OUT * (values["maps/support_force"] > 2.0 * scene.friction.mu * state.force)
+    friction = 2.0 * scene.friction.mu * state.force
+    found |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
     strength = thin_body(scene.object).material.yield_strength
-    return found | Flag.YIELDS * (strength is not None and values["maps/wall_stress"] > strength)
+    return found | Flag.YIELDS * (strength is not None and not surely_below(values["maps/wall_stress"], strength))
 
 
 def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:

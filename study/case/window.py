@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.case.margin import MARGIN
 from study.case.sweep import axes
 from study.scene import Scene
 from study.storage.layout import DONE, Derived
@@ -67,6 +68,8 @@ def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArr
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
     """Force at which values first pass a limit, by straight lines from 0 at no force; NaN where they never do.
 
+    A solved value within `MARGIN` of the limit has passed it.
+
     Parameters
     ----------
     forces : (k,) array
@@ -84,9 +87,9 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     values = np.asarray(values, float)
     y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
     known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
-    above = known & (y >= limit)
+    above = known & (y >= limit * (1.0 - MARGIN))
     k = np.maximum(above.argmax(axis=-1), 1)[..., None]
     low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
-    share = (limit - low) / np.where(high > low, high - low, 1.0)
+    share = np.clip((limit - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
     found = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
     return np.where(above.any(axis=-1), found, np.nan)

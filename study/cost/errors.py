@@ -14,6 +14,8 @@ from study.cost.knobs import Knob, Level
 from study.cost.measure import QUANTITIES, Measured
 
 FloatArray = NDArray[np.float64]
+COARSE, NODAL = 4096, 512  # flags, as study.storage.quantities says
+ALIKE = 1e-9  # relative difference of values that is none: the same state by another order of sums
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class LevelErrors:
     by_case : (4, cases) array
     message : str
         What failed.
+    flags : (cases,) array
     """
 
     name: str
@@ -38,6 +41,7 @@ class LevelErrors:
     middle: FloatArray
     by_case: FloatArray
     message: str
+    flags: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -63,9 +67,14 @@ class KnobErrors:
         return bool(self.settings) and not any(np.isnan(s.size) for s in self.settings)
 
     @property
+    def doubts(self) -> FloatArray:
+        """To what the limit of e_n is known, relative to it ``(cases,)``; infinite where that is not known."""
+        return np.nan_to_num(self.limits[0].doubt / np.abs(self.limits[0].value), nan=np.inf)
+
+    @property
     def doubt(self) -> float:
-        """To what the limit of e_n is known, relative to it: the worst case."""
-        return float(np.nan_to_num(self.limits[0].uncertainty / np.abs(self.limits[0].value), nan=np.inf).max())
+        """The largest of ``doubts``."""
+        return float(self.doubts.max())
 
 
 def knob_errors(knob: Knob, found: Sequence[Sequence[Measured]], levels: Sequence[Level]) -> KnobErrors:
@@ -90,7 +99,7 @@ def _level(name: str, own: Sequence[Measured]) -> LevelErrors:
     nothing = np.full(len(QUANTITIES), np.nan)
     seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
     told = "; ".join(dict.fromkeys(m.message for m in own if m.message))
-    return LevelErrors(name, seconds, part, nothing, nothing, nothing[:, None], told)
+    return LevelErrors(name, seconds, part, nothing, nothing, nothing[:, None], told, flags_of(own))
 
 
 def _with_limits(table: KnobErrors, values: FloatArray, limits: Sequence[Limit]) -> KnobErrors:
@@ -124,16 +133,33 @@ def share_limits(tables: list[KnobErrors], values: dict[str, FloatArray]) -> lis
     return made
 
 
-def _own(settings: Sequence[str], values: FloatArray, study: CostStudy) -> int:
-    """The level that is the scene's own setting, or the one that gives the same in the same time; -1 for none."""
+def flags_of(found: Sequence[Measured]) -> NDArray[np.int64]:
+    """Flags of all cases of some probes."""
+    return np.nan_to_num(np.concatenate([m.flags for m in found])).astype(np.int64)
+
+
+def places(found: Sequence[Measured]) -> list[str]:
+    """All cases of some probes in words."""
+    return [f"{m.candidate}, {force:g} N" for m in found for force in m.forces]
+
+
+def flagged(flags: NDArray[np.int64], reference: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which cases carry a flag that those of the reference do not."""
+    return (flags & ~reference) != 0
+
+
+def unsure(reference: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which cases of a reference say themselves that their mesh is not to be trusted."""
+    return (reference & (COARSE | NODAL)) != 0
+
+
+def _own(settings: list[str], values: FloatArray, study: CostStudy) -> int:
+    """The level that is the scene's own setting, or the cheapest that gives the same; -1 for none."""
+    if study.base in settings:
+        return settings.index(study.base)
     base = np.concatenate([m.values for m in study.of(study.base)])
-    for i, setting in enumerate(settings):
-        if setting == study.base:
-            return i
-    alike = [np.allclose(v, base, rtol=1e-12, atol=0.0) for v in values]
-    seconds = [abs(np.mean([m.seconds for m in study.of(s)]) - np.mean([m.seconds for m in study.of(study.base)]))
-               for s in settings]  # fmt: skip
-    return min((i for i, same in enumerate(alike) if same), key=lambda i: seconds[i], default=-1)
+    alike = (i for i, v in enumerate(values) if np.allclose(v, base, rtol=ALIKE, atol=0.0))
+    return next(alike, -1)
 
 
 def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],

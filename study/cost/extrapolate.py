@@ -12,6 +12,8 @@ FloatArray = NDArray[np.float64]
 ALIKE = 0.75  # share of the change in which both steps must go the same way
 LOWEST, HIGHEST = 0.5, 6.0  # orders that are believed
 NOISE = 1e-9  # relative changes below this tell nothing
+SAFETY = 0.25  # of the correction by an observed order, which may be off by so much: Roache's factor of 1.25
+ASSUMED = 1.5  # order with which the last step is taken to shrink where none is seen: that of a contact's edge
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,9 @@ class Limit:
         The limit: extrapolated where the order was seen, else the finest level.
     uncertainty : (cases,) array
         How far the finest level is from its limit, or from the level before it where no order was seen (absolute).
+    doubt : (cases,) array
+        How far ``value`` itself may be off (absolute); NaN where a single level tells nothing, 0 where the last of
+        discrete levels is exact by definition.
     order : float
         Observed order; NaN where none was seen.
     remark : str
@@ -32,6 +37,7 @@ class Limit:
 
     value: FloatArray
     uncertainty: FloatArray
+    doubt: FloatArray
     order: float
     remark: str
 
@@ -58,17 +64,24 @@ def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
     finest = f[-1].copy()
     step = np.abs(f[-1] - f[-2]) if len(f) > 1 else np.full(finest.shape, np.nan)
     if not np.isfinite(h).all():
-        return Limit(finest, step, np.nan, "no order is expected")
-    if len(h) < 3:
-        return Limit(finest, step, np.nan, "fewer than three levels")
-    order, remark = observed_order(h[-3:], f[-3:])
+        return Limit(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
+    order, remark = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
+    used = ASSUMED if remark else order if np.isnan(formal) else min(order, formal)
+    correction, before = (_correction(h[k - 2 : k or None], f[k - 2 : k or None], used) for k in (0, -1))
     if remark:
-        return Limit(finest, step, np.nan, remark)
-    used = order if np.isnan(formal) else min(order, formal)
-    correction = (f[-1] - f[-2]) / ((h[-2] / h[-1]) ** used - 1.0)
+        shrunk = np.abs(before) * (h[-1] / h[-2]) ** used if len(h) > 1 else before
+        return Limit(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, remark)
     known = np.isfinite(correction)
     value = np.where(known, finest + np.where(known, correction, 0.0), finest)
-    return Limit(value, np.where(known, np.abs(value - finest), step), order, "")
+    doubt = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))
+    return Limit(value, np.where(known, np.abs(value - finest), step), doubt, order, "")
+
+
+def _correction(h: FloatArray, f: FloatArray, order: float) -> FloatArray:
+    """From the finer of two levels to their limit; NaN where there are fewer."""
+    if len(h) < 2:
+        return np.full(f.shape[-1:], np.nan)
+    return (f[-1] - f[-2]) / ((h[-2] / h[-1]) ** order - 1.0)
 
 
 def observed_order(h: FloatArray, f: FloatArray) -> tuple[float, str]:

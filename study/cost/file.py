@@ -17,7 +17,7 @@ from study.exits import OTHER_FILE, StudyError
 from study.storage.guarded import GuardedFile, opened
 from study.writing import beside
 
-PROGRAM, KIND, VERSION = "softjaw", "cost study", 1
+PROGRAM, KIND, VERSION = "softjaw", "cost study", 2
 TEXT = h5py.string_dtype("utf-8")
 MEANING = {
     "setting": ("", "what tells settings apart: the values by which they differ from the scene, or knob and level"),
@@ -28,6 +28,7 @@ MEANING = {
     "max_force": (UNITS["max_force"], "larger of max f_x and max f_y of the weaker finger, curved model"),
     "max_torque": (UNITS["max_torque"], "max tau_z of the weaker finger, curved model"),
     "quality": (UNITS["quality"], "volume of the grasp wrench space"),
+    "flags": ("", "flags of the case, as in a result file"),
     "cpu_seconds": ("s", "CPU time of one case, the least of the repeats"),
     "own_seconds": ("s", "part of it that the knob itself takes, where that is not the contact solve"),
     "repeats": ("", "how often it was measured"),
@@ -114,9 +115,9 @@ def save(path: Path, study: CostStudy) -> None:
 def _columns(study: CostStudy) -> dict[str, list]:
     columns: dict[str, list] = {name: [] for name in MEANING}
     for m in study.measured.values():
-        for force, values in zip(m.forces, m.values, strict=True):
-            row = [m.setting, m.what, m.candidate, float(force), *map(float, values), m.seconds, m.own,
-                   float(m.repeats), m.message]  # fmt: skip
+        for force, values, flags in zip(m.forces, m.values, m.flags, strict=True):
+            row = [m.setting, m.what, m.candidate, float(force), *map(float, values), float(flags), m.seconds,
+                   m.own, float(m.repeats), m.message]  # fmt: skip
             for name, value in zip(MEANING, row, strict=True):
                 columns[name].append(value)
     return columns
@@ -168,5 +169,5 @@ def _fill(study: CostStudy, read: dict) -> None:
         study.add(
             Measured(setting, read["level"][first], candidate, read["normal_force"][own], values,
                      float(read["cpu_seconds"][first]), float(read["own_seconds"][first]),
-                     int(read["repeats"][first]), read["message"][first])
+                     int(read["repeats"][first]), read["message"][first], read["flags"][own])
         )  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from study.case.build import has_wall
@@ -25,6 +25,11 @@ STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.mesh_object has 
 OWN = ("friction", "limit_surface")  # effects with knobs of their own in study.cost.judging
 EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
+# Time over that of the level which is taken for granted, about; more than the unknowns tell.
+DEARER = {
+    "gripper.element": {"hex27": 1.25}, "effects.pad": {"linear": 0.2}, "effects.sheet": {"elastic": 1.3},
+    "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -40,12 +45,15 @@ class Level:
         What the error is a power of (an element's size, ...); NaN where no order is expected.
     between : int
         Forces solved between those that are wanted; `EACH_ALONE` solves each from scratch.
+    work : float
+        Expected time over that of the scene as it is, by `weight`: measured times change from run to run.
     """
 
     name: str
     values: tuple[tuple[str, Any], ...] = ()
     size: float = math.nan
     between: int = 0
+    work: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,7 @@ def contact_knobs(scene: Scene) -> tuple[list[Knob], list[Skipped]]:
             if reason:
                 skipped.append(Skipped(knob.name, level.name, reason))
             else:
-                good.append(level)
+                good.append(replace(level, work=weight(with_level(scene, level)) / weight(scene)))
         place = next((i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == own), -1)
         if len(good) > 1:
             knobs.append(Knob(knob.name, knob.long_name, tuple(good), place, knob.formal, knob.family))
@@ -108,13 +116,17 @@ def refusal(scene: Scene, level: Level) -> str:
 
 
 def weight(scene: Scene) -> float:
-    """Expected time of one force, in any unit: by the unknowns of pad and wall."""
+    """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
     from study.execution.wall_cost import wall_size
 
+    times = 1.0
+    for key, levels in DEARER.items():
+        section, _, name = key.partition(".")
+        times *= levels.get(getattr(getattr(scene, section), name), 1.0)
     if has_wall(scene.object) and scene.effects.object != "rigid" and (wall := wall_size(scene)):
-        return float(wall.pad + wall.shell) ** WEIGHT_POWER
+        return times * float(wall.pad + wall.shell) ** WEIGHT_POWER
     per_side = {"hex8": 1, "hex27": 2}[scene.gripper.element]
-    return float(math.prod(per_side * n + 1 for n in scene.gripper.elements)) ** WEIGHT_POWER
+    return times * float(math.prod(per_side * n + 1 for n in scene.gripper.elements)) ** WEIGHT_POWER
 
 
 def _even(value: float) -> int:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
+Case = tuple[FloatArray, int]  # values and flags
 QUANTITIES = ("e_n", "max_force", "max_torque", "quality")
 UNITS = {"e_n": "m", "max_force": "N", "max_torque": "N m", "quality": ""}
 ENOUGH, REPEATS = 1.0, 3  # seconds after which, and times, that a cheap measurement is repeated
@@ -47,6 +48,8 @@ class Measured:
     repeats : int
     message : str
         Why values are missing.
+    flags : (k,) array
+        Flags of the cases, as ``study.tables.ranking`` names them; 0 where there is no value, and by default.
     """
 
     setting: str
@@ -58,6 +61,11 @@ class Measured:
     own: float = np.nan
     repeats: int = 1
     message: str = ""
+    flags: FloatArray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.flags is None:
+            object.__setattr__(self, "flags", np.zeros(len(self.forces)))
 
     @property
     def spent(self) -> float:
@@ -92,8 +100,8 @@ def measure(setting: str, probe: Probe, level: Level, timed: Callable = least_se
     scene = with_level(probe.unit.scene, level)
     ladders = ladders_of(probe.forces, level.between)
 
-    def solve() -> tuple[dict[float, FloatArray], str]:
-        found: dict[float, FloatArray] = {}
+    def solve() -> tuple[dict[float, Case], str]:
+        found: dict[float, Case] = {}
         message = ""
         for forces in ladders:
             point = scene.with_values({"load.normal_force_n": list(forces)})
@@ -103,10 +111,12 @@ def measure(setting: str, probe: Probe, level: Level, timed: Callable = least_se
         return found, message
 
     seconds, (found, message), repeats = timed(solve)
-    nothing = np.full(len(QUANTITIES), np.nan)
-    values = np.array([found.get(force, nothing) for force in probe.forces])
-    return Measured(setting, level.name, probe.label, np.array(probe.forces), values, seconds / len(probe.forces),
-                    repeats=repeats, message=message)  # fmt: skip
+    nothing = np.full(len(QUANTITIES), np.nan), 0
+    values, flags = zip(*(found.get(force, nothing) for force in probe.forces), strict=True)
+    return Measured(
+        setting, level.name, probe.label, np.array(probe.forces), np.array(values), seconds / len(probe.forces),
+        repeats=repeats, message=message, flags=np.array(flags, float),
+    )  # fmt: skip
 
 
 def ladders_of(forces: Sequence[float], between: int) -> list[tuple[float, ...]]:
@@ -123,16 +133,17 @@ def ladders_of(forces: Sequence[float], between: int) -> list[tuple[float, ...]]
     return [tuple(rising)]
 
 
-def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, FloatArray], str]:
+def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, Case], str]:
     from study import pipeline  # loads PETSc, which is not needed to read a study
 
-    found, message = {}, ""
+    found: dict[float, Case] = {}
+    message = ""
     try:
         for k, result in pipeline.solve_unit(unit):
             if isinstance(result, CaseFailure):
                 message = message or result.message
             else:
-                found[forces[k]] = from_maps(result.values)
+                found[forces[k]] = from_maps(result.values), int(result.values["maps/flags"])
     except Exception as error:  # whatever a case dies of is its result, as in a run
         message = f"{type(error).__name__}: {error}"
     return found, message

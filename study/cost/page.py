@@ -63,7 +63,8 @@ def _front(best: Sequence[Combination], base: float) -> str:
     head = ["CPU per case", "over the scene's", "predicted error of e_n", "settings"]
     told = (
         "Combinations of all measured levels. Errors of the knobs are added, each the largest over the probe cases;"
-        " times are multiplied. 'accuracy.e_n' in a scene chooses from these and tries them on the probes."
+        " times are multiplied; what is cheaper follows from the unknowns. 'accuracy.e_n' in a scene chooses from these"
+        " and tries them on the probes and on cases held out."
     )
     more = f" The first {MOST_SHOWN} of {len(best)}." if len(best) > MOST_SHOWN else ""
     return table("Pareto front, the cheapest first", head, rows, texts=(0,), wide=(3,)) + paragraph(told + more, "note")

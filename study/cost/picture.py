@@ -31,7 +31,7 @@ def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) ->
         for table in tables:
             _baselines(panel, table, q)
         if q == 0 and len(best) > 1:
-            x, y = [c.seconds for c in best], [max(c.error, LEAST) for c in best]
+            x, y = zip(*sorted((c.seconds, max(c.error, LEAST)) for c in best), strict=True)
             panel.step(x, y, where="post", color=pictures.INK, lw=0.9, ls=":", zorder=2, label="Pareto front")
     for panel in axes[-1]:
         panel.set_xlabel("CPU seconds per case")

@@ -47,7 +47,7 @@ def _fresh(scene: Scene, output: Path, say: Callable[[str], None]) -> Choice:
     from study.cost.quick import quick_choice, quick_probes
 
     path = cost_path(output)
-    found, cases = quick_probes(scene)
+    found, others, cases = quick_probes(scene)
     study = new_study(scene, found, getattr(scene.object, "name", None) or output.stem, "")
     if path.exists():
         old = load(path)
@@ -56,13 +56,13 @@ def _fresh(scene: Scene, output: Path, say: Callable[[str], None]) -> Choice:
     if not study.measured:
         say(f"accuracy.e_n = {scene.accuracy.e_n:g}: choosing the mesh on {'; '.join(study.candidates)}")
         warm_up(found[0])
-    choice = quick_choice(scene, study, found, cases, lambda: save(path, study))
+    choice = quick_choice(scene, study, found, others, cases, lambda: save(path, study))
     say(_told(choice))
     return choice
 
 
 def _from_file(scene: Scene, say: Callable[[str], None]) -> Choice:
-    from study.cost.probes import probes
+    from study.cost.probes import held_out, probes
 
     path = Path(str(scene.accuracy.cost_file))
     study = load(path)
@@ -73,7 +73,8 @@ def _from_file(scene: Scene, say: Callable[[str], None]) -> Choice:
     found = probes(measured, named) if len(named) == len(study.candidates) else []
     if found:
         warm_up(found[0])
-    choice = choose(what, study, float(scene.accuracy.e_n), explicit(scene), found, measure_once)
+    others = held_out(measured, found) if found else []
+    choice = choose(what, study, float(scene.accuracy.e_n), explicit(scene), found, others, measure_once)
     save(path, study)
     say(_told(choice))
     return choice
@@ -124,7 +125,7 @@ def expected(scene: Scene) -> str:
         return ""
     goal = f"e_n within {100 * scene.accuracy.e_n:g} %"
     if scene.accuracy.cost_file is None:
-        return f"{goal}: the mesh is chosen when the run starts, by solving a few probe cases (at most 5 % of a map)"
+        return f"{goal}: the mesh is chosen when the run starts, by solving some ten cases on several meshes"
     path = Path(scene.accuracy.cost_file)
     study = load(path)
     measured = stored_scene(path, study)

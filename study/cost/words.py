@@ -113,6 +113,7 @@ def _need(table: KnobErrors) -> str:
 def choice_text(choice: Choice) -> str:
     """What was chosen, in one sentence."""
     measured = "" if math.isnan(choice.measured) else f", measured on the probes {percent(choice.measured)}"
+    measured += "" if math.isnan(choice.held_out) else f", on cases held out {percent(choice.held_out)}"
     verdict = "" if choice.met else "; THE TARGET IS NOT MET"
     return (
         f"accuracy.e_n = {choice.target:g}: {values_text(choice.values)}; predicted error {percent(choice.predicted)}"

@@ -11,6 +11,7 @@ from study import pictures
 from study.case.stored_surface import StoredSurface, stored_surface
 from study.data import Data, number
 from study.figures import WIDTH, rendering
+from study.tables.ranking import nearest
 
 MOTIONS = 250  # slip motions whose wrenches are drawn, and their opposites
 SUPPORTS = 8000  # planes that bound the exact body
@@ -74,7 +75,7 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
 
 def misfit_along(data: Data) -> tuple[Any, str]:
     """(c) Mean error of both fitted surfaces at every candidate along the object."""
-    k = int(np.abs(data.forces - FORCE).argmin())
+    k = nearest(data.forces, FORCE)
     z = 1e3 * data.axes[-3].values
     drawn, axes = pictures.figure(WIDTH, 2.9, 1, data.shape[-2], gap=0.1, sharey=True)
     for j, panel in enumerate(axes[0]):

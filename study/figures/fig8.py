@@ -10,6 +10,7 @@ from study import pictures
 from study.data import WIDE, Data, number
 from study.figures import WIDTH, rendering
 from study.outline import read_scene, shape_outline
+from study.tables.ranking import largest
 from study.view.colours import table
 from study.view.model import View
 from study.view.surface import NOBODY
@@ -49,7 +50,7 @@ def best_and_widest(data: Data) -> str:
     words = []
     for name in QUANTITIES:
         values = data.map(name)[..., data.k]
-        i, _ = np.unravel_index(np.nanargmax(values), values.shape)
+        i, _ = np.unravel_index(largest(values), values.shape)
         share = 100 * np.nanmax(values[wide]) / np.nanmax(values)
         words.append(f"{name} largest at {number(stations[i])} mm, where widest at most {number(share)} % of that")
     ends = np.flatnonzero(np.diff(wide.astype(int), prepend=0, append=0)).reshape(-1, 2)

@@ -78,7 +78,7 @@ def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: b
     x, swapped = folded[order], half_turn & (turns[order] % 2 == 1)
     if len(x) == 1:
         return Nodes(name, units, _point(float(x[0])), order.repeat(2), swapped.repeat(2), period, half_turn)
-    if x[0] + period - x[-1] <= WIDER * np.diff(x).max():
+    if x[0] + period - x[-1] <= WIDER * np.diff(x).max() * (1 + ALIKE):
         x, order = np.append(x, x[0] + period), np.append(order, order[0])
         swapped = np.append(swapped, swapped[0] ^ half_turn)
     return Nodes(name, units, x, order, swapped, period, half_turn)

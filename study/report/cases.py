@@ -9,6 +9,7 @@ from study.flags import flags_in
 from study.report.page import details, paragraph, table
 from study.report.words import VALUES, head, value
 from study.storage.layout import DONE, FAILED, MISSING
+from study.tables.ranking import largest
 
 MOST_REASONS, MOST_PLACES = 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
@@ -85,8 +86,7 @@ def checks(data: Data) -> str:
         found = data.values(f"checks/{name}")
         if found is None:
             continue
-        pick = np.nanargmin if name in ABOVE else np.nanargmax
-        index = np.unravel_index(pick(found), found.shape)
+        index = np.unravel_index(largest(-found if name in ABOVE else found), found.shape)
         worst = float(found[index])
         limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
         state = "–" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"

@@ -13,6 +13,7 @@ from study.data import Data, number, shown
 from study.report.page import Picture
 from study.report.spots import Spot, spot
 from study.storage.layout import FAILED
+from study.tables.ranking import largest
 
 MOST_ANGLES, MOST_TICKS, FEW = 4, 12, 5
 SHORT = {"quality": "grasp quality [-]", "e_n": "e_n [mm]", "dent": "dent [mm]", "wall_stress": "wall stress [MPa]"}
@@ -104,7 +105,7 @@ def draw_panel(
     if yl:
         axes.set_yticks(yt, yl)
     if np.isfinite(values).any():
-        i, j = np.unravel_index(np.nanargmax(values), values.shape)
+        i, j = np.unravel_index(largest(values), values.shape)
         place = (0.5 * (xe[j] + xe[j + 1]), 0.5 * (ye[i] + ye[i + 1]))
         for colour, width in (("white", 2.6), (pictures.INK, 1.1)):
             axes.plot(*place, "o", ms=7, mfc="none", mec=colour, mew=width)
@@ -196,7 +197,7 @@ def extremes(data: Data, index: tuple[int, ...], names: tuple[str, ...] = MAPS) 
     for name in names:
         values = scaled(data, name)[..., index[-1]]
         if np.isfinite(values).any():
-            low, high = (np.unravel_index(f(values), values.shape) for f in (np.nanargmin, np.nanargmax))
+            low, high = (np.unravel_index(largest(sign * values), values.shape) for sign in (-1, 1))
             label, unit, _ = data.units(name)
             words.append(
                 f"{label} runs from {number(values[low])} ({data.place((*low, index[-1]))}) to "

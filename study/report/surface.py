@@ -10,6 +10,7 @@ from study import pictures
 from study.case.stored_surface import StoredSurface, shadow_outline, stored_surface
 from study.data import Data, number, shown
 from study.report.page import Picture
+from study.tables.ranking import largest
 
 COMPONENTS = (("f_x", "N", 1.0), ("f_y", "N", 1.0), ("tau_z", "N mm", 1e3))
 PLANES = ((0, 1), (0, 2), (1, 2))
@@ -23,7 +24,7 @@ LINES = {
 def surface_pictures(data: Data, index: tuple[int, ...]) -> list[Picture]:
     """Shadows and a view in space of the weaker finger's limit surfaces at one case; none where nothing is stored."""
     weakest = data.values("fingers/tau_z_max")
-    finger = 0 if weakest is None else int(np.nan_to_num(weakest[index][:, 0]).argmin())
+    finger = 0 if weakest is None else largest(-np.nan_to_num(weakest[index][:, 0]))
     found = {model: stored_surface(data, index, finger, model) for model in ("curved", data.planar)}
     known = {model: surface for model, surface in found.items() if surface is not None and surface.ellipsoid.rank == 3}
     if not known:

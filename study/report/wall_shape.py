@@ -13,6 +13,7 @@ from study.outline import undeformed
 from study.report.page import Picture
 from study.storage.layout import DONE
 from study.storage.wall_quantities import ALONG, AROUND
+from study.tables.ranking import largest
 
 LEVEL = 0.05  # of an approach along the object's axis, beyond which sections would not show both fingers
 FINE = 180  # points of a ring
@@ -85,7 +86,7 @@ def _caption(data: Data, cases: list[tuple[int, ...]], scene: Any) -> str:
 
 def _deepest(data: Data) -> tuple[int, ...] | None:
     dent = data.map("dent")
-    return None if dent is None else tuple(int(i) for i in np.unravel_index(np.nanargmax(dent), dent.shape))
+    return None if dent is None else tuple(int(i) for i in np.unravel_index(largest(dent), dent.shape))
 
 
 def _stored(data: Data, places: np.ndarray | None, index: tuple[int, ...]) -> bool:

@@ -12,6 +12,7 @@ from study.data import Data, number, shown
 from study.report.maps import chosen_angles, elsewhere, main_axis, ticks
 from study.report.page import Picture
 from study.storage.layout import DONE
+from study.tables.ranking import largest
 
 SAFE, NONE = "#2a8c82", "#c9ced2"
 
@@ -81,6 +82,7 @@ def _said(data: Data, index: tuple[int, ...], low: np.ndarray | None, high: np.n
     good = np.argwhere(bottom <= high)
     if not len(good):
         return "No grasp has a safe force."
-    widest = tuple(int(i) for i in max(good, key=lambda i: (high - bottom)[tuple(i)]))
+    wide = np.where(bottom <= high, high - bottom, np.nan)
+    widest = tuple(int(i) for i in np.unravel_index(largest(wide), wide.shape))
     ends = f"{number(bottom[widest])} to {number(high[widest])} N"
     return f"{len(good)} of {high.size} grasps have one, the widest from {ends} at {data.place((*widest, index[-1]))}."

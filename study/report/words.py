@@ -9,7 +9,7 @@ from study.flags import Flag, flags_in
 from study.report.page import box, paragraph, table
 from study.report.wall_words import SAFE, wall_sentence, window_text
 from study.storage.layout import DONE, FAILED, MISSING
-from study.tables.ranking import BORNE, passed_over
+from study.tables.ranking import BORNE, largest, passed_over
 from study.uncertainty.verdict import sure
 from study.uncertainty.verdict import verdict as judgement
 
@@ -155,7 +155,7 @@ def _planar(data: Data, index: tuple[int, ...]) -> list[str]:
 def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
     """Where the score per unit of normal force is largest, if that is at another force."""
     tops = [i for k in range(len(data.forces)) for i in data.order(k)[:1] if not data.lost[i] or i == best]
-    top = max(tops, key=lambda i: np.nan_to_num(data.at(data.score, i), nan=-np.inf))
+    top = tops[largest(np.array([data.at(data.score, i) for i in tops]))]
     if top[-1] == best[-1] or not data.at(data.score, top) > data.at(data.score, best) * (1 + 1e-3):
         return []
     most = number(data.at(data.score, top) * data.units(data.score)[2])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from study.exits import USAGE, StudyError
 from study.scene.difference import changes
 from study.storage.layout import DONE
+from study.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]
 ALIKE = 1e-9  # relative difference of coordinates that is only rounding
@@ -56,9 +57,9 @@ class Difference:
 
     @property
     def beyond(self) -> NDArray[np.object_]:
-        """Whether a difference exceeds the errors of both; None where one of them is unknown."""
+        """Whether a difference exceeds the errors of both, and `TIE` of the value; None where an error is unknown."""
         known = np.isfinite(self.change) & np.isfinite(self.error)
-        return np.where(known, np.abs(self.change) > self.error, None)
+        return np.where(known, np.abs(self.change) > self.error + TIE * np.abs(self.values[0]), None)
 
     @property
     def exceed(self) -> tuple[int, int]:

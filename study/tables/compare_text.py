@@ -11,6 +11,7 @@ import numpy as np
 from study.scene.difference import value_text
 from study.tables.columns import DISPLAY, PAPER, aligned, csv_text, two_lines, with_unit, wrapped
 from study.tables.compare import AxisMatch, Comparison, Difference
+from study.tables.ranking import falling
 
 MOST_SETTINGS, WIDEST_SETTING = 12, 24
 BEYOND = {True: "yes", False: "no", None: "-"}
@@ -90,8 +91,7 @@ def _verdict(found: Comparison) -> str:
 
 def _cases(found: Comparison, top: int) -> list[str]:
     d = found.asked
-    order = [int(i) for i in np.argsort(-np.abs(np.nan_to_num(d.change.ravel())), kind="stable")]
-    order = [i for i in order if np.isfinite(d.change.ravel()[i])]
+    order = [int(i) for i in falling(np.abs(d.change.ravel())) if np.isfinite(d.change.ravel()[i])]
     shown = order[: top or None]
     if not shown:
         return []

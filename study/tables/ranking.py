@@ -13,6 +13,8 @@ from study.storage.layout import DONE
 IntArray = NDArray[np.int64]
 BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
 LOST = Flag.SLIPS | Flag.OVERLAP | BORNE  # of a grasp that does not hold, or does harm, as it was computed
+TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal as far as can be told
+NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 
 def judged(result: Any) -> IntArray:
@@ -24,20 +26,60 @@ def judged(result: Any) -> IntArray:
     flags = np.nan_to_num(result.map("flags")).astype(np.int64)
     bounds = {d.name for d in getattr(result.layout, "derived", ())}
     if "force_low" in bounds:
-        flags |= Flag.TOO_WEAK * (result.map("safety_factor", "curved") < 1)
+        flags |= Flag.TOO_WEAK * (result.map("safety_factor", "curved") < 1 - TIE)
     if "force_high" in bounds:
         flags |= Flag.TOO_STRONG * (result.axes[-1].values > result.derived("force_high")[..., None] * (1 + 1e-9))
     return flags
 
 
+def falling(values: np.ndarray) -> np.ndarray:
+    """Positions from the largest to the smallest value, NaN last; of values within `TIE` the first comes first.
+
+    >>> falling(np.array([1.0, 3.0, np.nan, 3.0 + 1e-15])).tolist()
+    [1, 3, 0, 2]
+    """
+    return np.argsort(_places(np.asarray(values, float)), kind="stable")
+
+
+def largest(values: np.ndarray) -> int:
+    """Position of the largest value in the flattened array; of values within `TIE` the first.
+
+    >>> largest(np.array([np.nan, 2.0, 2.0 + 1e-15])), largest(-np.array([2.0 + 1e-15, 2.0]))
+    (1, 0)
+    """
+    return int(falling(np.ravel(values))[0])
+
+
+def nearest(values: np.ndarray, wanted: float) -> int:
+    """Position of the value that is nearest to another one; of two that are equally near the first.
+
+    >>> nearest(np.array([0.1, 0.3]), 0.2), nearest(np.array([0.1, 0.3]), 0.21)
+    (0, 1)
+    """
+    return largest(-np.abs(np.asarray(values, float) - wanted))
+
+
+def _places(values: np.ndarray) -> IntArray:
+    """Place of every value in the ranking, counted from 0; those within `TIE` of the next share one."""
+    known = np.nan_to_num(values, nan=-np.inf)
+    order = np.argsort(-known, kind="stable")
+    found = known[order]
+    same = TIE * np.abs(found[1:]) + NOTHING * np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    with np.errstate(invalid="ignore"):  # from one that is not there to the next
+        apart = found[:-1] - found[1:] > np.where(np.isfinite(same), same, 0.0)
+    places = np.empty(len(order), np.int64)
+    places[order] = np.concatenate([[0], np.cumsum(apart)])[: len(order)]
+    return places
+
+
 def ranking(score: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """Positions from the best to the worst: by score, but with the `LOST` ones last.
+    """Positions from the best to the worst: by score, but with the `LOST` ones last; ties as in `falling`.
 
     >>> ranking(np.array([1.0, 3.0, 2.0]), np.array([0, 1024, 0])).tolist()
     [2, 0, 1]
     """
     lost = (np.nan_to_num(flags).astype(int) & LOST) > 0
-    return np.lexsort((-np.nan_to_num(score, nan=-np.inf), lost))
+    return np.lexsort((_places(np.asarray(score, float)), lost))
 
 
 def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:

@@ -12,7 +12,7 @@ import numpy as np
 from study.flags import OF_FILE
 from study.storage.layout import DONE
 from study.tables.columns import DISPLAY, csv_text, with_unit
-from study.tables.ranking import BORNE, LOST, borne_level, judged, passed_over, ranking
+from study.tables.ranking import BORNE, LOST, borne_level, judged, nearest, passed_over, ranking
 from study.tables.show_text import WINDOW, Columns, alike
 from study.tables.show_text import as_text as as_text
 from study.uncertainty.verdict import sure, verdict
@@ -107,7 +107,7 @@ def _level(result: Any, flags: np.ndarray, force: float | None) -> tuple[int, st
     """Number of the force level that is shown, and why where that is not plain."""
     forces = result.axes[-1].values
     if force is not None:
-        k = int(np.abs(forces - force).argmin())
+        k = nearest(forces, force)
         return k, "" if np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
     k = borne_level(result.status, flags) if (flags & BORNE).any() else None
     if k is None or k == len(forces) - 1:

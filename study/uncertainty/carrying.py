@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+TIE = 1e-6  # relative difference of values that is none: images of one grasp
 TIMES = 2.0  # root mean squares of the probes that a band is wide: about 95 of 100 cases lie within
 POWER = 5  # of mu in the quality of contacts that face each other: three axes of one finger's surface, two of the other
 
@@ -67,7 +68,7 @@ def at_least_own(share: FloatArray, change: FloatArray, probes: tuple[int, ...],
     """
     found = share.copy()
     for own, number in zip(np.abs(change), probes, strict=True):
-        alike = np.all((values == values[number]) | (np.isnan(values) & np.isnan(values[number])), axis=-1)
+        alike = np.isclose(values, values[number], rtol=TIE, atol=0.0, equal_nan=True).all(axis=-1)
         found[alike] = np.fmax(found[alike], own)
     return found
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.tables.columns import DISPLAY
+from study.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]
-TIE = 1e-6  # relative difference of scores that is none: images of one grasp
 MOVES = {"mu": "mu", "modulus": "the shear modulus", "wall": "the wall's thickness"}  # all grasps at once
 
 
@@ -42,10 +42,14 @@ class Sure:
         return np.sqrt(self.own**2 + sum((change**2 for change in self.common.values()), np.zeros(self.value.shape)))
 
     def apart(self, i: int, j: int) -> bool | None:
-        """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known."""
+        """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
+
+        A difference within `TIE` of the values is none, also where nothing is said to be in error.
+        """
         both = np.array([change[i] - change[j] for change in self.common.values()])
         error = np.sqrt(self.own[i] ** 2 + self.own[j] ** 2 + np.sum(both**2))
-        return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error)
+        least = TIE * max(abs(self.value[i]), abs(self.value[j]))
+        return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
 
 
 def sure(result: Any, name: str, k: int) -> Sure | None:

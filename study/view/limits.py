@@ -8,6 +8,7 @@ import numpy as np
 
 from study.case.stored_surface import stored_surface
 from study.data import Data
+from study.tables.ranking import largest
 
 ROWS, COLUMNS = 17, 32  # directions from pole to pole, and round
 
@@ -39,7 +40,7 @@ def directions() -> np.ndarray:
 def limit_body(data: Data, index: tuple[int, ...]) -> LimitBody | None:
     """Curved model, weaker finger; None where the file holds no surface with an inside."""
     weakest = data.values("fingers/tau_z_max")
-    finger = 0 if weakest is None else int(np.nan_to_num(weakest[index][:, 0]).argmin())
+    finger = 0 if weakest is None else largest(-np.nan_to_num(weakest[index][:, 0]))
     found = stored_surface(data, index, finger, "curved")
     if found is None or found.ellipsoid.rank < 3:
         return None

@@ -12,6 +12,7 @@ from study.exits import USAGE, StudyError
 from study.flags import flag_words
 from study.outline import read_scene, swept_object
 from study.storage.layout import DONE, FAILED
+from study.tables.ranking import nearest
 from study.view.surface import NOBODY, Cells, coloured, with_normals
 from study.view.wall import Wall, displacement, wall_of
 
@@ -180,7 +181,7 @@ def view_of(data: Data, candidate: int | None, place: tuple[float | None, float 
     StudyError
         For a candidate that the file does not have, or a station far outside of the map.
     """
-    k = data.k if force is None else int(np.abs(data.forces - force).argmin())
+    k = data.k if force is None else nearest(data.forces, force)
     best = next(iter(data.order(k)), (*(0 for _ in data.shape[:-1]), k))
     if candidate is not None:
         count = int(np.prod(data.shape[:-1]))
@@ -212,8 +213,7 @@ def _nearest(data: Data, best: tuple[int, ...], place: tuple[float | None, float
     """The case at this force nearest to a station and an angle; the best one where only one of them is given."""
     near = []
     for axis, wanted in zip(data.axes[-3:-1], place, strict=True):
-        off = np.abs(axis.values - (np.nan if wanted is None else wanted))
-        near.append(None if wanted is None else int(off.argmin()))
+        near.append(None if wanted is None else nearest(axis.values, wanted))
     fits = [
         i
         for i in data.order(k)

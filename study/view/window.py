@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyvista as pv
 
+from study.tables.ranking import nearest
 from study.view.colours import CROSS
 from study.view.drawing import SIZE, draw_limits, draw_object, draw_pads, draw_words, look_at
 from study.view.model import View
@@ -65,7 +65,7 @@ def add_controls(plotter: Any, view: View, index: tuple[int, ...], quantity: str
         plotter.subplot(0, 0)
 
     def force(value: float) -> None:
-        redraw((*state["at"][:-1], int(np.abs(view.data.forces - value).argmin())))
+        redraw((*state["at"][:-1], nearest(view.data.forces, value)))
 
     def pick(_: Any, picker: Any) -> None:
         found = pv.wrap(picker.GetDataSet())

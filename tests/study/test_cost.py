@@ -257,7 +257,7 @@ def test_the_choice_meets_the_target_at_the_least_cost(text, target):
     from study.cost.knobs import with_level
 
     what, study, probes, solve, _ = formula_study(scene(text, [*COARSE, *(COARSE_WALL if "wall" in text else [])]))
-    choice = choose(what, study, target, {}, probes, solve)
+    choice = choose(what, study, target, {}, probes, (), solve)
     exact = 0.01
 
     def error(level):
@@ -279,7 +279,7 @@ def test_what_the_scene_gives_itself_stays():
     given = explicit(own)
     assert given["gripper.elements"] == (12, 6, 4)
     assert "effects.pad" not in given
-    choice = choose(what, study, 0.01, given, probes, solve)
+    choice = choose(what, study, 0.01, given, probes, (), solve)
     assert choice.values.get("gripper.elements", [12, 6, 4]) == [12, 6, 4]
     assert not choice.met
     assert "no measured setting meets the target" in choice.remark
@@ -290,10 +290,10 @@ def test_a_second_choice_solves_nothing_and_chooses_the_same():
 
     own = scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL])
     what, study, probes, solve, calls = formula_study(own)
-    first = choose(what, study, 0.02, {}, probes, solve)
+    first = choose(what, study, 0.02, {}, probes, (), solve)
     assert calls  # combinations that were not on any ladder
     calls.clear()
-    assert choose(what, study, 0.02, {}, probes, solve) == first
+    assert repr(choose(what, study, 0.02, {}, probes, (), solve)) == repr(first)
     assert not calls
 
 
@@ -304,14 +304,14 @@ def test_a_run_without_a_study_climbs_no_further_than_needed():
     _, study, probes, solve, calls = formula_study(own)
     study.measured.clear()
     saved = []
-    choice = quick_choice(own, study, probes, 1000, lambda: saved.append(1), solve)
+    choice = quick_choice(own, study, probes, (), 1000, lambda: saved.append(1), solve)
     names = [level.name for level in ladder(own)]
     chosen = names.index(" x ".join(map(str, choice.values["gripper.elements"])))
     assert e_n_of(own.with_values(choice.values)) / 0.01 - 1 <= 0.02
     assert len(calls) / 2 <= max(3, chosen + 2)  # on two probes: the chosen mesh and one finer
     assert len(saved) == len(calls)
     calls.clear()
-    assert quick_choice(own, study, probes, 1000, list, solve).values == choice.values
+    assert quick_choice(own, study, probes, (), 1000, list, solve).values == choice.values
     assert not calls
 
 
@@ -321,7 +321,7 @@ def test_a_given_mesh_leaves_nothing_to_choose():
 
     own = scene(overrides=[*COARSE, "accuracy.e_n=0.02"])
     _, study, probes, solve, _ = formula_study(own)
-    choice = quick_choice(own, study, probes, 10, list, solve)
+    choice = quick_choice(own, study, probes, (), 10, list, solve)
     assert choice.values == {}
     assert not choice.met
     assert with_choice(own, choice).digest == own.digest
@@ -373,7 +373,7 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
     """All that is predicted much cheaper than the choice is solved too: none within 1 % costs below 2/3."""
     from dataclasses import replace
 
-    from study.cost.choose import choose, combinations, measured_error, reference
+    from study.cost.choose import choose, combinations, reference
     from study.cost.measure import measure
     from study.cost.probes import probes
     from study.cost.study import Measuring, costs, new_study, setting_of
@@ -397,7 +397,7 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
             if not study.has(setting):
                 study.add(measure(setting, probe, combination.level))
         seconds = np.mean([m.seconds for m in study.of(setting)])
-        good = measured_error(study, setting, goal) <= target
+        good = goal.error(study.of(setting)) <= target
         assert not good or seconds > choice.seconds / 1.5, f"{combination.level.name} is cheaper and good enough"
 
 

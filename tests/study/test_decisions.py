@@ -1,0 +1,252 @@
+"""Outcomes of a study that rounding does not decide: rankings, levels of effects, flags, windows, probes, look-ups.
+
+Each decision is put where it is hardest, on its limit or on a tie, moved by a few ulp or turned: 200 times the same.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+ULPS = np.finfo(float).eps * np.arange(-8, 9)
+tries = settings(max_examples=200, deadline=None)
+SPHERE = """
+[object]
+shape = "sphere"
+radius_mm = 30
+[candidates]
+stations_mm = [0]
+angles_deg = [0]
+[load]
+normal_force_n = [1]
+"""
+seeds = st.integers(0, 2**32 - 1)
+scores = st.lists(st.sampled_from([0.0, 1e-3, 0.1, 0.1, 0.25, 3.0, math.nan]), min_size=1, max_size=12)
+
+
+def moved(values, seed):
+    """The values, each off by at most eight ulp."""
+    return np.asarray(values, float) * (1.0 + np.random.default_rng(seed).choice(ULPS, np.shape(values)))
+
+
+# --- rankings and extremes --------------------------------------------------------------------------------------------
+
+
+@tries
+@given(scores, seeds)
+def test_equal_grasps_keep_their_order(values, seed):
+    from study.tables.ranking import falling, largest, ranking
+
+    flags = np.random.default_rng(seed).choice([0, 1024], len(values))
+    assert ranking(moved(values, seed), flags).tolist() == ranking(np.array(values), flags).tolist()
+    assert falling(moved(values, seed)).tolist() == falling(np.array(values)).tolist()
+    assert largest(moved(values, seed)) == largest(np.array(values))
+
+
+@tries
+@given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
+def test_a_ranking_is_one(values):
+    """What differs by more than a tie stands in falling order, and nothing is lost."""
+    from study.tables.ranking import TIE, falling
+
+    order = falling(np.array(values))
+    assert sorted(order.tolist()) == list(range(len(values)))
+    ranked = np.array(values)[order]
+    assert (ranked[:-1] >= ranked[1:] * (1 - len(values) * TIE)).all()
+
+
+@tries
+@given(st.floats(0.1, 50.0), st.floats(1e-3, 10.0), seeds)
+def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
+    from study.tables.ranking import nearest
+
+    forces = low + step * np.arange(4)
+    wanted = moved([low + 1.5 * step], seed)[0]
+    assert nearest(moved(forces, seed), wanted) == 1
+    assert nearest(forces, low + 1.51 * step) == 2
+
+
+@tries
+@given(scores, seeds)
+def test_rounding_is_no_difference_of_two_maps_without_errors(values, seed):
+    from study.tables.compare import Difference
+    from study.uncertainty.verdict import Sure
+
+    one, other = np.array(values), moved(values, seed)
+    difference = Difference("e_n", "m", (one, other), np.zeros(one.shape), (True, True))
+    assert not any(difference.beyond[np.isfinite(one)])
+    pair = Sure(np.array([one[0], other[0]]), np.zeros(2), {})
+    assert pair.apart(0, 1) is False
+    assert pair.apart(1, 0) is False
+
+
+def test_a_difference_above_the_errors_is_still_one():
+    from study.tables.compare import Difference
+    from study.uncertainty.verdict import Sure
+
+    values = np.array([1.0, 1.0]), np.array([1.1, 1.01])
+    assert Difference("e_n", "m", values, np.full(2, 0.05), (True, True)).beyond.tolist() == [True, False]
+    assert Sure(np.array([1.1, 1.0]), np.full(2, 0.05), {}).apart(0, 1) is True
+
+
+@tries
+@given(seeds)
+def test_a_band_of_a_probe_is_that_of_its_images(seed):
+    from study.uncertainty.carrying import at_least_own
+
+    values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
+    band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
+    assert band.tolist() == [[0.05, 0.02], [0.05, 0.02], [0.01, 0.01], [0.01, 0.01]]
+
+
+# --- windows of forces ------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(st.lists(st.sampled_from([0.5, 1.0, 1.5]), min_size=1, max_size=5), seeds)
+def test_a_window_ends_at_the_same_force(values, seed):
+    """Values that just reach the limit, also where they fall again or the forces end."""
+    from study.case.window import first_crossing
+
+    forces = 1.0 + np.arange(len(values))
+    one = first_crossing(forces, values, 1.0)
+    other = first_crossing(forces, moved(values, seed), 1.0)
+    assert other == pytest.approx(one, rel=1e-9, nan_ok=True)
+
+
+@tries
+@given(seeds)
+def test_a_grasp_that_just_holds_is_not_too_weak(seed):
+    from study.tables.ranking import TOO_WEAK, judged
+
+    factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
+    layout = SimpleNamespace(derived=[SimpleNamespace(name="force_low")])
+    result = SimpleNamespace(layout=layout, map=lambda name, model="": factor if model else np.zeros((1, 4)))
+    assert (judged(result) & TOO_WEAK > 0).tolist() == [[False, False, True, False]]
+
+
+# --- levels of effects ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ulp", ULPS[::4])
+def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
+    from study.case import coupling_level, pad_level, sheet_level, wall
+    from study.case.margin import surely_below
+    from study.scene import parse_scene
+
+    scene = parse_scene(SPHERE)
+    on = 1.0 + ulp
+    assert not surely_below(on, 1.0)
+    monkeypatch.setattr(sheet_level, "_compliance", lambda gripper: sheet_level.STIFF * on)
+    assert sheet_level.sheet_level(scene).elastic
+    monkeypatch.setattr(coupling_level, "neglected_traction", lambda state, mu: coupling_level.SMALL * on)
+    reason = coupling_level.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
+    assert coupling_level.REASONS[reason].startswith("left out")
+    monkeypatch.setattr(pad_level, "departure", lambda law, strain: pad_level.NEARLY_LINEAR * on)
+    monkeypatch.setattr(pad_level.model, "usable_symmetry", lambda *_: (True, True))
+    bed = SimpleNamespace(travel=lambda force: 1e-3)
+    monkeypatch.setattr(pad_level, "SpringBed", lambda *_: bed)
+    assert not pad_level.choose_pad_level(scene, [SimpleNamespace(gap=None)]).linear
+    monkeypatch.setattr(wall, "thin_body", lambda shape: None)
+    for dent, ratio, level in (
+        (wall.STIFF * on, 0.1, wall.LINEAR),
+        (1.0, wall.SMALL_DENT * on, wall.NONLINEAR),
+        (0.5 * wall.STIFF, 0.1, wall.RIGID),
+    ):
+        monkeypatch.setattr(wall, "estimated_dent", lambda *_, found=(dent, ratio): found)
+        assert wall.choose_level(scene, None, 1.0).number == level
+
+
+# --- flags ------------------------------------------------------------------------------------------------------------
+
+
+def facing(turn, lean, distance=0.06, free=0.0):
+    """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
+    made = []
+    for side, angle in ((1.0, lean), (-1.0, np.pi)):
+        R = (turn * Rotation.from_rotvec([0.0, angle, 0.0])).as_matrix()
+        origin = turn.apply([0.0, 0.0, -0.5 * side * distance])
+        pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
+        made.append(SimpleNamespace(
+            normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
+            frame=SimpleNamespace(flag=0), finger=SimpleNamespace(pose=pose),
+            state=SimpleNamespace(checks=SimpleNamespace(acoustic=1.0)),
+        ))  # fmt: skip
+    return made
+
+
+@tries
+@given(seeds)
+def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
+    """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
+    from study.case.contact import ANTIPODAL, NOT_ANTIPODAL, PADS_MEET, flags
+
+    turn = Rotation.random(random_state=seed)
+    assert flags(facing(turn, 0.0), 0.0, 0) == 0
+    assert flags(facing(turn, ANTIPODAL), 1.0, 0) == NOT_ANTIPODAL
+    assert flags(facing(turn, 0.0, 0.06, 0.03), 1.0, 0) == PADS_MEET
+    assert flags(facing(turn, 0.0, 0.06, 0.0299), 1.0, 0) == 0
+
+
+@tries
+@given(seeds)
+def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
+    """Without friction the force on a straight wall's support is rounding; a newton is not."""
+    from study.case import wall
+
+    random = np.random.default_rng(seed)
+    scene = SimpleNamespace(friction=SimpleNamespace(mu=0.0), object=None)
+    body = SimpleNamespace(material=SimpleNamespace(yield_strength=5e7))
+    state = SimpleNamespace(wall=SimpleNamespace(snapped=False), force=10.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wall, "thin_body", lambda shape: body)
+        values = {"maps/support_force": abs(random.normal(0.0, 1e-12)), "maps/wall_stress": moved([5e7], seed)[0]}
+        assert wall.wall_flags(scene, state, values) == wall.YIELDS
+        values = {"maps/support_force": 1.0, "maps/wall_stress": 4e7}
+        assert wall.wall_flags(scene, state, values) == wall.SLIDES_OUT
+
+
+# --- look-ups and probes ----------------------------------------------------------------------------------------------
+
+
+@tries
+@given(st.floats(-3.0, 3.0), seeds)
+def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
+    """The gap that closes it is just as wide as is allowed."""
+    from study.lookup.interpolation import WIDER, circle
+
+    step = math.pi / (1 + WIDER)
+    angles = np.array([first, first + step])
+    assert len(circle("angle", "rad", moved(angles, seed), math.pi, True).x) == 3
+    assert len(circle("angle", "rad", [first, first + 0.99 * step], math.pi, True).x) == 2
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
+def test_equal_places_give_the_first_ones_as_probes(shift):
+    """Pads all along a cylinder touch it alike, but for rounding."""
+    from study.case.sweep import units
+    from study.cost.probes import demanding, spread
+    from study.scene import parse_scene
+
+    text = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 400
+[candidates]
+stations_mm = {}
+angles_deg = [0]
+[load]
+normal_force_n = [1, 5]
+"""
+    stations = [shift + 7.0 * i for i in range(-6, 7)]
+    own = units(parse_scene(text.format(stations)), lambda point: point.axis_symmetry)
+    assert [unit.index for unit in spread(own, 3)] == [2, 6, 10]
+    assert [unit.index for unit in demanding(own)] == [0, 2]
