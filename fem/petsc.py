@@ -22,6 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.blas_buffers import take_buffers
 from fem.errors import ConvergenceError
 from fem.pattern import Pattern, add_up
 
@@ -47,6 +48,16 @@ import petsc4py  # noqa: E402  (only importable once the path is known)
 petsc4py.init(["softjaw", "-skip_petscrc", "-no_signal_handler"])
 from petsc4py import PETSc  # noqa: E402  (after init, as petsc4py requires)
 
+
+def _dense_factors() -> None:
+    """Factors of a small dense matrix, by PETSc's LAPACK."""
+    matrix = PETSc.Mat().createDense((2, 2), array=np.eye(2), comm=PETSc.COMM_SELF)
+    matrix.assemble()
+    matrix.factorLU(*matrix.getOrdering("natural"))
+    matrix.destroy()
+
+
+take_buffers(_dense_factors)
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 
