@@ -26,6 +26,7 @@ from fem.pad import Pad
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+NO_DIRECTIONS = np.empty((0, 3))
 
 
 @dataclass
@@ -182,6 +183,43 @@ class ContactProblem:
             own[0] = self.travel_stiffness
         return self._values
 
+    def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
+        """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
+
+        ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
+        force does not grow with the travel, or a tangent under travel control cannot tell.
+        """
+        load = np.zeros(self.size)
+        load[self.pad.travel_dof] = 1.0
+        found = answer(load)
+        if not found[self.pad.travel_dof] > 0.0:
+            return None
+        if self._by_force:
+            return self.pad.share * found
+        along = found / found[self.pad.travel_dof]
+        h = 1e-6 * self.pad.shape.size[2]
+        rise = (self.sheet_force(x + h * along) - self.sheet_force(x - h * along)) / (2.0 * h)
+        return along / rise if rise > 0.0 else None
+
+    def symmetric_tangent(self, x: FloatArray) -> tuple[FloatArray, int]:
+        """Entries of the symmetric tangent under force control, and the number of nodes in contact.
+
+        It is that of ``R_u`` with the rows ``-kappa G_i`` of these nodes, whose pressures are the multipliers; those of
+        the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
+        """
+        before = self.control, self._held, self._by_force  # the latter two tell of the factors at hand
+        self.control = Control(force=1.0)
+        entries, held = self.tangent(x), self._held
+        self.control, self._held, self._by_force = before
+        _, _, by_pressure, by_displacement, _ = self._parts()
+        by_displacement *= -1.0
+        by_pressure[~np.repeat(held[self._face_pressures], by_pressure.size // self._face_pressures.size)] = 0.0
+        return entries, int(np.count_nonzero(held))
+
+    def largest_strain(self, x: FloatArray) -> float:
+        """Largest principal strain of the foam."""
+        return self.foam.strains(x, NO_DIRECTIONS)[1]
+
     def keep(self, x: FloatArray, first: bool) -> bool:
         """Whether the last tangent may serve once more (see ``fem.petsc.Problem``).
 
@@ -213,6 +251,11 @@ class ContactProblem:
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
         return self.foam.sheet_force(x)
+
+    @property
+    def travel_dof(self) -> int:
+        """Number of the unknown that is the sheet's travel; before it come the displacements."""
+        return self.pad.travel_dof
 
     def travel(self, x: FloatArray) -> float:
         """Travel of the sheet [m]."""

@@ -91,6 +91,7 @@ class Stepping:
     floor: float = 0.0
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
+    jumped: bool = False  # whether a step is known to have left the path of equilibria
 
     def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
