@@ -79,6 +79,7 @@ class ContactProblem:
         self.kappa = pad.modulus_per_thickness
         self.area = pad.node_area
         self.travel_stiffness = self.kappa * self.area.sum()
+        self._by_force: bool | None = None  # whether the last tangent was that under force control
         self.travel_step = 0.1 * pad.shape.size[2]  # longest change of travel in one iteration
         self._pressures = slice(pad.travel_dof + 1, pad.size)
         self._allocate()
@@ -189,6 +190,8 @@ class ContactProblem:
         ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
         force does not grow with the travel, or a tangent under travel control cannot tell.
         """
+        if self._by_force is None:  # nothing has been factorised yet
+            return None
         load = np.zeros(self.size)
         load[self.pad.travel_dof] = 1.0
         found = answer(load)

@@ -1,9 +1,10 @@
 """Press a pad on an object along a ladder of normal forces, each force started from the one before.
 
-A force that Newton does not reach in one step is approached by halves. Where that fails and a fallback pad with nodal
-gaps is given, the ladder goes on with that one (weighted gaps couple neighbouring pressures, and a pad's rim on a
-steep slope can make their active set cycle for ever); else the sheet is walked by its travel until the force is
-bracketed. Every state that is passed on has converged and has been checked.
+A force that Newton does not reach in one step is approached by halves. Where that fails, or the pad jumps, and a
+fallback pad with nodal gaps is given, the ladder goes on with that one, from first contact (weighted gaps couple
+neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever); where that
+fails too, or there is none, the sheet is walked by its travel until the force is bracketed. Every state that is passed
+on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -156,8 +157,7 @@ class Press:
             except ConvergenceError:
                 if self.fallback is None:
                     raise
-                self._fall_back()
-                x = self._climb(x, reached, force, work)
+                x = self._other_way(force, work)
             if below is not None:
                 refuse_fall((reached, self.problem.travel(below)), (force, self.problem.travel(x)))
             reached = force
@@ -169,13 +169,27 @@ class Press:
                 self._stepping.jumped,
             )  # fmt: skip
 
-    def _fall_back(self) -> None:
-        """Go on with the fallback pad; its unknowns are numbered alike."""
-        seconds, jumped = self.solver.seconds, self._stepping.jumped
+    def _other_way(self, force: float, work: Work) -> FloatArray:
+        """State at ``force`` of the fallback pad, else of the pad itself beyond a jump; both from first contact on.
+
+        All forces that follow keep to the pad that was found to serve.
+        """
+        pads, self.fallback, errors = (self.fallback, self.pad), None, []
+        for pad in pads:
+            self._change(pad)
+            try:
+                return self._climb(None, 0.0, force, work)
+            except ConvergenceError as error:
+                errors.append(error)
+        raise errors[0]
+
+    def _change(self, pad: Pad) -> None:
+        """Go on with another pad."""
+        seconds = self.solver.seconds
         self.solver.destroy()
-        self.pad, self.fallback = self.fallback, None
+        self.pad = pad
         self._set_up()
-        self.solver.seconds, self._stepping.jumped = seconds, jumped
+        self.solver.seconds = seconds
 
     def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
         """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""

@@ -28,9 +28,10 @@ FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, be
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 FRAME_FLAGS = 4  # factor that puts the frame's flags above the score's
 NOT_ANTIPODAL, NODAL_INSTEAD, SLIPS, PADS_MEET, COARSE = (256 << k for k in range(5))  # as in storage.quantities
-UNSTABLE = 131072
+UNSTABLE, PATH = 131072, 262144
 REMARKS = {  # the most important ones first: a stored message has an end
     UNSTABLE: "foam lost ellipticity, strains may localise",
+    PATH: "the pad jumped on the way to this force, the state depends on the load path",
     SLIPS: "the line between the contacts leaves a friction cone, the grasp slips",
     NOT_ANTIPODAL: "contacts more than 5 deg from antipodal",
     PADS_MEET: "the pads run into each other beside the object, which is not simulated",
@@ -134,6 +135,7 @@ def flags(contacts: Sequence[Contact], mu: float, score_flag: int) -> int:
     found |= SLIPS * (np.tan(min(line, 1.57)) > mu + 1e-9)
     found |= PADS_MEET * (one.free_front + two.free_front > between_fronts)
     found |= UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
+    found |= PATH * any(c.state.path_dependent for c in contacts)
     for c in contacts:
         found |= FRAME_FLAGS * int(c.frame.flag) | NODAL_INSTEAD * c.nodal_instead | COARSE * c.coarse
     return int(found)

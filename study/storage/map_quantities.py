@@ -150,7 +150,8 @@ MAPS = (
         " on average; 16384 the pads push the object along its axis with more than friction can hold: it slides"
         " out; 32768 the wall's stress is above its yield strength: the dent stays; 65536 a limit surface could not"
         " be fitted, the ellipsoid from three motions stands in; 131072 the foam lost ellipticity: strains may"
-        " localise.",
+        " localise; 262144 the pad jumped on the way to this force, because its path of equilibria ends, folds or forks"
+        " there: the state depends on the load path.",
     ),
     *(
         Quantity(

@@ -32,6 +32,7 @@ FLAGS = (  # as study.storage.quantities defines them
     (16384, "slides out", "the pads push the object along its axis with more than friction can hold"),
     (32768, "yields", "the wall's stress is above its yield strength: the dent stays"),
     (65536, "no fit", "a limit surface could not be fitted: the ellipsoid from three motions stands in"),
+    (262144, "jumped", "the pad jumped on the way to this force: the state depends on the load path"),
     (TOO_WEAK, "too weak", "this force does not hold the object's weight"),
     (TOO_STRONG, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"),
 )

@@ -14,7 +14,7 @@ import pytest
 from study import pipeline
 from study.case import solving
 from study.case.build import build_object
-from study.case.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, SLIPS
+from study.case.contact import COARSE, NOT_ANTIPODAL, PADS_MEET, PATH, SLIPS
 from study.case.sweep import units
 from study.environment import launch_environment
 from study.scene import parse_scene
@@ -406,3 +406,12 @@ def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
         of_stub, of_flat, of_endless = (values[f"maps/{name}"][CURVED] for values in (stub, flat, endless))
         assert of_stub < most * of_endless
         assert of_stub < of_flat
+
+
+def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):
+    jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
+    monkeypatch.setattr("fem.following.Following._leaves", jumps)
+    found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
+    for _, ladder in found:
+        assert [bool(int(result.values["maps/flags"]) & PATH) for result in ladder] == [False, True, True]
+        assert [("depends on the load path" in result.message) for result in ladder] == [False, True, True]

@@ -69,6 +69,7 @@ def test_every_flag_has_a_word_of_its_own():
         (contact.SLIPS, "slips"),
         (contact.PADS_MEET, "overlap"),
         (contact.COARSE, "coarse"),
+        (contact.PATH, "jumped"),
     ],
 )
 def test_flags_are_words_with_a_legend(bit, word):
