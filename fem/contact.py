@@ -26,7 +26,18 @@ from fem.pad import Pad
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+IDLE = 1e-9  # of the largest pressure: a node that bears less is taken as idle
 NO_DIRECTIONS = np.empty((0, 3))
+
+
+def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
+    """Nodal pressures ``(n,)`` [Pa] without what is none: of idle nodes, and what rounding leaves of active ones.
+
+    Whether a node below `IDLE` of the largest pressure bears anything is not decided by the solve, whose tolerance is
+    about as large. Tension is kept, for the checks to see.
+    """
+    some = active & (pressure > IDLE * pressure.max(initial=0.0))
+    return np.where(some, pressure, np.minimum(pressure, 0.0))
 
 
 @dataclass
@@ -267,8 +278,6 @@ class ContactProblem:
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)
-        pressure = self.kappa * x[self._pressures]
-        # rounding leaves an idle node up to 1e-16 of what it bore: that is no contact; tension is for the checks to see
-        pressure = np.where(self._active(x, weighted_gap), pressure, np.minimum(pressure, 0.0))
+        pressure = borne(self.kappa * x[self._pressures], self._active(x, weighted_gap))
         load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
         return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, self._gap, load)

@@ -21,7 +21,7 @@ import numpy as np
 
 from fem.contact import Control
 from fem.errors import ConvergenceError
-from fem.stepping import FloatArray, State, Stepping, Work
+from fem.stepping import FloatArray, State, Stepping, Work, falls
 
 LONGEST = 0.2  # foretold travel of one step
 STRAY = 0.1  # distance of a node or the sheet from where it was foretold; good steps of practice keep to 0.06
@@ -146,5 +146,5 @@ class Following(Stepping):
         """State at ``force`` by way of the travel; the force may fall on the way, which it does beyond a limit."""
         forces = [here.force]
         x = self.walk(here.x, force, work, STRAY * self.thickness, forces)
-        self.jumped |= bool((np.diff(forces) < 0.0).any())
+        self.jumped |= falls(forces)
         return x
