@@ -26,6 +26,18 @@ from fem.pad import Pad
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+IDLE = 1e-9  # of the largest pressure: a node that bears less is taken as idle
+NO_DIRECTIONS = np.empty((0, 3))
+
+
+def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
+    """Nodal pressures ``(n,)`` [Pa] without what is none: of idle nodes, and what rounding leaves of active ones.
+
+    Whether a node below `IDLE` of the largest pressure bears anything is not decided by the solve, whose tolerance is
+    about as large. Tension is kept, for the checks to see.
+    """
+    some = active & (pressure > IDLE * pressure.max(initial=0.0))
+    return np.where(some, pressure, np.minimum(pressure, 0.0))
 
 
 @dataclass
@@ -78,6 +90,7 @@ class ContactProblem:
         self.kappa = pad.modulus_per_thickness
         self.area = pad.node_area
         self.travel_stiffness = self.kappa * self.area.sum()
+        self._by_force: bool | None = None  # whether the last tangent was that under force control
         self.travel_step = 0.1 * pad.shape.size[2]  # longest change of travel in one iteration
         self._pressures = slice(pad.travel_dof + 1, pad.size)
         self._allocate()
@@ -182,6 +195,45 @@ class ContactProblem:
             own[0] = self.travel_stiffness
         return self._values
 
+    def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
+        """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
+
+        ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
+        force does not grow with the travel, or a tangent under travel control cannot tell.
+        """
+        if self._by_force is None:  # nothing has been factorised yet
+            return None
+        load = np.zeros(self.size)
+        load[self.pad.travel_dof] = 1.0
+        found = answer(load)
+        if not found[self.pad.travel_dof] > 0.0:
+            return None
+        if self._by_force:
+            return self.pad.share * found
+        along = found / found[self.pad.travel_dof]
+        h = 1e-6 * self.pad.shape.size[2]
+        rise = (self.sheet_force(x + h * along) - self.sheet_force(x - h * along)) / (2.0 * h)
+        return along / rise if rise > 0.0 else None
+
+    def symmetric_tangent(self, x: FloatArray) -> tuple[FloatArray, int]:
+        """Entries of the symmetric tangent under force control, and the number of nodes in contact.
+
+        It is that of ``R_u`` with the rows ``-kappa G_i`` of these nodes, whose pressures are the multipliers; those of
+        the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
+        """
+        before = self.control, self._held, self._by_force  # the latter two tell of the factors at hand
+        self.control = Control(force=1.0)
+        entries, held = self.tangent(x), self._held
+        self.control, self._held, self._by_force = before
+        _, _, by_pressure, by_displacement, _ = self._parts()
+        by_displacement *= -1.0
+        by_pressure[~np.repeat(held[self._face_pressures], by_pressure.size // self._face_pressures.size)] = 0.0
+        return entries, int(np.count_nonzero(held))
+
+    def largest_strain(self, x: FloatArray) -> float:
+        """Largest principal strain of the foam."""
+        return self.foam.strains(x, NO_DIRECTIONS)[1]
+
     def keep(self, x: FloatArray, first: bool) -> bool:
         """Whether the last tangent may serve once more (see ``fem.petsc.Problem``).
 
@@ -214,6 +266,11 @@ class ContactProblem:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
         return self.foam.sheet_force(x)
 
+    @property
+    def travel_dof(self) -> int:
+        """Number of the unknown that is the sheet's travel; before it come the displacements."""
+        return self.pad.travel_dof
+
     def travel(self, x: FloatArray) -> float:
         """Travel of the sheet [m]."""
         return float(x[self.pad.travel_dof])
@@ -221,8 +278,6 @@ class ContactProblem:
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)
-        pressure = self.kappa * x[self._pressures]
-        # rounding leaves an idle node up to 1e-16 of what it bore: that is no contact; tension is for the checks to see
-        pressure = np.where(self._active(x, weighted_gap), pressure, np.minimum(pressure, 0.0))
+        pressure = borne(self.kappa * x[self._pressures], self._active(x, weighted_gap))
         load = self.pad.face_area * (pressure[self._face_pressures] @ self.pad.face_N.T)
         return pressure, weighted_gap / self.area, ContactPoints(self._points, self._normal, self._gap, load)

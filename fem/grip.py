@@ -23,7 +23,7 @@ from fem.petsc import NonlinearSolver, Seconds
 from fem.pose import FloatArray
 from fem.press import Pressed, pressed, since
 from fem.spring_bed import SpringBed
-from fem.stepping import Settings, Stepping, Work
+from fem.stepping import Settings, Stepping, Work, falls
 
 LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
@@ -192,7 +192,7 @@ class Grip:
             pass
         forces: list[float] = []
         ahead = self._stepping.walk(x, force, work, LONGEST_STEP, forces)
-        return ahead, bool((np.diff([reached, *forces]) < 0).any())
+        return ahead, falls([reached, *forces])
 
     def _watch(self, x: FloatArray, force: float) -> None:
         self.opening.watch(self.problem.wall_state(x), force)

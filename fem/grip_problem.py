@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.contact import ContactPoints, Control
+from fem.contact import ContactPoints, Control, borne
 from fem.facing import FAR, Facing, Wall, face
 from fem.foam import Foam, gather
 from fem.pad import Pad
@@ -293,7 +293,7 @@ class GripProblem:
         own, _ = f.points(x)
         normal = np.where(c.facing.gap[:, None] < FAR, c.facing.normal @ f.R, [0.0, 0.0, -1.0]).reshape(own.shape)
         gap = c.facing.gap.reshape(own.shape[:2])
-        pressure = np.where(c.active, f.pressure(x), np.minimum(f.pressure(x), 0.0))  # as in `fem.contact`
+        pressure = borne(f.pressure(x), c.active)
         load = np.where(gap < FAR, f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T), 0.0)
         return pressure, c.weighted / f.pad.node_area, ContactPoints(own, normal, gap, load)
 

@@ -29,7 +29,7 @@ from fem.linear_pad import CondensedPad
 from fem.pad import Pad
 from fem.petsc import Seconds
 from fem.press import Press
-from fem.stepping import Settings
+from fem.stepping import Settings, Stepping
 
 FloatArray = NDArray[np.float64]
 MOST = 25  # iterations
@@ -44,7 +44,7 @@ def linear_press(pad: CondensedPad, gap: Gap, fallback: Pad | None = None, setti
     def solver(problem: ContactProblem, _options: dict[str, Any]) -> FrontSolver:
         return FrontSolver(problem, pad)
 
-    return Press(pad.pad, gap, {}, fallback, settings or Settings(), solver)
+    return Press(pad.pad, gap, {}, fallback, settings or Settings(), solver, stepping=Stepping)
 
 
 @dataclass(frozen=True)

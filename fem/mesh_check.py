@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from fem.crossing import crossing_pairs
 from fem.file_limits import MOST_TRIANGLES
@@ -16,6 +19,10 @@ MOST_PIECES = 50
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 TOLERATED_CROSSINGS = 1e-3  # share of crossing triangle pairs that is a scan's blemish, not a wrong shape
 DEBRIS = 0.02  # loose pieces below this share of the object's diagonal are dropped
+ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
+FLAT = 1e-6  # volume of a piece over its area and size, below which it has no inside
+SURE = 1e-3  # winding numbers this close to 0 and 1 are those of points outside and inside; others lie on the surface
+MOST_ASKED = 100  # corners of a piece that are asked whether they lie in another
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
 
@@ -29,7 +36,8 @@ def sound_mesh(
     """Mesh in metres, points merged, closed, oriented outwards, and notes on what was repaired or tolerated.
 
     Repaired: doubled points, collapsed triangles, orientation, specks of debris, shells inside the object. Tolerated: a
-    few crossing triangles. Refused: all else that leaves inside and outside undefined.
+    few crossing triangles. Refused: all else that leaves inside and outside undefined, also where they are undecided:
+    pieces without volume, and pieces whose corners all lie on another one.
 
     Parameters
     ----------
@@ -50,6 +58,8 @@ def sound_mesh(
         raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     _check_numbers(points, triangles)
     points, triangles, notes = _merged(points, triangles)
+    if not _every_edge_twice(triangles):  # corners that rounding moved apart are only looked for where there is need
+        points, triangles, notes = _merged(_snapped(points), triangles, notes)
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
     neighbours = _closed(triangles)
@@ -87,7 +97,7 @@ def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
 def _check_size(extent: float, unit: str) -> None:
     """Refuse an ``extent``, in the file's own numbers, that makes no plausible object in this unit."""
     size = extent * UNITS[unit]
-    if SMALLEST <= size <= LARGEST:
+    if (1 - ROUNDED) * SMALLEST <= size <= (1 + ROUNDED) * LARGEST:
         return
     fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
     advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
@@ -95,13 +105,28 @@ def _check_size(extent: float, unit: str) -> None:
                     f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
 
 
-def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
-    """Equal points as one, unused ones left out, triangles that collapse dropped."""
+def _every_edge_twice(triangles: IntArray) -> bool:
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
+
+
+def _snapped(points: FloatArray) -> FloatArray:
+    """Points within rounding of each other moved to the first of them."""
+    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+    links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
+    group = connected_components(links, directed=False)[1]
+    return points[np.unique(group, return_index=True)[1]][group]
+
+
+def _merged(
+    points: FloatArray, triangles: IntArray, notes: Sequence[str] = ()
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """Equal points as one, unused ones left out, triangles that collapse dropped; adds to the notes."""
     used, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
     a, b, c = triangles.T
     whole = (a != b) & (b != c) & (c != a)
-    notes = [] if whole.all() else [f"dropped {np.sum(~whole)} triangles without area"]
+    notes = [*notes, *([] if whole.all() else [f"dropped {np.sum(~whole)} triangles without area"])]
     if not whole.any():
         raise MeshError("the mesh is empty: all its triangles have collapsed to lines or points")
     return used, triangles[whole], notes
@@ -136,10 +161,28 @@ def _oriented(
     flip = label[:n] > label[n:]
     triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
     piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
-    inverted = np.bincount(piece, _volumes(points, triangles)) < 0
+    volume = np.bincount(piece, _volumes(points, triangles))
+    _refuse_flat(points, triangles, piece, volume)
+    inverted = volume < 0
     triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
     turned = int(np.sum(flip != inverted[piece]))
     return np.ascontiguousarray(triangles), [f"turned {turned} of {n} triangles outwards"] if turned else []
+
+
+def _refuse_flat(points: FloatArray, triangles: IntArray, piece: IntArray, volume: FloatArray) -> None:
+    """Refuse pieces, specks aside, that enclose nothing: which of their sides is the outer one is not decided."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    area = np.bincount(piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+    low, high = np.full((2, len(area), 3), np.inf)
+    np.minimum.at(low, piece, points[triangles].min(axis=1))
+    np.minimum.at(high, piece, -points[triangles].max(axis=1))
+    size = np.linalg.norm(-high - low, axis=1)
+    flat = (np.abs(volume) <= FLAT * area * size) & (size >= DEBRIS * size.max())
+    if flat.any():
+        raise MeshError(
+            f"a piece of the mesh, {size[flat][0]:.4g} m large, encloses no volume: its two sides lie on each other; "
+            "give the object as a solid"
+        )
 
 
 def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
@@ -161,7 +204,7 @@ def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
     size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
     speck = size < DEBRIS * size.max()
     inner = np.array([
-        any(winding_number(points[pieces[k][0, 0]], points, pieces[m]) > 0.5 for m in np.flatnonzero(~speck) if m != k)
+        any(_lies_inside(points, pieces[k], pieces[m]) for m in np.flatnonzero(~speck) if m != k)
         for k in range(count)
     ])
     keep = ~speck & ~inner
@@ -172,6 +215,18 @@ def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
     notes = [f"dropped {number} {kind}" for number, kind in
              ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object")) if number]
     return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
+
+
+def _lies_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
+    """Whether a piece lies inside another, by the first of its corners that does not lie on the other."""
+    corners = np.unique(piece)
+    for corner in corners[:: 1 + len(corners) // MOST_ASKED]:
+        if abs((turns := winding_number(points[corner], points, other)) - 0.5) > 0.5 - SURE:
+            return turns > 0.5
+    raise MeshError(
+        "two pieces of the mesh lie on each other: all corners of one are on the other; unite them into one surface, "
+        "or leave one out"
+    )
 
 
 def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:

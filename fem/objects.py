@@ -92,22 +92,67 @@ class Sphere(Analytic):
 
 @dataclass(frozen=True)
 class EllipticCylinder(Analytic):
-    """Cylinder about z with semi-axes ``a`` along x and ``b`` along y; ``length`` is drawn, the gap has no ends."""
+    """Cylinder about z with semi-axes ``a`` along x and ``b`` along y, ``length`` long from cap to cap.
+
+    Flat caps meet the wall in a rounded edge, which is a tube round the curve that runs parallel to the ellipse inside
+    it: all distances are exact, outside and inside. The curvature jumps where wall and cap meet the edge.
+
+    Parameters
+    ----------
+    a, b, length : float
+        [m]
+    rim : float
+        Radius of the rounding [m]; at most half the ellipse's smallest radius of curvature and a quarter of the length
+        are taken.
+    """
 
     a: float
     b: float
     length: float
+    rim: float = 0.002
 
     def __post_init__(self) -> None:
         """Refuse a cylinder without extent."""
-        _positive(a=self.a, b=self.b, length=self.length)
+        _positive(a=self.a, b=self.b, length=self.length, rim=self.rim)
+
+    @property
+    def edge_radius(self) -> float:
+        """Radius of the rounding at both ends [m]."""
+        return min(self.rim, 0.5 * min(self.a, self.b) ** 2 / max(self.a, self.b), 0.25 * self.length)
+
+    @property
+    def _wall(self) -> float:
+        """Half the length of the straight wall [m]."""
+        return 0.5 * self.length - self.edge_radius
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         from fem.closest import ellipse_gap  # with numba, which a scene that is only checked does not need
 
-        g, n, H = ellipse_gap(np.asarray(x, dtype=float), float(self.a), float(self.b))
-        return g, *in_plane(x, n, H)
+        x = np.asarray(x, dtype=float)
+        g, n, H = ellipse_gap(x, float(self.a), float(self.b))
+        normal, hessian = in_plane(x, n, H)
+        beyond = np.abs(x[:, 2]) - self._wall
+        wall = (beyond <= 0) & (g >= beyond - self.edge_radius)  # no farther than the cap, for points inside
+        if not wall.all():
+            self._add_ends(~wall, x, beyond, g, normal, hessian)
+        return g, normal, hessian
+
+    def _add_ends(
+        self, pick: FloatArray, x: FloatArray, beyond: FloatArray, g: FloatArray, normal: FloatArray,
+        hessian: FloatArray,
+    ) -> None:  # fmt: skip
+        """Put the distances to caps and edges in place of those to the wall, for the points ``pick``."""
+        r, up = self.edge_radius, np.zeros((pick.sum(), 3))
+        up[:, 2] = np.where(x[pick, 2] < 0, -1.0, 1.0)
+        q = np.stack([g[pick] + r, beyond[pick]], axis=1)  # from the middle of the tube, outwards and up
+        tube = (q > 0).all(axis=1)[:, None, None]
+        distance, e, H = radial(q)
+        directions = np.stack([normal[pick], up], axis=1)
+        bent = e[:, :1, None] * hessian[pick] + np.einsum("nia,nij,njb->nab", directions, H, directions)
+        g[pick] = np.where(tube[:, 0, 0], distance, q[:, 1]) - r
+        normal[pick] = np.where(tube[:, 0], np.einsum("ni,nia->na", e, directions), up)
+        hessian[pick] = np.where(tube, bent, 0.0)
 
     @property
     def bounds(self) -> FloatArray:
@@ -121,12 +166,17 @@ class EllipticCylinder(Analytic):
         return 0 if self.a == self.b else 2
 
     def surface(self) -> Surface:
-        """Points and triangles of the wall."""
-        z, t = np.meshgrid(
-            np.linspace(-0.5, 0.5, 25) * self.length, np.linspace(0, 2 * np.pi, 96, endpoint=False), indexing="ij"
-        )
-        points = np.stack([self.a * np.cos(t), self.b * np.sin(t), z], axis=-1).reshape(-1, 3)
-        return points, grid_triangles(25, 96, closed=True)
+        """Points and triangles: ellipses along the wall, the curves parallel to them on the edges, and the caps."""
+        phi, r = np.linspace(0.0, np.pi / 2, 7), self.edge_radius
+        t = np.linspace(0, 2 * np.pi, 96, endpoint=False)
+        ellipse = np.stack([self.a * np.cos(t), self.b * np.sin(t)], axis=-1)
+        normal = np.stack([self.b * np.cos(t), self.a * np.sin(t)], axis=-1)
+        normal *= r / np.linalg.norm(normal, axis=1)[:, None]
+        ends = [np.insert(ellipse - (1 - np.cos(p)) * normal, 2, self._wall + r * np.sin(p), axis=1) for p in phi]
+        top = np.stack([*ends[1:], np.broadcast_to([0.0, 0.0, self.length / 2], (96, 3))])
+        wall = [np.insert(ellipse, 2, z, axis=1) for z in np.linspace(-1.0, 1.0, 25) * self._wall]
+        points = np.concatenate([top[::-1] * [1, 1, -1], wall, top])
+        return points.reshape(-1, 3), grid_triangles(len(points), 96, closed=True)
 
 
 @dataclass(frozen=True, eq=False)

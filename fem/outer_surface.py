@@ -22,6 +22,8 @@ from fem.pose import FloatArray
 from fem.profile import Curve, through
 from fem.revolution import Revolution
 
+AT_LINE = 1e-12  # heights this close to a sample of the outline are at it [m]
+
 
 @dataclass(frozen=True)
 class Section:
@@ -118,7 +120,7 @@ class OuterSurface:
         """
         s = np.linspace(*self.wall, 2001)
         off = self.curve.derivative(s)[:, 0] - z
-        off[np.abs(off) < 1e-12] = 0.0
+        off[np.abs(off) < AT_LINE] = 0.0
         crossing = np.flatnonzero((off[:-1] <= 0) & (off[1:] >= 0))
         if not len(crossing):
             raise ValueError(

@@ -158,10 +158,17 @@ class Pad:
 
 def _as_grid(nodes: FloatArray, chosen: NDArray[np.bool_], tol: float) -> tuple[IntArray, tuple[int, int]]:
     """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
-    # nodes inside elements carry rounding errors that would mix up the rows
-    column, row = np.round(nodes[chosen, 0] / tol), np.round(nodes[chosen, 1] / tol)
+    column, row = (_lines(nodes[chosen, axis], tol) for axis in (0, 1))
     order = np.lexsort((row, column))
-    return np.flatnonzero(chosen)[order].astype(np.int32), (len(np.unique(column)), len(np.unique(row)))
+    return np.flatnonzero(chosen)[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
+
+
+def _lines(x: FloatArray, tol: float) -> IntArray:
+    """Number ``(n,)`` of the mesh line of every coordinate; nodes inside elements are off it by rounding."""
+    order = np.argsort(x)
+    number = np.empty(len(x), dtype=np.int32)
+    number[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > tol)])
+    return number
 
 
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.blas_buffers import take_buffers
 from fem.errors import ConvergenceError
 from fem.pattern import Pattern, add_up
 
@@ -47,6 +48,16 @@ import petsc4py  # noqa: E402  (only importable once the path is known)
 petsc4py.init(["softjaw", "-skip_petscrc", "-no_signal_handler"])
 from petsc4py import PETSc  # noqa: E402  (after init, as petsc4py requires)
 
+
+def _dense_factors() -> None:
+    """Factors of a small dense matrix, by PETSc's LAPACK."""
+    matrix = PETSc.Mat().createDense((2, 2), array=np.eye(2), comm=PETSc.COMM_SELF)
+    matrix.assemble()
+    matrix.factorLU(*matrix.getOrdering("natural"))
+    matrix.destroy()
+
+
+take_buffers(_dense_factors)
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 
@@ -223,6 +234,32 @@ class NonlinearSolver:
         factors = self._snes.getKSP().getPC()
         return factors.getFactorSolverType() == "mumps" and factors.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY
 
+    def is_at(self, x: FloatArray) -> bool:
+        """Whether the last solve ended at ``x``, so that the factors at hand are those of a tangent close to it."""
+        return self._end is not None and np.array_equal(x, self._end)
+
+    def negative_eigenvalues(self, entries: FloatArray) -> int:
+        """Their number for the symmetric matrix of ``entries`` in the tangent's order: negative pivots of LDL^T.
+
+        An eigenvalue within rounding of zero may count as either; all of them count where MUMPS gives up.
+        """
+        values = np.zeros_like(self._pattern.values)
+        add_up(self._slots, entries, values)
+        matrix = PETSc.Mat().createAIJ(
+            self._matrix.size, csr=(self._pattern.start, self._pattern.column, values), comm=PETSc.COMM_SELF
+        )
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        factors = PETSc.PC().create(PETSc.COMM_SELF)
+        factors.setType("cholesky")
+        factors.setFactorSolverType("mumps")
+        factors.setOperators(matrix)
+        factors.setUp()
+        factor = factors.getFactorMatrix()
+        negative = factor.getMumpsInfog(12) if factor.getMumpsInfog(1) == 0 else self.problem.size
+        factors.destroy()
+        matrix.destroy()
+        return negative
+
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
         b, y = self._f.duplicate(), self._f.duplicate()
@@ -269,7 +306,7 @@ class NonlinearSolver:
         if keep is None or self.problem.complementarity:
             return False
         if len(norms) == 1:
-            return self._end is not None and np.array_equal(x, self._end) and keep(x, True)
+            return self.is_at(x) and keep(x, True)
         if not self.thrifty or len(norms) > self._limit - RESERVED:
             return False
         return norms[-1] <= min(FAST * norms[-2], NEAR * self._goal) and keep(x, False)

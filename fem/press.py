@@ -1,9 +1,10 @@
 """Press a pad on an object along a ladder of normal forces, each force started from the one before.
 
-A force that Newton does not reach in one step is approached by halves. Where that fails and a fallback pad with nodal
-gaps is given, the ladder goes on with that one (weighted gaps couple neighbouring pressures, and a pad's rim on a
-steep slope can make their active set cycle for ever); else the sheet is walked by its travel until the force is
-bracketed. Every state that is passed on has converged and has been checked.
+A force that Newton does not reach in one step is approached by halves. Where that fails, or the pad jumps, and a
+fallback pad with nodal gaps is given, the ladder goes on with that one, from first contact (weighted gaps couple
+neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever); where that
+fails too, or there is none, the sheet is walked by its travel until the force is bracketed. Every state that is passed
+on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from fem.checks import Checks, check
 from fem.contact import ContactPoints, ContactProblem, Control, Gap
 from fem.errors import ConvergenceError
 from fem.foam import Foam
+from fem.following import Following
 from fem.pad import Pad
 from fem.petsc import NonlinearSolver, Seconds
 from fem.reasons import explained, refuse_fall
@@ -48,6 +50,8 @@ class Pressed:
         Deformed nodes of the front, in the pad's frame at first touch [m].
     points : ContactPoints
         Position, normal and load of the quadrature points of the meshed front.
+    path_dependent : bool
+        Whether the pad has jumped on the way here: another way may lead to another state.
     """
 
     force: float
@@ -62,11 +66,12 @@ class Pressed:
     steps: int
     cuts: int
     seconds: Seconds
+    path_dependent: bool = False
 
 
 def pressed(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
-    settings: Settings, work: Work, seconds: Seconds,
+    settings: Settings, work: Work, seconds: Seconds, path_dependent: bool = False,
 ) -> Pressed:  # fmt: skip
     """State of one pad that has passed its checks; parameters as in ``fem.checks.check``."""
     pad, (pressure, _, points) = foam.pad, state
@@ -74,7 +79,7 @@ def pressed(
     front = (pad.nodes + pad.displacement(x))[pad.front_nodes]
     return Pressed(
         force, float(x[pad.travel_dof]), x, pad, pressure, front, points, checks, work.iterations, work.steps,
-        work.cuts, seconds,
+        work.cuts, seconds, path_dependent,
     )  # fmt: skip
 
 
@@ -104,6 +109,8 @@ class Press:
         Pad and gap to the problem.
     way : callable
         From one force [N] (0: no contact yet) to the next: the forces to go through, the last of them the next.
+    stepping : type
+        How to get from one of them to the next: along the path of equilibria, or in one step where Newton's method can.
     """
 
     pad: Pad
@@ -114,6 +121,7 @@ class Press:
     solver_of: Callable[[ContactProblem, dict[str, Any]], Any] = NonlinearSolver
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
     way: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
+    stepping: type[Stepping] = Following
 
     def __post_init__(self) -> None:
         """Set up the solver of this pad and object."""
@@ -123,7 +131,7 @@ class Press:
         self._bed = SpringBed(self.pad, self.gap)
         self.problem = self.problem_of(self.pad, self.gap)
         self.solver = self.solver_of(self.problem, self.options)
-        self._stepping = Stepping(
+        self._stepping = self.stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
             self._bed.force_scale, self.pad.rounding, watch=self._remember,
         )  # fmt: skip
@@ -149,21 +157,37 @@ class Press:
             except ConvergenceError:
                 if self.fallback is None:
                     raise
-                self._fall_back()
-                x = self._climb(x, reached, force, work)
+                x = self._other_way(force, work)
             if below is not None:
                 refuse_fall((reached, self.problem.travel(below)), (force, self.problem.travel(x)))
             reached = force
             seconds = since(before, self.solver.seconds, start)
             left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
             state = self.problem.contact_state(x)
-            yield pressed(self.problem.foam, x.copy(), state, left_over, force, self.settings, work, seconds)
+            yield pressed(
+                self.problem.foam, x.copy(), state, left_over, force, self.settings, work, seconds,
+                self._stepping.jumped,
+            )  # fmt: skip
 
-    def _fall_back(self) -> None:
-        """Go on with the fallback pad; its unknowns are numbered alike."""
+    def _other_way(self, force: float, work: Work) -> FloatArray:
+        """State at ``force`` of the fallback pad, else of the pad itself beyond a jump; both from first contact on.
+
+        All forces that follow keep to the pad that was found to serve.
+        """
+        pads, self.fallback, errors = (self.fallback, self.pad), None, []
+        for pad in pads:
+            self._change(pad)
+            try:
+                return self._climb(None, 0.0, force, work)
+            except ConvergenceError as error:
+                errors.append(error)
+        raise errors[0]
+
+    def _change(self, pad: Pad) -> None:
+        """Go on with another pad."""
         seconds = self.solver.seconds
         self.solver.destroy()
-        self.pad, self.fallback = self.fallback, None
+        self.pad = pad
         self._set_up()
         self.solver.seconds = seconds
 

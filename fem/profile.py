@@ -17,6 +17,8 @@ from fem.pose import FloatArray
 
 COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step, are on it
 ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely
+ONE_WAY = 1e-9  # turn up to which two straight runs have one direction: there is no corner between them [rad]
+SHORTEST_CUT = 0.005  # of the rim: gentler corners are rounded by a larger radius, or rounding errors would bend them
 
 
 @dataclass(frozen=True)
@@ -195,11 +197,12 @@ def through(points: FloatArray, rim: float) -> tuple[Curve, Curve]:
     ``rim`` is the radius of the rounding at corners and open ends [m].
     """
     runs = straight_runs(points)
-    corners = {
-        j: _corner(points, runs[k], runs[k + 1], rim)
+    found = (
+        (j, _corner(points, runs[k], runs[k + 1], rim))
         for k, (_, j, flat) in enumerate(runs[:-1])
         if flat and runs[k + 1][2]
-    }
+    )
+    corners = {j: corner for j, corner in found if corner is not None}
     pieces: list[Curve] = []
     for i, j, flat in runs:
         if flat:
@@ -229,13 +232,19 @@ def _open_end(p: FloatArray) -> End:
 
 def _corner(
     points: FloatArray, before: tuple[int, int, bool], after: tuple[int, int, bool], rim: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Rounding of the corner between two straight runs: points, arc length, direction before and after."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Rounding of the corner between two straight runs: points, arc length, direction before and after.
+
+    None where the runs have one direction up to rounding, as the two parts of a long line of rounded points may.
+    """
     p, q, r = points[before[0]], points[before[1]], points[after[1]]
     a, b = np.linalg.norm(q - p), np.linalg.norm(r - q)
     t, u = (q - p) / a, (r - q) / b
-    half = np.tan(np.arccos(np.clip(t @ u, -1, 1)) / 2)
-    cut = min(rim * half, 0.3 * a, 0.3 * b)
+    turn = np.arctan2(abs(t[0] * u[1] - t[1] * u[0]), t @ u)
+    if turn <= ONE_WAY:
+        return None
+    half = np.tan(turn / 2)
+    cut = min(max(half, SHORTEST_CUT) * rim, 0.3 * a, 0.3 * b)
     return *rounding(q - cut * t, t, u, cut / half), t, u
 
 

@@ -14,6 +14,8 @@ from fem.shape import Analytic, Gap, Surface, grid_triangles
 BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
 CLOSEST_POINTS = 1e-6  # points of a profile closer than this are refused [m]
+ON_AXIS = 1e-9  # ends of a profile this close to the axis are on it, and a curve may not come as close on its way [m]
+TOUCH = 1e-9  # of the outline's extent: pieces of it this close to each other touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,8 @@ def _checked_points(profile: FloatArray) -> FloatArray:
         raise ValueError(f"profile must be a list of at least two pairs (z, r), found shape {points.shape}")
     if not np.isfinite(points).all():
         raise ValueError(f"profile point {_first(~np.isfinite(points).all(axis=1))} is not a pair of finite numbers")
+    ends = points[[0, -1], 1]
+    points[[0, -1], 1] = np.where(np.abs(ends) <= ON_AXIS, 0.0, ends)
     bad = points[:, 1] <= 0
     bad[[0, -1]] = points[[0, -1], 1] < 0
     if bad.any():
@@ -138,20 +142,22 @@ def _places(curve: Curve) -> FloatArray:
 
 
 def _check_line(line: FloatArray) -> None:
-    """Refuse a curve that touches the axis on the way or crosses itself; ``line (m + 1, 2)`` is its polyline."""
-    low = line[1:-1, 1].min()
-    if low <= 0:
+    """Refuse a curve that touches the axis on the way, or itself; ``line (m + 1, 2)`` is its polyline."""
+    if line[1:-1, 1].min() <= ON_AXIS:
         z = line[1 + line[1:-1, 1].argmin(), 0]
         raise ValueError(f"the profile's curve swings to the axis near z = {z:g} m; add points there to hold it off")
     a, d = line[:-1], np.diff(line, axis=0)
     cross = lambda u, v: u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]  # noqa: E731
-    start = cross(d[:, None], a[None] - a[:, None])
-    end = cross(d[:, None], line[None, 1:] - a[:, None])
-    split = start * end < 0
-    i, _ = np.nonzero(np.triu(split & split.T, k=2))
+    e, touch = d / np.linalg.norm(d, axis=1)[:, None], TOUCH * np.ptp(line, axis=0).max()
+    start = cross(e[:, None], a[None] - a[:, None])  # distances of all ends from all pieces' lines
+    end = cross(e[:, None], line[None, 1:] - a[:, None])
+    split = (start * end < 0) | (np.minimum(np.abs(start), np.abs(end)) <= touch)
+    low, high = np.minimum(a, line[1:]) - touch, np.maximum(a, line[1:])
+    near = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=-1)
+    i, _ = np.nonzero(np.triu(split & split.T & near, k=2))
     if len(i):
-        raise ValueError(f"the profile crosses itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give the points "
-                         "in order along the outside, and more of them where it bends sharply")
+        raise ValueError(f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
+                         "the points in order along the outside, and more of them where it bends sharply")
 
 
 def _overshoot(points: FloatArray, given: Curve) -> float:

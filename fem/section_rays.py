@@ -9,6 +9,8 @@ import numpy as np
 from fem.pose import FloatArray
 from fem.shape import IntArray
 
+NO_AREA = 1e-12  # of the mesh's width squared: cuts that enclose less are empty
+
 
 @dataclass(frozen=True)
 class Rays:
@@ -70,7 +72,7 @@ def centroids(points: FloatArray, triangles: IntArray, z: FloatArray) -> FloatAr
     cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
     total = lambda weight: np.bincount(cut, weight, minlength=len(z))  # noqa: E731
     area = total(3.0 * cross)
-    area[area == 0] = np.nan
+    area[np.abs(area) <= NO_AREA * np.ptp(points[:, :2], axis=0).max(initial=0.0) ** 2] = np.nan
     return np.stack([total(cross * (p + q)[:, axis]) / area for axis in (0, 1)], axis=1)
 
 

@@ -32,7 +32,8 @@ class Sheet:
         [m], [Pa].
     poisson_ratio : float
     support : (float, float)
-        Length and width of the patch in the middle that the finger holds [m]; 0 for a line.
+        Length and width of the patch in the middle that the finger holds [m]; 0 for a line. What reaches beyond the
+        plate holds nothing: a plate that is no larger than the patch is rigid.
     """
 
     thickness: float
@@ -95,8 +96,13 @@ def back_stiffness(
 def relative_compliance(
     x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], sheet: Sheet, foam: float
 ) -> float:
-    """Mean deflection of the sheet under an even pressure over that of the foam ``thickness / E = foam`` [m/Pa]."""
-    shell, fixed, _ = _plate(x, y, symmetry, sheet)
+    """Mean deflection of the sheet under an even pressure over that of the foam ``thickness / E = foam`` [m/Pa].
+
+    Zero where the finger holds every node of the sheet.
+    """
+    shell, fixed, free = _plate(x, y, symmetry, sheet)
+    if not free.any():
+        return 0.0
     load = np.zeros((shell.nodes, 6))
     load[:, 2] = load[:, 5] = shell.node_area
     linear = LinearShell(shell, fixed)

@@ -12,6 +12,8 @@ from fem.outer_surface import OuterSurface
 from fem.shell_grid import MeshSize, along, around
 from fem.shell_mesh import FloatArray, IntArray, ShellMesh, grid_elements
 
+THICKEST = 1.0 - 1e-6  # of the outline's radius: a wall that reaches its centre of curvature has no inner face
+
 
 @dataclass(frozen=True)
 class BodyMesh(ShellMesh):
@@ -166,7 +168,7 @@ def _wall(
     if not (np.isfinite(t) & (t > 0)).all():
         raise ValueError(f"the wall thickness must be positive everywhere, found {t.min():g} m")
     bend = surface.curve.curvature(s)
-    if (bend * t > 1.0).any():
+    if (bend * t > THICKEST).any():
         k = int(np.argmax(bend * t))
         raise ValueError(
             f"the wall is {t[k]:g} m thick at z = {z[k]:g} m, where the outline's radius is only "

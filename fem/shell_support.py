@@ -11,6 +11,7 @@ from fem.shell_mesh import FloatArray
 from fem.shell_model import Shell
 from fem.wall_material import WallMaterial
 
+ON_LINE = 1e-9  # grid lines this close to the edge of the flat bottom are on it [m]
 WEAK = 1.0  # N/m: stiffness of all weak springs of a whole body together, per direction
 
 
@@ -79,7 +80,7 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
 
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
-    lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0])
+    lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + ON_LINE
     held[np.unique(mesh.number[:, lines])] = True
 
 

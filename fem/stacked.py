@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # numba and scipy, which a scene that is only checked does no
     from fem.mesh_object import MeshObject
     from fem.spline_surface import SplineSurface
 
+ROUND = 1e-9  # how far ratios and exponents of round sections may be off
 NEAR = 0.004  # where the exact place on the wall is looked for [m]
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
 RIM = 17  # samples of a rounded edge, which is short
@@ -37,8 +38,8 @@ class Stacked:
             return 1
         s = np.linspace(*self.outer.wall, 64)
         z = self.outer.curve.derivative(s)[:, 0]
-        round_ = np.allclose(self.outer.ratio(z), 1.0) and np.allclose(self.outer.exponent(z), 2.0)
-        return 0 if round_ else 2
+        off = np.abs(np.stack([self.outer.ratio(z) - 1.0, self.outer.exponent(z) - 2.0])).max()
+        return 0 if off <= ROUND else 2
 
     @property
     def bounds(self) -> FloatArray:

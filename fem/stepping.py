@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,7 +20,18 @@ WALK_STEPS = 60  # of the sheet, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step of a walk, where that is bounded
 MOST_FAILURES = 20  # of the steps of one walk
 FIRST_TRIES = 12
+FALL = 1e-6  # of the force: less is the rounding of a plateau, see `falls`
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
+
+
+def falls(forces: Sequence[float]) -> bool:
+    """Whether a force fell on the way: by more than the solver's tolerance and rounding leave it open.
+
+    >>> falls([1.0, 2.0, 1.999]), falls([1.0, 2.0, 2.0 - 1e-9, 3.0])
+    (True, False)
+    """
+    f = np.asarray(forces, dtype=float)
+    return bool((np.diff(f) < -FALL * np.abs(f[1:])).any())
 
 
 @dataclass(frozen=True)
@@ -91,6 +102,7 @@ class Stepping:
     floor: float = 0.0
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
+    jumped: bool = False  # whether a step is known to have left the path of equilibria
 
     def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""

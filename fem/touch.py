@@ -11,6 +11,7 @@ from fem.shape import GapFunction
 
 CREEP = 1e-4  # smallest step of a trace in units of the reach: a point that grazes the surface still gets past
 SHARPNESS = 1e-12  # how well the touch is located [m]
+GRAZE = 1e-9  # depth that a point has to reach to have met the object [m]: less is a pad that may as well pass it
 
 
 class NoContactError(ValueError):
@@ -37,7 +38,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     Raises
     ------
     NoContactError
-        If no point meets the object within ``reach``, or the pad starts inside the object.
+        If no point meets the object within ``reach``, or only grazes it, or the pad starts inside the object.
     """
     start, approach = pose.to_object(points), pose.rotation[:, 2]
 
@@ -47,7 +48,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     active = np.arange(len(points))
     t = np.zeros(len(points))
     g = gap(active, t)
-    if g.min() < 0:
+    if g.min() < -GRAZE:
         raise NoContactError(
             f"the pad starts {-g.min() * 1e3:.3g} mm inside the object; start it further out against its approach"
         )
@@ -57,11 +58,16 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         t = t + np.maximum(g, CREEP * reach)
         g = gap(active, t)
         closest = min(closest, g.min())
-        hit = g <= 0
+        hit = g <= -GRAZE
         if hit.any():
             first = min(first, _bisected(lambda s, which=active[hit]: gap(which, s), low[hit], t[hit]).min())
         keep = ~hit & (t < min(first, reach))
         active, t, g = active[keep], t[keep], g[keep]
+    if np.isinf(first) and closest < GRAZE:
+        raise NoContactError(
+            f"the pad only grazes the object on its way along the approach ({_vector(approach)}) from "
+            f"({_vector(pose.origin)}) m: whether it touches hangs on rounding; move the station or the pose"
+        )
     if first > reach:
         raise NoContactError(
             f"the pad passes the object: within {reach * 1e3:.4g} mm along the approach ({_vector(approach)}) from "

@@ -15,6 +15,7 @@ from study import commands
 from study.completion import add_options as add_completion_options
 from study.cost.command import add_options as add_cost_options
 from study.environment import keep_compiled_loops, pin_threads
+from study.execution.memory import is_out_of_memory, no_room
 from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
 from study.figures.command import add_options as add_figure_options
 from study.file_options import add_repair_options, add_scale_options
@@ -64,7 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _unforeseen(options: argparse.Namespace, error: Exception) -> int:
-    """The exit code of an error that no command expects: a damaged file, or a bug."""
+    """The exit code of an error that no command expects: too little memory, a damaged file, or a bug."""
+    if is_out_of_memory(error):
+        return complain(StudyError(USAGE, no_room(str(error) or type(error).__name__)))
     if damage := commands.damage(options, error):
         return complain(damage)
     traceback.print_exc()

@@ -9,8 +9,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from study.execution.memory import is_out_of_memory, no_room, require_room
 from study.execution.running import prepare, scene_of, target, with_target_met, work
-from study.exits import BUG, DONE, OTHER_FILE, USAGE, StudyError
+from study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
 from study.speaking import complain, say
 from study.writing import write_file
 
@@ -211,6 +212,7 @@ def completion(options: Namespace) -> int:
 
 def cost(options: Namespace) -> int:
     """Measure what accuracy costs in time."""
+    require_room()
     from study.cost.command import run
 
     run(options, scene_of(options))
@@ -236,6 +238,7 @@ def doctor(_options: Namespace) -> int:
 
 def run(options: Namespace) -> int:
     """Solve a scene; the same exit code on every rank."""
+    require_room()
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     from mpi4py import MPI
 
@@ -247,12 +250,16 @@ def run(options: Namespace) -> int:
         return _run_on(comm, options)
     except StudyError as error:
         return complain(error)
-    except BaseException:
-        traceback.print_exc()
+    except BaseException as error:
+        code = STOPPED if is_out_of_memory(error) else BUG
+        if code == STOPPED:
+            print(f"error: {no_room(str(error) or type(error).__name__)}", file=sys.stderr)
+        else:
+            traceback.print_exc()
         sys.stderr.flush()
         if comm.size > 1:
-            comm.Abort(BUG)  # the other ranks wait for this one
-        return BUG
+            comm.Abort(code)  # the other ranks wait for this one
+        return code
 
 
 def _run_on(comm: Any, options: Namespace) -> int:

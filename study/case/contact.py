@@ -127,6 +127,7 @@ def flags(contacts: Sequence[Contact], mu: float, score_flag: ScoreFlag) -> Flag
     found |= Flag.SLIPS * (np.tan(min(line, 1.57)) > mu + ALIKE)
     found |= Flag.OVERLAP * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
     found |= Flag.UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
+    found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
     for c in contacts:
         found |= raised(c.frame.flag) | Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
     return found

@@ -9,7 +9,7 @@ from fem.linear_pad import linearised
 from fem.linear_press import linear_press
 from fem.pad import Pad
 from fem.press import Press
-from fem.stepping import Settings
+from fem.stepping import Settings, Stepping
 from study.case import model
 from study.case.build import pad_shape
 from study.case.model import Finger
@@ -38,5 +38,6 @@ def press_of(scene: Scene, finger: Finger, coarser: bool, linear: bool) -> Press
         return linear_press(pad, finger.gap, linearised(fallback) if fallback else None, settings(scene))
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
-        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), problem_of=problem, way=way)
+        steps = {"problem_of": problem, "way": way, "stepping": Stepping}
+        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), **steps)
     return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))

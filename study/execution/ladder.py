@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from study.execution.lost_ranks import LostRanks
+from study.execution.memory import is_out_of_memory
 from study.execution.standing import Standing
 from study.execution.stopping import AbandonedError, Stopper, TimeLimitError
 from study.storage.layout import FAILED, MISSING
@@ -23,7 +24,6 @@ KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-
 NOT_TRIED = "not tried, because a lower force of this candidate failed: {text}"
 TOO_SLOW = "not solved within {limit:g} s; raise run.time_limit_s and run again with --retry-failed"
 HUNG = "did not come back to Python within {patience:g} s, so its rank was given up; 'run --retry-failed' tries again"
-OUT_OF_MEMORY = ("Cannot allocate memory", "failed to map segment")  # of a file or library that is opened meanwhile
 NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fewer ranks or a coarser mesh"
 
 
@@ -179,7 +179,7 @@ def _sentence(error: BaseException, limit: float) -> str:
         return TOO_SLOW.format(limit=limit)
     if isinstance(error, StopIteration):
         return "the ladder of forces ended before this one; this is a bug"
-    if isinstance(error, MemoryError) or any(sign in str(error) for sign in OUT_OF_MEMORY):
+    if is_out_of_memory(error):
         return NO_MEMORY.format(text=str(error) or "no more could be had")
     text = f"{type(error).__name__}: {error}"
     if type(error).__module__ == "builtins" and error.__traceback__:

@@ -1,4 +1,7 @@
-"""How much memory a rank may take: a case that asks for more fails by itself, before the system kills the run."""
+"""How much memory a rank may take: a case that asks for more fails by itself, before the system kills the run.
+
+A run that has too little to start with says so: some libraries ask for ever for memory that they do not get.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from study.exits import USAGE, StudyError
+
+ITSELF = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
+SIGNS = ("Cannot allocate memory", "failed to map segment")  # of a file or library that finds no memory
 LEAST = 1e9  # bytes for the cases of a rank: with less than that, nothing could be solved at all
 KEPT = 0.9  # share of the free memory that is handed out; the rest is for the file's pages and for other programs
 CGROUPS = Path("/sys/fs/cgroup")
@@ -37,6 +44,34 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def require_room() -> None:
+    """Refuse a limit of addresses that leaves no room for the program itself.
+
+    Raises
+    ------
+    StudyError
+        With the limit, what is needed, and what to do.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < ITSELF:
+        raise StudyError(USAGE, no_room(f"softjaw with its libraries takes {ITSELF / 1e9:g} GB for small cases"))
+
+
+def no_room(reason: str) -> str:
+    """A sentence for memory that was missing outside of a case."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    found = "unlimited" if limit == resource.RLIM_INFINITY else f"limited to {limit / 1e9:.2f} GB"
+    return (
+        f"out of memory: addresses of a process are {found} (ulimit -v); {reason}; raise the limit to 2 GB or more, or "
+        "ask the batch system for more memory"
+    )
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory was missing, whatever its type."""
+    return isinstance(error, MemoryError) or any(sign in str(error) for sign in SIGNS)
 
 
 def available() -> float:

@@ -167,7 +167,7 @@ def forces(load: Load) -> Iterator[Finding]:
 
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("object",), object_size), (("object",), profile), (("object",), box_edges), (("gripper", "effects"), pad_mesh),
-    (("gripper", "effects"), sheet),
+    (("gripper", "effects", "accuracy"), sheet),
     (("object", "effects"), coupling),
     (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
     (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from study.scene.sections import Candidates, Gripper
 from study.scene.shapes import Shape, Span
 
-WITH_ENDS = ("elliptic_cylinder", "box", "mesh", "revolution")
+WITH_ENDS = ("elliptic_cylinder", "box", "mesh", "revolution", "sections")
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
 
 
@@ -29,10 +29,9 @@ def station_warnings(shape: Shape, span: Span | None, candidates: Candidates, gr
     over = [s for s in places if s - half < low - slack or s + half > high + slack]
     if over and shape.shape in WITH_ENDS:
         listed = ", ".join(f"{s:g}" for s in over[:4]) + (", ..." if len(over) > 4 else "")
-        known = "the cylinder is taken as infinite there" if shape.shape == "elliptic_cylinder" else "it meets the edge"
         yield (
             f"candidates: at {len(over)} of {len(places)} stations ({listed} mm) the pad, {2 * half:g} mm along the"
-            f" object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: {known}"
+            f" object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: it meets the edge"
         )
 
 

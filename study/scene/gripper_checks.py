@@ -9,6 +9,7 @@ from study.scene.errors import Finding, shown
 from study.scene.sections import Accuracy, Effects, Friction, Gripper, Load
 
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
+ROUNDING = 1e-9  # of a length: fem.sheet finds nodes this close to the support's rim on it, too
 
 
 def pad_mesh(gripper: Gripper, effects: Effects) -> Iterator[Finding]:
@@ -51,16 +52,19 @@ def element_edges(gripper: Gripper) -> list[tuple[float, float]]:
     return edges
 
 
-def sheet(gripper: Gripper, effects: Effects) -> Iterator[Finding]:
-    """The finger holds the sheet by at least one node of the pad's mesh; with even counts one is in the middle."""
+def sheet(gripper: Gripper, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
+    """The finger holds the sheet by at least one node of every mesh; with even counts one is in the middle."""
     if effects.sheet == "rigid":
         return
-    edges = [gripper.pad_length_mm / gripper.elements[0], gripper.pad_width_mm / gripper.elements[1]]
-    need = [edge if n % 2 else 0.0 for edge, n in zip(edges, gripper.elements, strict=False)]
-    if any(held < least for held, least in zip(gripper.sheet_support_mm, need, strict=True)):
-        found = f"{list(gripper.sheet_support_mm)} mm with {list(gripper.elements[:2])} elements along length and width"
+    counts = [gripper.elements[:2], [-(-n // 2) for n in gripper.elements[:2]]][: accuracy.meshes]
+    size = gripper.pad_length_mm, gripper.pad_width_mm
+    need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
+    if any(held < (1 - ROUNDING) * least for held, least in zip(gripper.sheet_support_mm, need, strict=True)):
+        meshes = " and ".join(f"{list(n)}" for n in counts)
+        found = f"{list(gripper.sheet_support_mm)} mm with {meshes} elements along length and width"
         expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
-        yield Finding(("gripper", "sheet_support_mm"), found, expected, "use even numbers of elements")
+        remedy = "use even numbers of elements" if len(counts) == 1 else "use multiples of 4 elements"
+        yield Finding(("gripper", "sheet_support_mm"), found, expected, remedy)
 
 
 def pad_material(gripper: Gripper) -> Iterator[Finding]:

@@ -36,7 +36,7 @@ class EllipticCylinder(Shape):
     shape: Literal["elliptic_cylinder"]
     semi_axis_a_mm: Length = Field(description="semi-axis along x, the approach at angle 0")
     semi_axis_b_mm: Length = Field(description="semi-axis along y, across the approach at angle 0")
-    length_mm: Length = Field(description="length along z")
+    length_mm: Length = Field(description="length along z, edges rounded by 2 mm included")
     semi_axis_a, semi_axis_b, length = si("semi_axis_a_mm"), si("semi_axis_b_mm"), si("length_mm")
 
     @property

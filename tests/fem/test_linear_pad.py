@@ -61,7 +61,7 @@ def test_condensed_and_full_solve_are_the_same(gap, elements, symmetry, contact,
 
 def test_fallback_takes_nodal_gaps_with_the_same_factors():
     press = linear_press(condensed(), OVAL, linearised(pad_of(contact="nodal")))
-    press._fall_back()
+    press._change(press.fallback)
     (one,), (other,) = press.ladder([3.0]), linear_press(condensed(contact="nodal"), OVAL).ladder([3.0])
     assert one.pad.contact == "nodal"
     np.testing.assert_allclose(one.pressure, other.pressure, rtol=1e-9, atol=1e-9 * other.pressure.max())

@@ -8,6 +8,7 @@ from scipy.interpolate import BSpline, PchipInterpolator
 
 from fem.outer_surface import Section, of_sections
 from fem.profile import b_splines
+from fem.revolution import Revolution
 
 
 @pytest.mark.parametrize("order", range(4))
@@ -25,3 +26,38 @@ def test_what_sections_say_follows_the_height_as_a_monotone_cubic_level_beyond_b
     x = np.concatenate([np.linspace(-0.02, 0.12, 201), z])
     beyond = PchipInterpolator([-0.1, *z, 0.2], [2.0, *exponent, 5.2])
     assert body.exponent(x, order) == pytest.approx(beyond(x, nu=order), rel=1e-11, abs=1e-9)
+
+
+def rounded_frustum(n, height, low, high):
+    """Points of a cone's wall as a drawing gives them: rounded to 0.001 mm, here in metres."""
+    return np.column_stack([np.round(np.linspace(0, height, n), 3), np.round(np.linspace(low, high, n), 3)]) / 1000
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [(18, 134.295, 15.300, 53.740), (27, 137.462, 23.936, 59.720), (32, 187.008, 20.405, 15.484), (7, 90, 30, 20)],
+)
+def test_two_straight_runs_of_one_direction_have_no_corner(outline):
+    """Rounding cuts a long line into runs; where two of them have one direction, a corner was 0 / 0."""
+    points = rounded_frustum(*outline)
+    body = Revolution(points)
+    e = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
+    s = np.linspace(0.2, 0.8, 500)
+    z, r = (points[0] + s[:, None] * (points[-1] - points[0])).T
+    g, normal, _ = body.gap(np.column_stack([r, 0 * r, z]))
+    assert np.abs(g).max() < 1e-6  # the points' own rounding
+    assert normal == pytest.approx(np.broadcast_to([e[0], 0, -e[1]], (500, 3)), abs=2e-3)
+    assert body.smallest_radius > 0.1
+
+
+@pytest.mark.parametrize("turn", [1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2])
+def test_gentle_corners_between_straight_runs_are_smooth(turn):
+    """The normal turns by no more than the corner, and the curve stays within a part 1e-4 of a step of its points."""
+    t = np.array([[0.01 * k, 0.03] for k in range(5)])
+    u = t[-1] + 0.01 * np.arange(1, 5)[:, None] * [np.cos(turn), -np.sin(turn)]
+    body = Revolution(np.concatenate([t, u]))
+    x = np.column_stack([np.full(2001, 0.03), np.zeros(2001), np.linspace(0.0395, 0.0405, 2001)])
+    g, normal, hessian = body.gap(x)
+    assert np.abs(g - np.maximum(0, np.sin(turn) * (x[:, 2] - 0.04))).max() < min(0.03 * turn, 1e-6) + 1e-15
+    assert np.arctan2(normal[:, 2], normal[:, 0]) == pytest.approx(np.clip(turn, 0, turn) / 2, abs=0.51 * turn + 1e-9)
+    assert np.abs(hessian[:, [0, 0, 2], [0, 2, 2]]).max() < 1e-3 + 1100 * turn / 1e-2

@@ -89,6 +89,16 @@ def test_a_slightly_soft_sheet_adds_its_own_deflection():
     assert travel[1e11] / travel[None] - 1.0 == pytest.approx(expected, rel=0.02)
 
 
+def test_a_sheet_that_is_no_larger_than_its_support_is_rigid():
+    """The finger holds all of it: nothing bends, and the pad is that on a rigid sheet to the last bit."""
+    held, half = Sheet(0.001, 2e9, 0.35, (0.050, 0.022)), Sheet(0.001, 2e9, 0.35, (0.050, 0.020))
+    assert relative_compliance(X, Y, WHOLE, held, 1e-7) == 0.0
+    assert relative_compliance(X[10:], Y[2:], (True, True), held, 1e-7) == 0.0
+    assert relative_compliance(X, Y, WHOLE, half, 1e-7) > 0.0
+    (rigid,), (one,) = (Press(pad_of(sheet), OVAL).ladder([5.0]) for sheet in (None, held))
+    assert one.unknowns.tobytes() == rigid.unknowns.tobytes()
+
+
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
     full, quarter = pad_of(PLASTIC, WHOLE), pad_of(PLASTIC)

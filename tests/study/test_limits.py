@@ -7,6 +7,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import time
 from types import SimpleNamespace
 
@@ -14,7 +15,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from fem.blas_buffers import take_buffers
 from fem.petsc import NonlinearSolver
+from study import exits
+from study.environment import launch_environment
 from study.execution import memory
 from study.execution.memory import available, limited_memory
 from study.execution.standing import Standing
@@ -22,7 +26,7 @@ from study.execution.stopping import GRACE, AbandonedError, Stopper, TimeLimitEr
 from study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from study.storage.layout import DONE, FAILED, MISSING
 from study.storage.store import open_result
-from tests.study.launching import contents, differing, start, study, wait_for
+from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 
 def wait():
@@ -76,6 +80,52 @@ def test_memory_is_bounded_and_the_bound_goes_away():
             np.empty(10**8)
     assert resource.getrlimit(resource.RLIMIT_AS) == before
     np.empty(10**8)
+
+
+def smoke(tmp_path, *words, addresses=None, ranks=0):
+    """Run the smallest scene, with a bound on the addresses of its process [B]; exit code and what it says."""
+    start = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks else []
+    bound = (lambda: resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))) if addresses else None
+    done = subprocess.run(
+        [*start, sys.executable, "-m", "study", "run", "jobs/smoke.toml", "-o", tmp_path / "out.hdf", *words],
+        cwd=ROOT, env=launch_environment(), preexec_fn=bound, capture_output=True, text=True, timeout=60,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    return done.returncode, done.stderr
+
+
+@pytest.mark.launches
+@pytest.mark.parametrize("kilobytes", [300_000, 700_000, 850_000, 900_000, 1_100_000])
+def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
+    """From 0.8 to 0.92 GB the run's first product in BLAS asked for memory for ever; below, and above, it crashed."""
+    code, errors = smoke(tmp_path, addresses=1024 * kilobytes)
+    assert code == exits.USAGE
+    assert f"limited to {1024 * kilobytes / 1e9:.2f} GB" in errors
+    assert len(errors.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_a_run_with_enough_addresses_starts_and_ends(tmp_path):
+    assert smoke(tmp_path, addresses=int(1.3e9))[0] == exits.DONE
+
+
+@pytest.mark.long
+@pytest.mark.launches
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_least_memory_that_a_scene_may_set_is_enough_on_every_rank(tmp_path, ranks):
+    """The second rank made its first product in BLAS within the bound, and asked for ever for 128 MB."""
+    code, errors = smoke(tmp_path, "--set", "run.memory_gb=0.1", ranks=ranks)
+    assert code == exits.DONE, errors
+
+
+def test_libraries_of_linear_algebra_are_not_let_loose_without_room():
+    called = []
+    with limited_memory(0.05, 1), pytest.raises(MemoryError, match="168 MB of addresses"):
+        take_buffers(lambda: called.append(1))
+    take_buffers(lambda: called.append(2))
+    assert called == [2]
 
 
 @pytest.mark.long

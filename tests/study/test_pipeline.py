@@ -393,3 +393,25 @@ def test_pads_that_would_run_into_each_other_are_flagged():
     [(_, ladder)] = solved(ball, forces="[1, 20]", elements="[20, 10, 6]")
     assert [bool(case.values["maps/flags"] & Flag.OVERLAP) for case in ladder] == [False, True]
     assert [2 * case.values["maps/travel"] > 0.012 for case in ladder] == [False, True]
+
+
+def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
+    """With the torque scales of the stub, 1.26 was the quality of an endless cylinder; the block is as high."""
+    short = OVAL.replace("length_mm = 120", "length_mm = 4")
+    block = 'shape = "box"\nsize_mm = [50, 40, 4]\nedge_radius_mm = 1'
+    scales = "score.contact_length_mm=50", "score.object_length_mm=50"
+    bodies = [cases(shape, *scales, forces="[5]", elements="[20, 4, 4]") for shape in (short, block, OVAL)]
+    (stub,), (flat,), (endless,) = bodies
+    for name, most in (("e_n", 0.3), ("quality", 0.25)):
+        of_stub, of_flat, of_endless = (values[f"maps/{name}"][CURVED] for values in (stub, flat, endless))
+        assert of_stub < most * of_endless
+        assert of_stub < of_flat
+
+
+def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):
+    jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
+    monkeypatch.setattr("fem.following.Following._leaves", jumps)
+    found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
+    for _, ladder in found:
+        assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in ladder] == [False, True, True]
+        assert [("depends on the load path" in result.message) for result in ladder] == [False, True, True]

@@ -141,7 +141,7 @@ def test_a_result_file_is_named_with_its_ending(shared_path, capsys, command):
     ("body", "inside", "outside", "words"),
     [
         (BOTTLE, "[25, 175]", "[20, 100]", "0 to 200 mm"),
-        (CYLINDER, "[-75, 75]", "[0, 80]", "-100 to 100 mm: the cylinder is taken as infinite there"),
+        (CYLINDER, "[-75, 75]", "[0, 80]", "-100 to 100 mm: it meets the edge"),
         (BOX, "[-35, 35]", "[-40]", "-60 to 60 mm"),
         (FLASK, "[25, 95]", "[10]", "0 to 120 mm"),
     ],

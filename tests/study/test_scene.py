@@ -59,6 +59,8 @@ WRONG_LINES = [
     ("[gripper]\nsheet_poison = 0.3", 12, "gripper.sheet_poison", "unknown key", "[gripper]", "`sheet_poisson`"),
     ("[gripper]\nelements = [20, 5, 6]\nsheet_support_mm = [20, 4]\n[effects]\nmodel_size = 'full'", 13,
      "gripper.sheet_support_mm", "[20.0, 4.0] mm", "0 x 4.4 mm", "even numbers"),
+    ("[gripper]\nelements = [10, 2, 3]\n[accuracy]\nmeshes = 2", 11,
+     "gripper.sheet_support_mm", "[10, 2] and [5, 1] elements", "10 x 22 mm", "multiples of 4"),
     ("[gripper]\npad_width_mm = '22 mm'", 12, "gripper.pad_width_mm", '"22 mm"', "number >= 1 and <= 500 [mm]",
      "`22` without"),
     ("[gripper]\npad_width_mm = true", 12, "gripper.pad_width_mm", "true", "[mm] (short side", "the default is 22"),

@@ -32,6 +32,17 @@ def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
     assert level(*STEEL, 'effects.sheet="elastic"')[::2] == ("elastic plate", "forced by the scene")
 
 
+@pytest.mark.parametrize("size", [(20, 10), (18, 9), (20, 9.5), (12, 6), (22, 10), (20, 11)])
+def test_pads_up_to_the_size_of_the_default_support_are_solved(size):
+    """Every node of their sheets is held; such a sheet is rigid, whatever it is made of."""
+    pad = [f"gripper.pad_{side}_mm={length}" for side, length in zip(("length", "width"), size, strict=True)]
+    name, compliance, reason = level(*pad, *PLASTIC, "gripper.pad_thickness_mm=6")
+    if size[0] <= 20 and size[1] <= 10:
+        assert (name, compliance, reason) == ("rigid", 0.0, "indicator below the target")
+    else:
+        assert compliance > 0.0
+
+
 def test_what_is_neglected_stays_below_the_target():
     """The rigid level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not."""
     np.testing.assert_array_equal(e_n(OVAL, *STEEL), e_n(OVAL, *STEEL, RIGID))

@@ -61,6 +61,7 @@ def test_images_of_a_grasp_are_never_torn_apart_and_count_as_one(top):
         (Flag.OVERLAP, "overlap"),
         (Flag.COARSE, "coarse"),
         (Flag.UNSTABLE, "unstable"),
+        (Flag.JUMPED, "jumped"),
     ],
 )
 def test_flags_are_words_with_a_legend(bit, word):

@@ -73,7 +73,8 @@ def test_a_cut_through_a_corner_makes_two_triangles():
 
 def test_normals_follow_a_cylinder_and_stay_sharp_at_a_box():
     corners = with_normals(*EllipticCylinder(0.02, 0.02, 0.1).surface())
-    x, n = corners[..., :3].reshape(-1, 3), corners[..., 3:].reshape(-1, 3)
+    wall = corners[(np.abs(corners[..., 2]) < 0.0479).all(axis=1)]
+    x, n = wall[..., :3].reshape(-1, 3), wall[..., 3:].reshape(-1, 3)
     radial = x[:, :2] / np.linalg.norm(x[:, :2], axis=1, keepdims=True)
     assert np.einsum("ki,ki->k", n[:, :2], radial).min() > 0.999
     sharp = with_normals(*Box(np.array([0.02, 0.03, 0.04]), 0.0).surface())[..., 3:]

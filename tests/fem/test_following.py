@@ -1,0 +1,247 @@
+"""The path of equilibria: its tangent, stability, jumps, and states that do not depend on the forces asked before."""
+
+import numpy as np
+import pytest
+
+from fem.contact import Control
+from fem.errors import ConvergenceError
+from fem.following import Following
+from fem.materials import material
+from fem.objects import EllipticCylinder, Revolution, Sphere
+from fem.pad import Pad, PadShape
+from fem.press import Press
+from fem.stepping import Settings, Stepping, Work
+from tests.fem import reference
+from tests.fem.test_linear_pad import e_n
+
+SIZE, G, MM = (0.050, 0.022, 0.015), 0.040e6, 1e-3
+NEO = material("neo_hookean", G, 0.25)
+BLATZ_KO = material("blatz_ko", G)
+ROUND = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
+BALL = reference.placed(Sphere(0.02), reference.facing(0.02))
+
+
+def press_of(law=NEO, gap=ROUND, symmetry=(True, True), elements=(12, 6, 4), **choices):
+    shape = PadShape(SIZE, elements)
+    nodal = Pad(shape, law, symmetry, "nodal")
+    return Press(Pad(shape, law, symmetry), gap, fallback=nodal, **choices)
+
+
+def last(press, forces):
+    """Last state of a list of forces."""
+    *_, state = press.ladder([float(f) for f in forces])
+    return state
+
+
+LISTS = [[500], [5, 500], [5, 50, 100, 200, 300, 400, 500], [3, 77, 201, 500], [5, *range(20, 520, 20)]]
+
+
+@pytest.mark.parametrize("forces", LISTS, ids=lambda forces: f"{forces[0]}-{len(forces)}")
+def test_a_state_does_not_depend_on_the_list_of_forces(forces):
+    """Neo-Hookean foam at 500 N: [5, 500] gave e_n = 15.14 mm and p_max = 2566 kPa, seven forces 14.79 mm and 2848."""
+    state = last(press_of(), forces)
+    assert not state.path_dependent
+    assert state.travel == pytest.approx(13.85589900e-3, rel=1e-7)
+    assert e_n(state) == pytest.approx(14.84071815e-3, rel=1e-7)
+    assert state.pressure.max() == pytest.approx(2816.678244e3, rel=1e-7)
+
+
+@pytest.mark.parametrize("law", [BLATZ_KO, material("neo_hookean", G, 0.49)], ids=["foam", "rubber"])
+@pytest.mark.parametrize("gap", [ROUND, BALL], ids=["cylinder", "sphere"])
+def test_nor_does_it_with_other_laws_and_objects(law, gap):
+    at_once, stepwise = (last(press_of(law, gap), forces) for forces in ([60], [1, 10, 17, 30, 44, 60]))
+    assert e_n(at_once) == pytest.approx(e_n(stepwise), rel=1e-9)
+    assert at_once.pressure.max() == pytest.approx(stepwise.pressure.max(), rel=1e-8)
+    assert not at_once.path_dependent
+
+
+def dense(press, entries):
+    K = np.zeros((press.problem.size + 1,) * 2)
+    np.add.at(K, (press.problem.rows, press.problem.columns), entries)
+    return K[:-1, :-1]
+
+
+def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
+    """Stable: the tangent on displacements that keep the nodes in contact on the object is positive definite."""
+    found = {}
+    for stepping in (Stepping, Following):
+        press = press_of(stepping=stepping)
+        state = last(press, [5, 500])
+        entries, held = press.problem.symmetric_tangent(state.unknowns)
+        K, n = dense(press, entries), press.pad.travel_dof + 1
+        np.testing.assert_allclose(K, K.T, atol=1e-12 * np.abs(K).max())
+        B = K[n:, :n][np.abs(K[n:, :n]).any(axis=1)]
+        assert len(B) == held == np.count_nonzero(state.pressure > 0)
+        _, _, V = np.linalg.svd(B)
+        free = V[held:] @ K[:n, :n] @ V[held:].T
+        negative = int((np.linalg.eigvalsh(free) < 0).sum())
+        assert press.solver.negative_eigenvalues(entries) == held + negative
+        found[stepping] = negative
+    assert found == {Stepping: 1, Following: 0}
+
+
+@pytest.mark.parametrize("symmetry", [(True, True), (False, True)])
+@pytest.mark.parametrize("control", ["force", "travel"])
+def test_tangent_of_the_path_by_finite_differences(symmetry, control):
+    """Of states at forces 1 % lower and higher, whose nodes in contact are the same."""
+    press = press_of(symmetry=symmetry)
+    low, state, high = press.ladder([19.8, 20.0, 20.2])
+    problem, work = press.problem, Work()
+    x = state.unknowns
+    if control == "travel":
+        x = press._stepping.solve(x * (1 + 1e-9), Control(travel=state.travel), work)
+    else:
+        x = press._stepping.solve(x * (1 + 1e-9), Control(force=20.0), work)
+    tangent = problem.path_tangent(x, press.solver.answer)
+    np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
+
+
+def test_looking_for_stability_leaves_the_solver_as_it_was():
+    once, again = press_of(), press_of()
+    ladder = again.ladder([5.0, 20.0])
+    plain, first = list(once.ladder([5.0, 20.0])), next(ladder)
+    again.problem.symmetric_tangent(first.unknowns * 1.001)
+    assert next(ladder).unknowns.tobytes() == plain[1].unknowns.tobytes()
+
+
+# -- jumps of an artificial pad whose force falls from 2.5 N to 2 N while it is pressed on ----------------------------
+
+
+def force(x):
+    """Force [N] at a travel of x [mm]."""
+    return x**3 - 4.5 * x**2 + 6 * x
+
+
+class Curve:
+    """One unknown, the travel; strained by ``strain(x)``."""
+
+    complementarity, travel_dof, control = False, 0, Control(travel=0.0)
+
+    def __init__(self, strain=lambda x: 0.0):
+        self.strain = strain
+
+    def sheet_force(self, x):
+        return float(force(x[0] / MM))
+
+    def travel(self, x):
+        return float(x[0])
+
+    def path_tangent(self, x, answer):
+        slope = np.polyval([3.0, -9.0, 6.0], x[0] / MM)
+        return np.array([MM / slope]) if slope > 0 else None
+
+    def largest_strain(self, x):
+        return self.strain(x[0] / MM)
+
+    def symmetric_tangent(self, x):
+        return x, int(self.path_tangent(x, None) is not None)
+
+
+class Crossings:
+    """Finds the state under travel control, and under force control the crossing next to the start."""
+
+    def __init__(self, problem):
+        self.problem, self.at = problem, None
+
+    def solve(self, x, tolerance, iterations=None):
+        control = self.problem.control
+        self.at = np.array([control.travel])
+        if control.force is not None:
+            roots = np.roots([1.0, -4.5, 6.0, -control.force])
+            roots = MM * roots[np.abs(roots.imag) < 1e-9].real
+            self.at = roots[[np.abs(roots - x[0]).argmin()]]
+        return self.at, 1
+
+    def is_at(self, x):
+        return x is self.at
+
+    def answer(self, b):
+        return b
+
+    def negative_eigenvalues(self, entries):
+        return 1
+
+
+def following(problem):
+    solver = Crossings(problem)
+    return Following(problem, solver, Settings(), 5 * MM, 1.0, lambda t: None, lambda t: 1.0)
+
+
+@pytest.mark.parametrize("forces", [[3.0], [2.4, 3.0], [0.3, 1.1, 2.49, 2.51, 3.0]])
+def test_a_jump_is_noted_however_the_force_is_reached(forces):
+    steps = following(Curve())
+    x, reached = np.array([0.01 * MM]), force(0.01)
+    for goal in forces:
+        x, reached = steps.climb(x, reached, goal, Work()), goal
+        assert force(x[0] / MM) == pytest.approx(goal)
+        assert steps.jumped == (goal > 2.5)
+
+
+def test_a_jump_is_an_error_where_there_is_another_way():
+    steps = following(Curve())
+    with pytest.raises(ConvergenceError, match=r"jumps at 2\.\d+ N|jumps at 3 N"):
+        steps.climb(np.array([0.01 * MM]), force(0.01), 3.0, Work(), walk=False)
+    x = steps.climb(np.array([0.01 * MM]), force(0.01), 2.4, Work(), walk=False)
+    assert x[0] < MM
+    assert not steps.jumped
+
+
+def test_a_fold_of_the_foam_is_a_jump():
+    """The strain grows by 0.8 at once; a growth of 0.8 along with the force is no fold."""
+    sudden = following(Curve(lambda x: 0.8 if force(x) > 1.5 else 0.0))
+    steady = following(Curve(lambda x: 0.8 * force(x) / 2.4))
+    for steps in (sudden, steady):
+        steps.climb(np.array([0.01 * MM]), force(0.01), 2.4, Work())
+    assert sudden.jumped
+    assert not steady.jumped
+
+
+def test_an_unstable_start_is_noted():
+    steps = following(Curve(lambda x: 0.6))
+    steps.problem.symmetric_tangent = lambda x: (x, 0)
+    steps.climb(np.array([0.01 * MM]), force(0.01), 1.0, Work())
+    assert steps.jumped
+
+
+# -- a jump of weighted gaps, where nodal ones know of none ------------------------------------------------------------
+
+NECK = np.array([
+    [115, 33], [120, 33], [125, 33], [130, 32.781], [135, 31.548], [140, 29.012], [145, 25.463], [150, 21.537],
+    [155, 17.988], [160, 15.452], [165, 14.219], [170, 14], [180, 14], [190, 14], [200, 14],
+])  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("station", [166.17647, 170.58824, 175.0])
+def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
+    """Travels of 9.85 and 15.24 mm, 9.95 and 12.45 mm, 8.34 and 9.27 mm at 13 N came of these lists."""
+    from study.case.candidates import axis_poses
+    from study.case.model import approach
+
+    finger = approach(Revolution(MM * NECK), axis_poses(station * MM, 0.0, 0.0)[0], SIZE)
+    states = []
+    for forces in ([1, 13], [1, 2, 4, 7, 10, 13]):
+        states.append(last(press_of(BLATZ_KO, finger.gap, (False, True), (20, 10, 6)), forces))
+    assert {state.pad.contact for state in states} == {"nodal"}
+    assert not any(state.path_dependent for state in states)
+    for state in states:
+        assert e_n(state) == pytest.approx(e_n(states[0]), rel=1e-8)
+        assert state.travel == pytest.approx(states[0].travel, rel=1e-9)
+
+
+def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():
+    press = press_of()
+    tried = []
+
+    def climb(x, reached, goal, work):
+        tried.append((press.pad.contact, press.fallback is None))
+        if len(tried) < 3:
+            raise ConvergenceError("the pad jumps at 7 N")
+        press._stepping.jumped = True
+        return proper(x, reached, goal, work)
+
+    proper, press._climb = press._climb, climb
+    (state,) = press.ladder([10.0])
+    assert tried == [("weighted", False), ("nodal", True), ("weighted", True)]
+    assert state.path_dependent
+    assert state.pad.contact == "weighted"
