@@ -52,18 +52,19 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         raise NoContactError(
             f"the pad starts {-g.min() * 1e3:.3g} mm inside the object; start it further out against its approach"
         )
-    closest, first = g.min(), np.inf
+    closest, first, grazed = g.min(), np.inf, False
     while len(active):
         low = t
         t = t + np.maximum(g, CREEP * reach)
         g = gap(active, t)
         closest = min(closest, g.min())
+        grazed |= bool((g[t < reach] < GRAZE).any())
         hit = g <= -GRAZE
         if hit.any():
             first = min(first, _bisected(lambda s, which=active[hit]: gap(which, s), low[hit], t[hit]).min())
         keep = ~hit & (t < min(first, reach))
         active, t, g = active[keep], t[keep], g[keep]
-    if np.isinf(first) and closest < GRAZE:
+    if np.isinf(first) and grazed:
         raise NoContactError(
             f"the pad only grazes the object on its way along the approach ({_vector(approach)}) from "
             f"({_vector(pose.origin)}) m: whether it touches hangs on rounding; move the station or the pose"

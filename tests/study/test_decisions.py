@@ -123,12 +123,13 @@ def test_a_window_ends_at_the_same_force(values, seed):
 @tries
 @given(seeds)
 def test_a_grasp_that_just_holds_is_not_too_weak(seed):
-    from study.tables.ranking import TOO_WEAK, judged
+    from study.flags import Flag
+    from study.tables.ranking import judged
 
     factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
     layout = SimpleNamespace(derived=[SimpleNamespace(name="force_low")])
     result = SimpleNamespace(layout=layout, map=lambda name, model="": factor if model else np.zeros((1, 4)))
-    assert (judged(result) & TOO_WEAK > 0).tolist() == [[False, False, True, False]]
+    assert (judged(result) & Flag.TOO_WEAK > 0).tolist() == [[False, False, True, False]]
 
 
 # --- levels of effects ------------------------------------------------------------------------------------------------
@@ -168,6 +169,8 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
 
 def facing(turn, lean, distance=0.06, free=0.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
+    from friction.frame import FrameFlag
+
     made = []
     for side, angle in ((1.0, lean), (-1.0, np.pi)):
         R = (turn * Rotation.from_rotvec([0.0, angle, 0.0])).as_matrix()
@@ -175,8 +178,8 @@ def facing(turn, lean, distance=0.06, free=0.0):
         pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
         made.append(SimpleNamespace(
             normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
-            frame=SimpleNamespace(flag=0), finger=SimpleNamespace(pose=pose),
-            state=SimpleNamespace(checks=SimpleNamespace(acoustic=1.0)),
+            frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose),
+            state=SimpleNamespace(checks=SimpleNamespace(acoustic=1.0), path_dependent=False),
         ))  # fmt: skip
     return made
 
@@ -185,13 +188,16 @@ def facing(turn, lean, distance=0.06, free=0.0):
 @given(seeds)
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
-    from study.case.contact import ANTIPODAL, NOT_ANTIPODAL, PADS_MEET, flags
+    from scoring.score import ScoreFlag
+    from study.case.contact import ANTIPODAL, flags
+    from study.flags import Flag
 
+    none = ScoreFlag(0)
     turn = Rotation.random(random_state=seed)
-    assert flags(facing(turn, 0.0), 0.0, 0) == 0
-    assert flags(facing(turn, ANTIPODAL), 1.0, 0) == NOT_ANTIPODAL
-    assert flags(facing(turn, 0.0, 0.06, 0.03), 1.0, 0) == PADS_MEET
-    assert flags(facing(turn, 0.0, 0.06, 0.0299), 1.0, 0) == 0
+    assert flags(facing(turn, 0.0), 0.0, none) == 0
+    assert flags(facing(turn, ANTIPODAL), 1.0, none) == Flag.ASKEW
+    assert flags(facing(turn, 0.0, 0.06, 0.03), 1.0, none) == Flag.OVERLAP
+    assert flags(facing(turn, 0.0, 0.06, 0.0299), 1.0, none) == 0
 
 
 @tries
@@ -199,6 +205,7 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
 def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
     """Without friction the force on a straight wall's support is rounding; a newton is not."""
     from study.case import wall
+    from study.flags import Flag
 
     random = np.random.default_rng(seed)
     scene = SimpleNamespace(friction=SimpleNamespace(mu=0.0), object=None)
@@ -207,9 +214,9 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wall, "thin_body", lambda shape: body)
         values = {"maps/support_force": abs(random.normal(0.0, 1e-12)), "maps/wall_stress": moved([5e7], seed)[0]}
-        assert wall.wall_flags(scene, state, values) == wall.YIELDS
+        assert wall.wall_flags(scene, state, values) == Flag.YIELDS
         values = {"maps/support_force": 1.0, "maps/wall_stress": 4e7}
-        assert wall.wall_flags(scene, state, values) == wall.SLIDES_OUT
+        assert wall.wall_flags(scene, state, values) == Flag.SLIDES_OUT
 
 
 # --- look-ups and probes ----------------------------------------------------------------------------------------------
