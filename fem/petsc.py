@@ -22,9 +22,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.blas_buffers import take_buffers
-from fem.errors import ConvergenceError
-from fem.pattern import Pattern, add_up
+from softjaw.fem.blas_buffers import take_buffers
+from softjaw.fem.contact.pattern import Pattern, add_up
+from softjaw.fem.errors import ConvergenceError
 
 FloatArray = NDArray[np.float64]
 

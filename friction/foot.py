@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from friction.orientation import slivers
-from friction.patch import CANCEL, ContactPatch, FloatArray
+from softjaw.friction.orientation import slivers
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
 TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both faces
 SAME = 1e-6  # of a usual face's size: corners no farther apart are one

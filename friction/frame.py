@@ -8,9 +8,9 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import ArrayLike
 
-from friction.foot import ContactFace, foot
-from friction.orientation import behind, firm, opposing, wound
-from friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
+from softjaw.friction.foot import ContactFace, foot
+from softjaw.friction.orientation import behind, firm, opposing, wound
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
 
 MAX_ITERATIONS = 100
 STILL = 1e-12  # change of the unit normal at which the iteration ends

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from friction.patch import ContactPatch, FloatArray
+from softjaw.friction.patch import ContactPatch, FloatArray
 
 ANGLE = 1e-6  # of a cosine: files in single precision know their directions to some 1e-7
 SLIVER = 1e-9  # area of a face over the square of its size, below which it has no side

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from friction.patch import ContactPatch, FloatArray
+from softjaw.friction.patch import ContactPatch, FloatArray
 
 GAUSS = 1 / np.sqrt(3)
 # Reference coordinates of the corners of an element, in order around it, and of the corners of its four faces.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from friction.kernel import friction_sums
-from friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
-from friction.wrench import Model, checked_mu, model_faces
+from softjaw.friction.kernel import friction_sums
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
+from softjaw.friction.wrench import Model, checked_mu, model_faces
 
 MAX_CUTS = 2000
 

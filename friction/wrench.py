@@ -28,9 +28,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from friction.kernel import friction_sums
-from friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
-from friction.patch import CANCEL, ContactPatch, FloatArray
+from softjaw.friction.kernel import friction_sums
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
 Model = Literal["curved", "flat", "projected", "unrolled"]
 MODELS: tuple[str, ...] = get_args(Model)

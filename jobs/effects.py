@@ -16,20 +16,20 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.errors import CheckError, ConvergenceError
-from fem.linear_pad import departure
-from friction.motion import fibonacci_twists
-from friction.wrench import friction_wrench
-from scoring.polytope import polytope_volume
-from study import pictures
-from study.case import coupling_level, model, pad_level, sheet_level, wall
-from study.case.build import build_object, pad_material
-from study.case.contact import Contact
-from study.case.limit_surface import Bound, bound
-from study.case.solving import Solver, solver
-from study.case.sweep import units
-from study.scene import Scene, load_scene, parse_scene
-from study.scene.score_sections import LimitSurface
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.pad.linear_pad import departure
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_wrench
+from softjaw.scoring.polytope import polytope_volume
+from softjaw.study.case import coupling_level, model, pad_level, sheet_level, wall
+from softjaw.study.case.build import build_object, pad_material
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.limit_surface import Bound, bound
+from softjaw.study.case.solving import Solver, solver
+from softjaw.study.case.sweep import units
+from softjaw.study.scene import Scene, load_scene, parse_scene
+from softjaw.study.scene.score_sections import LimitSurface
+from softjaw.study.show import pictures
 
 TARGET = 0.02  # relative error of e_n that a skip may have
 FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there

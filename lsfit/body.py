@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from lsfit.flag import FitFlag
-from lsfit.geometry import directions, shadow_area
-from lsfit.samples import NOTHING, checked_wrenches, sample_rank
-from lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
+from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.geometry import directions, shadow_area
+from softjaw.lsfit.samples import NOTHING, checked_wrenches, sample_rank
+from softjaw.lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
 
 __all__ = ["ExactSurface", "body_volume", "hull_volume", "shadow_area"]
 

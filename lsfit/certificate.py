@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lsfit.definite import definite_freedom
-from lsfit.form import substitute
-from lsfit.lowest import smallest_eigenvalue
-from lsfit.quartic_surface import Quartic
-from lsfit.sos import MARGIN, ball_freedom, gram_matrix
-from lsfit.surface import Image
+from softjaw.lsfit.definite import definite_freedom
+from softjaw.lsfit.form import substitute
+from softjaw.lsfit.lowest import smallest_eigenvalue
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.sos import MARGIN, ball_freedom, gram_matrix
+from softjaw.lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
 

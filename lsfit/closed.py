@@ -7,10 +7,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from lsfit.flag import OpenBodyError, UndecidedError
-from lsfit.form import exponents
-from lsfit.geometry import half_sphere_monomials
-from lsfit.lowest import lies_above, smallest_value
+from softjaw.lsfit.flag import OpenBodyError, UndecidedError
+from softjaw.lsfit.form import exponents
+from softjaw.lsfit.geometry import half_sphere_monomials
+from softjaw.lsfit.lowest import lies_above, smallest_value
 
 FloatArray = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from lsfit.flag import FitFlag
-from lsfit.form import exponents, monomials
-from lsfit.samples import FLAT, NOTHING, checked_wrenches, principal_frame
-from lsfit.sos import least_in_cone, quadratic_parts
-from lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
-from lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.samples import FLAT, NOTHING, checked_wrenches, principal_frame
+from softjaw.lsfit.sos import least_in_cone, quadratic_parts
+from softjaw.lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
+from softjaw.lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 FAR = 10.0  # largest reach of a fitted ellipsoid, as a multiple of the samples' largest

@@ -9,7 +9,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.sums import fill_monomials
+from softjaw.lsfit.sums import fill_monomials
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

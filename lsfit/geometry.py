@@ -12,9 +12,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import roots_gegenbauer
 
-from lsfit.flag import FitError
-from lsfit.form import exponents, monomials
-from lsfit.sums import fill_floors
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.sums import fill_floors
 
 FloatArray = NDArray[np.float64]
 

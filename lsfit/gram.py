@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.special import factorial
 
-from lsfit.geometry import directions
+from softjaw.lsfit.geometry import directions
 
 FloatArray = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import csr_array
 
-from lsfit.flag import FitError
+from softjaw.lsfit.flag import FitError
 
 FloatArray = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from lsfit.form import derivative, exponents, hessian_tensor, monomials
-from lsfit.geometry import directions, half_sphere_monomials
+from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials
+from softjaw.lsfit.geometry import directions, half_sphere_monomials
 
 FloatArray = NDArray[np.float64]
 SLOPE = 1e-12  # of the largest value: the gradient at which the search ends; the value is then good to its square

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.samples import checked_motions
-from lsfit.sums import ENDLESS, mean_errors
-from lsfit.surface import LimitSurface
+from softjaw.lsfit.samples import checked_motions
+from softjaw.lsfit.sums import ENDLESS, mean_errors
+from softjaw.lsfit.surface import LimitSurface
 
 __all__ = ["LimitSurface", "Misfit", "misfit"]
 

@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.certificate import Certificate, certify
-from lsfit.ellipsoid import FAR, nearest_solution
-from lsfit.flag import FitError, FitFlag
-from lsfit.lowest import lies_above
-from lsfit.quartic_surface import Quartic
-from lsfit.round import Residuals, ball_coefficients, placed, round_samples
-from lsfit.sos import MARGIN, convex_least_squares
-from lsfit.surface import Image
+from softjaw.lsfit.certificate import Certificate, certify
+from softjaw.lsfit.ellipsoid import FAR, nearest_solution
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.lowest import lies_above
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.round import Residuals, ball_coefficients, placed, round_samples
+from softjaw.lsfit.sos import MARGIN, convex_least_squares
+from softjaw.lsfit.surface import Image
 
 __all__ = ["Quartic", "QuarticFit", "convex_quartic", "least_squares_quartic"]
 

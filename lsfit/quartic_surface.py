@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.closed import refuse_open
-from lsfit.flag import FitError, FitFlag
-from lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
-from lsfit.geometry import (
+from softjaw.lsfit.closed import refuse_open
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials, substitute
+from softjaw.lsfit.geometry import (
     directions,
     half_sphere_monomials,
     quartic_shadow,
@@ -19,10 +19,10 @@ from lsfit.geometry import (
     round_frame,
     supported_shadow,
 )
-from lsfit.lowest import lowest_eigenvalues, neighbours
-from lsfit.newton import support_points
-from lsfit.surface import LevelSet, checked_factors, rows
-from lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.lowest import lowest_eigenvalues, neighbours
+from softjaw.lsfit.newton import support_points
+from softjaw.lsfit.surface import LevelSet, checked_factors, rows
+from softjaw.lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.ellipsoid import full_ellipsoid
-from lsfit.flag import FitFlag
-from lsfit.form import exponents, substitute
-from lsfit.quartic_surface import Quartic
-from lsfit.samples import checked_motions, principal_frame
-from lsfit.sums import fill_residuals
-from lsfit.surface import Image
+from softjaw.lsfit.ellipsoid import full_ellipsoid
+from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.form import exponents, substitute
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.samples import checked_motions, principal_frame
+from softjaw.lsfit.sums import fill_residuals
+from softjaw.lsfit.surface import Image
 
 FloatArray = NDArray[np.float64]
 TILT = 50.0  # spread of a frame's directions from which coefficients lose digits: its fourth power times rounding

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.flag import FitFlag
+from softjaw.lsfit.flag import FitFlag
 
 FloatArray = NDArray[np.float64]
 UNIT = 1e-5  # how far the length of a unit motion may be from 1

@@ -15,16 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.ellipsoid import full_ellipsoid, nearest_solution
-from lsfit.flag import FitError
-from lsfit.form import exponents, monomial_gradients, monomials
-from lsfit.gram import GramCertificate, ball_gram, gram_certificate, gram_map
-from lsfit.interior import least_quadratic
-from lsfit.misfit import Misfit, misfit
-from lsfit.quartic_surface import Quartic
-from lsfit.round import ball_coefficients
-from lsfit.span import Scaling, SpanSamples, placed, refuse_runaway, span_samples
-from lsfit.surface import LimitSurface
+from softjaw.lsfit.ellipsoid import full_ellipsoid, nearest_solution
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.form import exponents, monomial_gradients, monomials
+from softjaw.lsfit.gram import GramCertificate, ball_gram, gram_certificate, gram_map
+from softjaw.lsfit.interior import least_quadratic
+from softjaw.lsfit.misfit import Misfit, misfit
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.round import ball_coefficients
+from softjaw.lsfit.span import Scaling, SpanSamples, placed, refuse_runaway, span_samples
+from softjaw.lsfit.surface import LimitSurface
 
 FloatArray = NDArray[np.float64]
 

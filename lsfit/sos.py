@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
-from lsfit.flag import FitError
-from lsfit.form import exponents
-from lsfit.gram import ball_gram, gram_map, quadratic_map, upper_triangle
-from lsfit.interior import least_quadratic
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.form import exponents
+from softjaw.lsfit.gram import ball_gram, gram_map, quadratic_map, upper_triangle
+from softjaw.lsfit.interior import least_quadratic
 
 FloatArray = NDArray[np.float64]
 

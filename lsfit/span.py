@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from lsfit.flag import FitError, FitFlag
-from lsfit.lowest import lies_above, smallest_value
-from lsfit.quartic_surface import Quartic
-from lsfit.samples import FLAT, THIN
-from lsfit.surface import Image, LimitSurface
-from lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.lowest import lies_above, smallest_value
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.samples import FLAT, THIN
+from softjaw.lsfit.surface import Image, LimitSurface
+from softjaw.lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 Scaling = Literal["maxima", "whitened", "none"]

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.flag import FitError, FitFlag
-from lsfit.geometry import supported_shadow
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.geometry import supported_shadow
 
 __all__ = ["FitError", "FitFlag", "Image", "LevelSet", "LimitSurface"]
 

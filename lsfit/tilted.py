@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsfit.flag import FitFlag
-from lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
+from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
 
 FloatArray = NDArray[np.float64]
 

@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 
-from lsfit.flag import FitError
-from lsfit.form import exponents, monomial_gradients, monomials
-from lsfit.gram import gram_map, quadratic_map, upper_triangle
-from lsfit.quartic_surface import Quartic
-from lsfit.span import FAR, CollapsedFitError, Scaling, SpanSamples, placed, refuse_runaway, span_samples
-from lsfit.surface import LimitSurface
-from lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.form import exponents, monomial_gradients, monomials
+from softjaw.lsfit.gram import gram_map, quadratic_map, upper_triangle
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.span import FAR, CollapsedFitError, Scaling, SpanSamples, placed, refuse_runaway, span_samples
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from scoring.contact import Body
+from softjaw.scoring.contact import Body
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.polytope import polytope_volume
+from softjaw.scoring.polytope import polytope_volume
 
 FloatArray = NDArray[np.float64]
 

@@ -18,12 +18,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.conic import cone_programme
-from scoring.contact import Body, SoftContact
-from scoring.gauge import contact_support, gauge, joint_support
-from scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from scoring.radius import certified_radius
-from scoring.reach import reach
+from softjaw.scoring.conic import cone_programme
+from softjaw.scoring.contact import Body, SoftContact
+from softjaw.scoring.gauge import contact_support, gauge, joint_support
+from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
+from softjaw.scoring.radius import certified_radius
+from softjaw.scoring.reach import reach
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def epsilon(
 
     Examples
     --------
-    >>> from scoring.contact import EllipsoidBody, SoftContact, contact_axes
+    >>> from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
     >>> body = EllipsoidBody([1, 1, 0.2])
     >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
     >>> round(epsilon(pads, 1.0, 1.0).upper, 6) == round(0.4 / 1.04**0.5, 6)

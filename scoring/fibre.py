@@ -24,9 +24,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from scoring.boundary import THIN, ellipsoid_matrix, surface_mesh
-from scoring.contact import Body
-from scoring.plane import fan_area, polygon_area
+from softjaw.scoring.boundary import THIN, ellipsoid_matrix, surface_mesh
+from softjaw.scoring.contact import Body
+from softjaw.scoring.plane import fan_area, polygon_area
 
 FloatArray = NDArray[np.float64]
 TINY = 1e-200  # instead of a singular value 0

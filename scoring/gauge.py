@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scoring.conic import cone_programme
+from softjaw.scoring.conic import cone_programme
 
 FloatArray = NDArray[np.float64]
 

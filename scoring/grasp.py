@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.boundary import ellipsoid_matrix
-from scoring.contact import SoftContact
-from scoring.epsilon import epsilon_l1, epsilon_linf
-from scoring.epsilon_search import epsilon
-from scoring.pose import pose_volume
-from scoring.rays import ray_volume
-from scoring.score import Score, contact_flag
-from scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.boundary import ellipsoid_matrix
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.rays import ray_volume
+from softjaw.scoring.score import Score, contact_flag
+from softjaw.scoring.volume import volume_l1, volume_linf
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def grasp_score(
 
     Examples
     --------
-    >>> from scoring.contact import EllipsoidBody, contact_axes
+    >>> from softjaw.scoring.contact import EllipsoidBody, contact_axes
     >>> body = EllipsoidBody([1, 1, 0.2])
     >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
     >>> found = grasp_score(pads, object_length=1.0, contact_length=1.0)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from scoring.contact import PolytopeBody, SoftContact
-from scoring.epsilon_search import epsilon
-from scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from scoring.polytope import fibonacci_vertices, graspit_vertices
+from softjaw.scoring.contact import PolytopeBody, SoftContact
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
+from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices
 
 FloatArray = NDArray[np.float64]
 

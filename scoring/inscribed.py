@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scoring.contact import Body
-from scoring.polytope import fibonacci_vertices
+from softjaw.scoring.contact import Body
+from softjaw.scoring.polytope import fibonacci_vertices
 
 FloatArray = NDArray[np.float64]
 

@@ -29,9 +29,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.contact import Body, PolytopeBody, SoftContact
-from scoring.fibre import Fibre, Span, fibre_of
-from scoring.plane import joint_pairs, mixed_area
+from softjaw.scoring.contact import Body, PolytopeBody, SoftContact
+from softjaw.scoring.fibre import Fibre, Span, fibre_of
+from softjaw.scoring.plane import joint_pairs, mixed_area
 
 FloatArray = NDArray[np.float64]
 ROUNDING = 1e-13

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 from scipy.special import ndtri
 
-from scoring.boundary import ellipsoid_matrix, sphere_mesh, touching_points
-from scoring.conic import cone_programme
-from scoring.contact import Body, SoftContact
+from softjaw.scoring.boundary import ellipsoid_matrix, sphere_mesh, touching_points
+from softjaw.scoring.conic import cone_programme
+from softjaw.scoring.contact import Body, SoftContact
 
 FloatArray = NDArray[np.float64]
 GOLDEN = 1.1347241384015194  # root of x^7 = x + 1

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from scoring.contact import Body
-from scoring.gauge import gauge
-from scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from scoring.polytope import fibonacci_vertices
-from scoring.simplex import best_columns
+from softjaw.scoring.contact import Body
+from softjaw.scoring.gauge import gauge
+from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
+from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.scoring.simplex import best_columns
 
 FloatArray = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from enum import IntFlag
 
 import numpy as np
 
-from scoring.contact import Body, EllipsoidBody
-from scoring.epsilon import epsilon_l1, epsilon_linf
-from scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.contact import Body, EllipsoidBody
+from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
+from softjaw.scoring.volume import volume_l1, volume_linf
 
 NOTHING = 1e-12
 """Share of the largest load, torques divided by their length, up to which a load is the rounding of none."""

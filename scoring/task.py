@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scoring.contact import SoftContact
-from scoring.reach import Reach, reach
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.reach import Reach, reach
 
 FloatArray = NDArray[np.float64]
 

@@ -11,21 +11,21 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from study import commands
-from study.completion import add_options as add_completion_options
-from study.cost.command import add_options as add_cost_options
-from study.environment import keep_compiled_loops, pin_threads
-from study.execution.memory import is_out_of_memory, no_room
-from study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
-from study.figures.command import add_options as add_figure_options
-from study.file_options import add_repair_options, add_scale_options
-from study.help import Formatter, Parser, Program
-from study.patch.command import add_options as add_patch_options
-from study.speaking import complain
-from study.start import add_options as add_init_options
-from study.tables.watch import add_options as add_watch_options
-from study.view.command import add_choice
-from study.view.command import add_options as add_view_options
+from softjaw.study import commands
+from softjaw.study.accuracy.cost.command import add_options as add_cost_options
+from softjaw.study.completion import add_options as add_completion_options
+from softjaw.study.environment import keep_compiled_loops, pin_threads
+from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
+from softjaw.study.file_options import add_repair_options, add_scale_options
+from softjaw.study.help import Formatter, Parser, Program
+from softjaw.study.patch.command import add_options as add_patch_options
+from softjaw.study.run.memory import is_out_of_memory, no_room
+from softjaw.study.scene.start import add_options as add_init_options
+from softjaw.study.show.figures.command import add_options as add_figure_options
+from softjaw.study.show.tables.watch import add_options as add_watch_options
+from softjaw.study.show.view.command import add_choice
+from softjaw.study.show.view.command import add_options as add_view_options
+from softjaw.study.speaking import complain
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 

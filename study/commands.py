@@ -9,20 +9,20 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from study.execution.memory import is_out_of_memory, no_room, require_room
-from study.execution.running import prepare, scene_of, target, with_target_met, work
-from study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
-from study.speaking import complain, say
-from study.writing import write_file
+from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
+from softjaw.study.run.running import prepare, scene_of, target, with_target_met, work
+from softjaw.study.speaking import complain, say
+from softjaw.study.writing import write_file
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
     """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
-    from study.scene.errors import SceneError
+    from softjaw.study.scene.errors import SceneError
 
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):
-        from study.storage.store import open_result, torn_rows
+        from softjaw.study.result.store import open_result, torn_rows
 
         try:
             with open_result(file) as result:
@@ -41,26 +41,26 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
 
 def init(options: Namespace) -> int:
     """Write a scene and a batch script to start from."""
-    from study.start import init
+    from softjaw.study.scene.start import init
 
     print(init(options))
     return DONE
 
 
 def _catalogue(options: Namespace) -> bool:
-    from study.catalogue.model import is_catalogue
+    from softjaw.study.catalogue.model import is_catalogue
 
     return is_catalogue(Path(options.scene))
 
 
 def check(options: Namespace) -> int:
     """Find every error of a scene or of a catalogue, or say what would be run."""
-    from study.case.build import check_object
-    from study.tables.columns import hanging, terminal_width
-    from study.tables.overview import scene_text
+    from softjaw.study.case.build import check_object
+    from softjaw.study.show.tables.columns import hanging, terminal_width
+    from softjaw.study.show.tables.overview import scene_text
 
     if _catalogue(options):
-        from study.catalogue.run import check_text
+        from softjaw.study.catalogue.run import check_text
 
         say(check_text(Path(options.scene), options.overrides))
         return DONE
@@ -72,9 +72,9 @@ def check(options: Namespace) -> int:
 
 def plan(options: Namespace) -> int:
     """Say what a run will take."""
-    from study.case.build import warnings
-    from study.execution.plan import make_plan, plan_text
-    from study.tables.columns import hanging, terminal_width
+    from softjaw.study.case.build import warnings
+    from softjaw.study.run.plan import make_plan, plan_text
+    from softjaw.study.show.tables.columns import hanging, terminal_width
 
     if _catalogue(options):
         text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
@@ -91,9 +91,9 @@ def plan(options: Namespace) -> int:
 
 def status(options: Namespace) -> int:
     """Say what a result file holds so far."""
-    from study.storage.store import open_result
-    from study.tables.columns import terminal_width
-    from study.tables.status import status_csv, status_json, status_text
+    from softjaw.study.result.store import open_result
+    from softjaw.study.show.tables.columns import terminal_width
+    from softjaw.study.show.tables.status import status_csv, status_json, status_text
 
     forms = {"json": status_json, "csv": status_csv}
     with open_result(options.file) as result:
@@ -103,14 +103,14 @@ def status(options: Namespace) -> int:
 
 def watch(options: Namespace) -> int:
     """Show how a run goes on until it ends."""
-    from study.tables.watch import watch
+    from softjaw.study.show.tables.watch import watch
 
     return watch(Path(options.file), options.every)
 
 
 def repair(options: Namespace) -> int:
     """Say what of a damaged file is good, and make it usable."""
-    from study.storage.repair import repair
+    from softjaw.study.result.repair import repair
 
     say(repair(Path(options.file), options.write, options.in_place))
     return DONE
@@ -118,7 +118,7 @@ def repair(options: Namespace) -> int:
 
 def scale(options: Namespace) -> int:
     """Replay a finished study on many ranks."""
-    from study.execution.scaling import scaling_text
+    from softjaw.study.run.scaling import scaling_text
 
     say(scaling_text(Path(options.file), options))
     return DONE
@@ -126,9 +126,9 @@ def scale(options: Namespace) -> int:
 
 def show(options: Namespace) -> int:
     """Print the best grasps."""
-    from study.storage.store import open_result
-    from study.tables.columns import terminal_width
-    from study.tables.show import as_csv, as_json, as_text, best
+    from softjaw.study.result.store import open_result
+    from softjaw.study.show.tables.columns import terminal_width
+    from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 
     with open_result(options.file) as result:
         table = best(result, options.force, options.top, whole_lines=options.form is None)
@@ -139,10 +139,10 @@ def show(options: Namespace) -> int:
 
 def compare(options: Namespace) -> int:
     """Print two maps side by side."""
-    from study.storage.store import open_result
-    from study.tables.columns import terminal_width
-    from study.tables.compare import compare
-    from study.tables.compare_text import comparison_csv, comparison_json, comparison_text
+    from softjaw.study.result.store import open_result
+    from softjaw.study.show.tables.columns import terminal_width
+    from softjaw.study.show.tables.compare import compare
+    from softjaw.study.show.tables.compare_text import comparison_csv, comparison_json, comparison_text
 
     with open_result(options.files[0]) as one, open_result(options.files[1]) as other:
         found = compare(one, other, options.quantity, options.model)
@@ -154,8 +154,8 @@ def compare(options: Namespace) -> int:
 
 def export(options: Namespace) -> int:
     """Write every case for planners."""
-    from study.storage.store import open_result
-    from study.tables.export import as_csv, as_json
+    from softjaw.study.result.store import open_result
+    from softjaw.study.show.tables.export import as_csv, as_json
 
     with open_result(options.file) as result:
         text = {"json": as_json, "csv": as_csv}[options.form](result, options.model)
@@ -169,8 +169,8 @@ def export(options: Namespace) -> int:
 
 def report(options: Namespace) -> int:
     """Write one page with everything."""
-    from study.report.writing import write_report
-    from study.view.command import choice
+    from softjaw.study.show.report.writing import write_report
+    from softjaw.study.show.view.command import choice
 
     page = Path(options.output or Path(options.file).with_suffix(".html"))
     for made in write_report(Path(options.file), page, *choice(options)):
@@ -180,7 +180,7 @@ def report(options: Namespace) -> int:
 
 def patch(options: Namespace) -> int:
     """Judge a pressure field from elsewhere."""
-    from study.patch.command import answer_text
+    from softjaw.study.patch.command import answer_text
 
     say(answer_text(options))
     return DONE
@@ -188,7 +188,7 @@ def patch(options: Namespace) -> int:
 
 def view(options: Namespace) -> int:
     """Show a result in three dimensions."""
-    from study.view.command import view
+    from softjaw.study.show.view.command import view
 
     view(options)
     return DONE
@@ -196,15 +196,15 @@ def view(options: Namespace) -> int:
 
 def figure(options: Namespace) -> int:
     """Redraw figures of the paper."""
-    from study.figures.command import figure
+    from softjaw.study.show.figures.command import figure
 
     return figure(options)
 
 
 def completion(options: Namespace) -> int:
     """Print a script that lets a shell complete the words of this program."""
-    from study.cli import program
-    from study.completion import script
+    from softjaw.study.cli import program
+    from softjaw.study.completion import script
 
     print(script(program(), options.shell))
     return DONE
@@ -213,7 +213,7 @@ def completion(options: Namespace) -> int:
 def cost(options: Namespace) -> int:
     """Measure what accuracy costs in time."""
     require_room()
-    from study.cost.command import run
+    from softjaw.study.accuracy.cost.command import run
 
     run(options, scene_of(options))
     return DONE
@@ -223,7 +223,7 @@ def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
     import json
 
-    from study.scene import Scene
+    from softjaw.study.scene import Scene
 
     print(json.dumps(Scene.model_json_schema(), indent=2))
     return DONE
@@ -231,7 +231,7 @@ def schema(_options: Namespace) -> int:
 
 def doctor(_options: Namespace) -> int:
     """Say whether this machine has what is needed."""
-    from study.doctor import doctor
+    from softjaw.study.doctor import doctor
 
     return doctor()
 
@@ -242,7 +242,7 @@ def run(options: Namespace) -> int:
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     from mpi4py import MPI
 
-    from study.execution.progress import Unbreakable
+    from softjaw.study.run.progress import Unbreakable
 
     comm = MPI.COMM_WORLD
     sys.stdout = Unbreakable(sys.stdout)
@@ -263,10 +263,10 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from study.execution.run import on_rank0, run_study
+    from softjaw.study.run.run import on_rank0, run_study
 
     if on_rank0(comm, _catalogue, options):
-        from study.catalogue.run import run_catalogue
+        from softjaw.study.catalogue.run import run_catalogue
 
         return run_catalogue(options, comm)
 
@@ -275,7 +275,7 @@ def _run_on(comm: Any, options: Namespace) -> int:
         return scene, target(options, scene)
 
     scene, path = on_rank0(comm, read)  # before the solvers are loaded: most wrong scenes are told of at once
-    from study import pipeline  # noqa: F401  (loads PETSc, which all ranks have to do together)
+    from softjaw.study import pipeline  # noqa: F401  (loads PETSc, which all ranks have to do together)
 
     scene, choice = on_rank0(comm, with_target_met, scene, path)
     how = work(scene, choice)

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.environment import THREADS, ask, compiled_loops_pass, mpirun
-from study.exits import CANNOT_WRITE, DONE, USAGE
+from softjaw.study.environment import THREADS, ask, compiled_loops_pass, mpirun
+from softjaw.study.exits import CANNOT_WRITE, DONE, USAGE
 
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"
@@ -51,7 +51,7 @@ def check_packages() -> Finding:
 
 def check_numpy() -> Finding:
     """The compiled system packages were built for the numpy that is imported."""
-    answer = ask("import numpy; print(numpy.__version__); import h5py; from fem.petsc import PETSc")
+    answer = ask("import numpy; print(numpy.__version__); import h5py; from softjaw.fem.petsc import PETSc")
     version = answer.output or "not importable"
     if "dtype size changed" in answer.errors or "compiled using NumPy 1" in answer.errors:
         older = "numpy>=1.26,<2" if version.startswith("2") else "numpy>=2"
@@ -63,7 +63,7 @@ def check_numpy() -> Finding:
 
 SADDLE = """
 import numpy as np
-from fem.petsc import PETSc
+from softjaw.fem.petsc import PETSc
 assert PETSc.ScalarType is np.float64, "PETSc was built with complex scalars"
 K = PETSc.Mat().createDense([3, 3], array=np.array([[2.0, 0, 1], [0, 2, 1], [1, 1, 0]]), comm=PETSc.COMM_SELF)
 K = K.convert("aij")

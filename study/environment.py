@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-ROOT = Path(__file__).parent.parent
-COMPILED = ("fem", "friction", "lsfit", "scoring")  # packages with loops that numba compiles
+ROOT = Path(__file__).parents[2]  # where the package softjaw lies
+# folders with loops that numba compiles
+COMPILED = ("fem", "fem/contact", "fem/objects", "fem/pad", "fem/shell", "friction", "lsfit", "scoring")
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
 
@@ -37,7 +38,7 @@ def keep_compiled_loops() -> None:
     """
     if os.environ.get("NUMBA_CACHE_DIR") or _writable(_user_cache()):
         return
-    if all(_writable(ROOT / package / "__pycache__") for package in COMPILED):
+    if all(_writable(ROOT / "softjaw" / package / "__pycache__") for package in COMPILED):
         return
     folder = tempfile.mkdtemp(prefix=PASSING)
     os.environ["NUMBA_CACHE_DIR"] = folder

@@ -71,7 +71,7 @@ OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits t
 def raised(flag: IntFlag) -> Flag:
     """Bits of the file for a flag of a lower package, whose members have the same names here.
 
-    >>> from friction.frame import FrameFlag
+    >>> from softjaw.friction.frame import FrameFlag
     >>> raised(FrameFlag.HOLE | FrameFlag.ORIENTATION) == Flag.HOLE | Flag.ORIENTATION
     True
     """

@@ -9,8 +9,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import IO, Any
 
-from study.exits import MEANING
-from study.speaking import first_rank
+from softjaw.study.exits import MEANING
+from softjaw.study.speaking import first_rank
 
 GROUPS = (  # in the order of use; a command that stands nowhere is listed under the last title
     ("prepare", ("init", "check", "plan", "cost")),

@@ -13,23 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.errors import CheckError, ConvergenceError
-from friction.motion import cor_grid
-from friction.wrench import friction_wrench
-from study.case import model
-from study.case.build import build_object
-from study.case.contact import Contact, angles, flags
-from study.case.effects import effects_of
-from study.case.grasp import grasp_values, quality
-from study.case.limit_surface import Bound, bound, fit_flag, surface_values
-from study.case.solving import Solved, Solver, solver
-from study.case.wall import wall_flags
-from study.case.weight import safety_factors
-from study.flags import flag_sentences
-from study.scene import Scene
-from study.storage.quantity import MODELS
-from study.storage.result import CaseFailure, CaseResult
-from study.uncertainty.probing import Probing
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.friction.motion import cor_grid
+from softjaw.friction.wrench import friction_wrench
+from softjaw.study.accuracy.uncertainty.probing import Probing
+from softjaw.study.case import model
+from softjaw.study.case.build import build_object
+from softjaw.study.case.contact import Contact, angles, flags
+from softjaw.study.case.effects import effects_of
+from softjaw.study.case.grasp import grasp_values, quality
+from softjaw.study.case.limit_surface import Bound, bound, fit_flag, surface_values
+from softjaw.study.case.solving import Solved, Solver, solver
+from softjaw.study.case.wall import wall_flags
+from softjaw.study.case.weight import safety_factors
+from softjaw.study.flags import flag_sentences
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.result.result import CaseFailure, CaseResult
+from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
@@ -111,7 +111,7 @@ def _bounds(scene: Scene, contact: Contact) -> dict[str, Bound]:
 
 
 def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, Bound]]) -> dict[str, Any]:
-    """Maps and per-finger values of one case, keyed as in ``study.storage.quantities``."""
+    """Maps and per-finger values of one case, keyed as in ``study.result.quantities``."""
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")

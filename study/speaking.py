@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 
-from study.exits import StudyError
-from study.tables.printable import printable
+from softjaw.study.exits import StudyError
+from softjaw.study.show.tables.printable import printable
 
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 

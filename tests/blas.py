@@ -26,7 +26,7 @@ def usable() -> list[str]:
 
 def loaded() -> dict[str, str]:
     """Kernel of every copy of OpenBLAS in this process, by its file, once all that computes is imported."""
-    for name in ("numpy", "scipy.linalg", "fem.petsc"):
+    for name in ("numpy", "scipy.linalg", "softjaw.fem.petsc"):
         importlib.import_module(name)
     files = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "openblas" in line}
     found = {}

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ellipeinc
 
-from friction.patch import ContactPatch
+from softjaw.friction.patch import ContactPatch
 
 
 def _mid(lower, upper, n):

@@ -12,26 +12,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from friction.motion import cor_grid, cor_twists, fibonacci_twists, screw_twist
-from friction.patch import ContactPatch
-from friction.torque import pure_torque
-from friction.wrench import friction_limits, friction_support, friction_wrench
-from lsfit.body import body_volume, shadow_area
-from lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from lsfit.misfit import misfit
-from lsfit.quartic import convex_quartic, least_squares_quartic
-from lsfit.samples import normalised_samples, sample_rank
-from lsfit.six import six_samples, span_ellipsoid, span_quartic
-from lsfit.surface import FitFlag
-from lsfit.zhou import ZhouWeights, zhou_ellipsoid, zhou_quartic
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.epsilon import epsilon_l1, epsilon_linf
-from scoring.epsilon_search import epsilon
-from scoring.polytope import fibonacci_vertices, graspit_vertices
-from scoring.pose import pose_volume
-from scoring.score import score
-from scoring.volume import volume_l1, volume_linf
+from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
+from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists, screw_twist
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.lsfit.body import body_volume, shadow_area
+from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.six import six_samples, span_ellipsoid, span_quartic
+from softjaw.lsfit.surface import FitFlag
+from softjaw.lsfit.zhou import ZhouWeights, zhou_ellipsoid, zhou_quartic
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import score
+from softjaw.scoring.volume import volume_l1, volume_linf
 from tests.generators import (
     arc_lengths,
     build,

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, QhullError
 
-from friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from friction.motion import SLIDE_X, SLIDE_Y, cor_twists, fibonacci_twists
-from friction.patch import ContactPatch, NoContactError, moved
-from friction.torque import pure_torque
-from friction.wrench import friction_limits, friction_support, friction_wrench
-from lsfit.body import hull_volume
-from lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from lsfit.quartic import convex_quartic, least_squares_quartic
-from lsfit.samples import normalised_samples, sample_rank
-from lsfit.surface import FitFlag
-from scoring.contact import EllipsoidBody, SoftContact, contact_axes
-from scoring.polytope import fibonacci_vertices, polytope_volume
-from scoring.pose import pose_volume
-from scoring.score import ScoreFlag, score
-from scoring.volume import volume_linf
+from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_twists, fibonacci_twists
+from softjaw.friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.lsfit.body import hull_volume
+from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.surface import FitFlag
+from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
+from softjaw.scoring.polytope import fibonacci_vertices, polytope_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import ScoreFlag, score
+from softjaw.scoring.volume import volume_linf
 from tests.generators import (
     cap_polar,
     cyl_mesh,
@@ -338,7 +338,7 @@ def failure_of_qhull():
             raise QhullError("QH6271 topology error")
         return ConvexHull(points, qhull_options=qhull_options, **options)
 
-    with mock.patch("scoring.polytope.ConvexHull", moody):
+    with mock.patch("softjaw.scoring.polytope.ConvexHull", moody):
         np.testing.assert_allclose(polytope_volume(vertices), exact, rtol=1e-4)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from study.environment import launch_environment, mpirun
+from softjaw.study.environment import launch_environment, mpirun
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -43,7 +43,7 @@ def run_in(folder: Path, block: list[str]) -> None:
     (folder / "jobs").symlink_to(ROOT / "jobs")
     programs = folder / "bin"
     programs.mkdir()
-    (programs / "softjaw").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m study "$@"\n')
+    (programs / "softjaw").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m softjaw "$@"\n')
     (programs / "softjaw").chmod(0o755)
     path = f"{programs}:{os.environ['PATH']}"
     env = {**launch_environment(), "PYTHONPATH": str(ROOT), "PATH": path, "HOME": str(folder)}

@@ -13,8 +13,8 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
 
-from fem.shape import grid_triangles  # noqa: E402
 from jobs.objects.make_flask import write_stl  # noqa: E402
+from softjaw.fem.objects.gap import grid_triangles  # noqa: E402
 
 SEMI_AXES_MM = np.array([25.0, 20.0, 35.0])
 ROWS, COLUMNS = 20, 36

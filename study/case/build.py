@@ -7,19 +7,19 @@ from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from study.exits import USAGE, StudyError
-from study.scene.grasp_warnings import station_warnings
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.scene.grasp_warnings import station_warnings
 
 if TYPE_CHECKING:
-    from fem.materials import Material
-    from fem.outer_surface import OuterSurface
-    from fem.pad_shape import PadShape
-    from fem.shape import GapObject
-    from fem.sheet import Sheet
-    from fem.traced_surface import TracedSurface, TraceReport
-    from study.scene import Scene
-    from study.scene.sections import Gripper
-    from study.scene.shapes import Shape, Walled
+    from softjaw.fem.materials import Material
+    from softjaw.fem.objects.gap import GapObject
+    from softjaw.fem.objects.outer_surface import OuterSurface
+    from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport
+    from softjaw.fem.pad.backing_plate import Sheet
+    from softjaw.fem.pad.shape import PadShape
+    from softjaw.study.scene import Scene
+    from softjaw.study.scene.sections import Gripper
+    from softjaw.study.scene.shapes import Shape, Walled
 
 
 @lru_cache(maxsize=8)
@@ -32,18 +32,18 @@ def build_object(shape: Shape) -> GapObject:
         For geometry that cannot be, a mesh that is open or crosses itself among others.
     """
     if shape.shape == "mesh":
-        from fem.mesh_object import MeshObject
+        from softjaw.fem.objects.mesh_object import MeshObject
 
         return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
     import numpy as np
 
-    from fem import objects
+    from softjaw.fem.objects import shapes as objects
 
     match shape.shape:
         case "revolution":
             return objects.Revolution(np.array(shape.profile))
         case "sections":
-            from fem.stacked import Stacked
+            from softjaw.fem.objects.stacked import Stacked
 
             return Stacked(outer_surface(shape)[0])
         case "elliptic_cylinder":
@@ -65,7 +65,7 @@ def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
     ValueError
         For geometry that cannot be.
     """
-    from fem.outer_surface import Section, of_revolution, of_sections
+    from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 
     if shape.shape == "revolution":
         return of_revolution(build_object(shape)), True
@@ -79,7 +79,7 @@ def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
 @lru_cache(maxsize=8)
 def _traced(shape: Walled) -> tuple[TracedSurface, TraceReport]:
     """Smooth surface of a mesh's wall, and how far it is from the mesh."""
-    from fem.traced_surface import traced
+    from softjaw.fem.objects.traced_surface import traced
 
     return traced(build_object(shape), shape.wall_heights)
 
@@ -130,8 +130,8 @@ def _check_wall(shape: Walled) -> None:
     """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely."""
     import numpy as np
 
-    from fem.shell_body import body_mesh
-    from fem.shell_grid import MeshSize
+    from softjaw.fem.shell.body import body_mesh
+    from softjaw.fem.shell.grid import MeshSize
 
     surface, _ = outer_surface(shape)
     lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
@@ -185,7 +185,7 @@ def _distance(shape: Walled) -> str:
 
 def pad_material(gripper: Gripper) -> Material:
     """Foam of the pads."""
-    from fem.materials import material
+    from softjaw.fem.materials import material
 
     nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
     return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
@@ -193,14 +193,14 @@ def pad_material(gripper: Gripper) -> Material:
 
 def sheet(gripper: Gripper) -> Sheet:
     """Plate behind each pad."""
-    from fem.sheet import Sheet
+    from softjaw.fem.pad.backing_plate import Sheet
 
     return Sheet(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
     """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
-    from fem.pad_shape import PadShape
+    from softjaw.fem.pad.shape import PadShape
 
     shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)
     return shape.halved() if coarser else shape

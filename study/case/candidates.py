@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.pose import Pose
-from study.scene import Scene
-from study.scene.sections import GraspPose
+from softjaw.fem.objects.pose import Pose
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import GraspPose
 
 FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch

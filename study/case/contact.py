@@ -9,18 +9,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.extract import extract
-from fem.press import Pressed
-from friction.frame import Frame, contact_frame, contact_length, in_frame
-from friction.patch import ContactPatch
-from friction.torque import pure_torque
-from friction.wrench import FrictionLimits, friction_limits
-from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
-from scoring.score import ScoreFlag
-from study.case.model import Finger
-from study.flags import Flag, raised
-from study.scene import Scene
-from study.storage.quantity import MODELS
+from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.press import Pressed
+from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import FrictionLimits, friction_limits
+from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
+from softjaw.scoring.score import ScoreFlag
+from softjaw.study.case.model import Finger
+from softjaw.study.flags import Flag, raised
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from fem.press import Pressed
-from study.case.margin import surely_below
-from study.scene import Scene
-from study.storage.quantities import EFFECTS, REASONS
+from softjaw.fem.contact.press import Pressed
+from softjaw.study.case.margin import surely_below
+from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.scene import Scene
 
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
 # tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.

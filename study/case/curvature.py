@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from study.case.sweep import axes
-from study.scene import Scene
-from study.storage.layout import Derived
+from softjaw.study.case.sweep import axes
+from softjaw.study.result.layout import Derived
+from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
-    from study.storage.store import ResultWriter
+    from softjaw.study.result.store import ResultWriter
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}
 

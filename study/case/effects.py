@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from study.case.coupling_level import coupling_level
-from study.case.limit_surface import dropped_share
-from study.case.sheet_level import sheet_level
-from study.scene import Scene
-from study.storage.quantities import EFFECTS, REASONS
+from softjaw.study.case.coupling_level import coupling_level
+from softjaw.study.case.limit_surface import dropped_share
+from softjaw.study.case.sheet_level import sheet_level
+from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.scene import Scene
 
 ONLY, FORCED, BELOW, ABOVE, SYMMETRY = range(5)  # of REASONS
 CHEAP = REASONS.index("never skipped, because it costs next to nothing")

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from lsfit.quartic import Quartic
-from lsfit.surface import LimitSurface
-from scoring.contact import PolytopeBody, SoftContact
-from scoring.epsilon_search import epsilon
-from scoring.polytope import graspit_vertices, polytope_volume
-from scoring.pose import pose_volume
-from scoring.score import ScoreFlag, score
-from scoring.volume import volume_linf
-from study.case.contact import Contact, angles
-from study.case.limit_surface import Bound
-from study.scene import Scene
-from study.storage.quantity import MODELS
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.scoring.contact import PolytopeBody, SoftContact
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.polytope import graspit_vertices, polytope_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import ScoreFlag, score
+from softjaw.scoring.volume import volume_linf
+from softjaw.study.case.contact import Contact, angles
+from softjaw.study.case.limit_surface import Bound
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.scene import Scene
 
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
 NEAR = 1e-2  # relative gap between the bounds of epsilon

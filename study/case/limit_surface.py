@@ -13,28 +13,28 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from friction.motion import fibonacci_twists
-from friction.patch import ContactPatch
-from friction.wrench import FrictionLimits, friction_wrench
-from lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from lsfit.flag import FitError
-from lsfit.misfit import Misfit, misfit
-from lsfit.quartic import Quartic, convex_quartic
-from lsfit.samples import normalised_samples
-from lsfit.six import six_samples, span_ellipsoid
-from lsfit.span import CollapsedFitError, sphere_motions
-from lsfit.surface import LimitSurface
-from lsfit.tilted import TiltedEllipsoid
-from lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
-from study.flags import Flag
-from study.scene import Scene
-from study.scene.score_sections import LimitSurface as Choice
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import FrictionLimits, friction_wrench
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.misfit import Misfit, misfit
+from softjaw.lsfit.quartic import Quartic, convex_quartic
+from softjaw.lsfit.samples import normalised_samples
+from softjaw.lsfit.six import six_samples, span_ellipsoid
+from softjaw.lsfit.span import CollapsedFitError, sphere_motions
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
+from softjaw.study.flags import Flag
+from softjaw.study.scene import Scene
+from softjaw.study.scene.score_sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
-STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.storage.finger_quantities says
+STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.result.finger_quantities says
 
 
 class Bound(NamedTuple):
@@ -146,7 +146,7 @@ def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
 
 
 def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[str, Bound]]) -> dict[str, Any]:
-    """What is stored of both fingers' surfaces, keyed as in ``study.storage.quantities``."""
+    """What is stored of both fingers' surfaces, keyed as in ``study.result.quantities``."""
     every = [[b for b in own.values()] for own in bounds]
     per_model = {
         "matrix": lambda b: matrix(b.surface),
@@ -171,7 +171,7 @@ def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[
 
 
 def six_values(contacts: Sequence[Any]) -> dict[str, Any]:
-    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.storage.quantities``."""
+    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.result.quantities``."""
     found = [six_ellipsoid(c.local, c.rho, c.unit_limits["curved"].S) for c in contacts]
     names = ("matrix_6d", "rank_6d", "misfit_6d")
     return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*found, strict=True), strict=True)}

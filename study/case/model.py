@@ -8,15 +8,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.contact import Gap
-from fem.linear_pad import CondensedPad, linearised
-from fem.pad import Pad
-from fem.pose import Pose
-from fem.shape import GapFunction, GapObject
-from fem.touch import first_touch
-from study.case.build import pad_material, pad_shape, sheet
-from study.scene import Scene
-from study.scene.sections import Gripper
+from softjaw.fem.contact.problem import Gap
+from softjaw.fem.objects.gap import GapFunction, GapObject
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.touch import first_touch
+from softjaw.fem.pad.linear_pad import CondensedPad, linearised
+from softjaw.fem.pad.mesh import Pad
+from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known

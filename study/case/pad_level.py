@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fem.errors import CheckError, ConvergenceError
-from fem.linear_pad import departure
-from fem.linear_press import linear_press
-from fem.press import Settings
-from fem.spring_bed import SpringBed
-from study.case import model
-from study.case.build import pad_material
-from study.case.margin import surely_below
-from study.case.model import Finger
-from study.case.sheet_level import sheet_level
-from study.scene import Scene
+from softjaw.fem.contact.linear_press import linear_press
+from softjaw.fem.contact.press import Settings
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.pad.linear_pad import departure
+from softjaw.fem.pad.spring_bed import SpringBed
+from softjaw.study.case import model
+from softjaw.study.case.build import pad_material
+from softjaw.study.case.margin import surely_below
+from softjaw.study.case.model import Finger
+from softjaw.study.case.sheet_level import sheet_level
+from softjaw.study.scene import Scene
 
 # In 444 cases (pads, objects, forces, laws) e_n of the linear pad was off by at most 0.7 times the departure of its law
 # from a straight line at its largest strain; this keeps it below 1.8 %.

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from functools import partial
 
-from fem.coupling import CoupledProblem, way
-from fem.linear_pad import linearised
-from fem.linear_press import linear_press
-from fem.pad import Pad
-from fem.press import Press
-from fem.stepping import Settings, Stepping
-from study.case import model
-from study.case.build import pad_shape
-from study.case.model import Finger
-from study.case.sheet_level import sheet_level
-from study.scene import Scene
+from softjaw.fem.contact.friction_coupling import CoupledProblem, way
+from softjaw.fem.contact.linear_press import linear_press
+from softjaw.fem.contact.load_stepping import Settings, Stepping
+from softjaw.fem.contact.press import Press
+from softjaw.fem.pad.linear_pad import linearised
+from softjaw.fem.pad.mesh import Pad
+from softjaw.study.case import model
+from softjaw.study.case.build import pad_shape
+from softjaw.study.case.model import Finger
+from softjaw.study.case.sheet_level import sheet_level
+from softjaw.study.scene import Scene
 
 
 def settings(scene: Scene) -> Settings:

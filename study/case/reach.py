@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.pose import Pose
-from fem.shape import Gap, GapObject
-from fem.touch import NoContactError
-from study.case import model
-from study.case.build import build_object
-from study.case.candidates import candidates
-from study.exits import USAGE, StudyError
-from study.scene import Scene
+from softjaw.fem.objects.gap import Gap, GapObject
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.touch import NoContactError
+from softjaw.study.case import model
+from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import candidates
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.scene import Scene
 
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object here (the others fail as cases), and sentences
 

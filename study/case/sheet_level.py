@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from fem.sheet import relative_compliance
-from study.case.build import pad_material, pad_shape, sheet
-from study.case.margin import surely_below
-from study.scene import Scene
-from study.scene.sections import Gripper
+from softjaw.fem.pad.backing_plate import relative_compliance
+from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.case.margin import surely_below
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import Gripper
 
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid sheet put e_n off by at most 3.5 times the relative
 # compliance of the sheet that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
@@ -18,7 +18,7 @@ STIFF = 0.005
 
 @dataclass(frozen=True)
 class SheetLevel:
-    """Level of the sheets of a scene; ``reason`` is one of `study.storage.quantities.REASONS`.
+    """Level of the sheets of a scene; ``reason`` is one of `study.result.quantities.REASONS`.
 
     ``compliance`` is the mean deflection of the sheet under an even pressure over that of the pad.
     """

@@ -11,23 +11,23 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fem.errors import CheckError, ConvergenceError
-from fem.extract import half_turned, mirrored
-from fem.grip import Grip, Gripped
-from fem.grip_problem import GripProblem
-from fem.linear_pad import linearised
-from fem.press import Press, Pressed
-from fem.spring_bed import SpringBed
-from fem.thin_walled import Grasp, WallMesh, grasp, wall_between
-from friction.patch import ContactPatch
-from study.case.build import pad_shape
-from study.case.candidates import turn_of_pose
-from study.case.contact import Contact
-from study.case.model import Finger
-from study.case.pad_level import PadLevel, choose_pad_level, level_on_wall
-from study.case.pressing import pad_of, press_of, settings
-from study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
-from study.scene import Scene
+from softjaw.fem.contact.extract import half_turned, mirrored
+from softjaw.fem.contact.press import Press, Pressed
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.pad.linear_pad import linearised
+from softjaw.fem.pad.spring_bed import SpringBed
+from softjaw.fem.shell.grip import Grip, Gripped
+from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
+from softjaw.friction.patch import ContactPatch
+from softjaw.study.case.build import pad_shape
+from softjaw.study.case.candidates import turn_of_pose
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.model import Finger
+from softjaw.study.case.pad_level import PadLevel, choose_pad_level, level_on_wall
+from softjaw.study.case.pressing import pad_of, press_of, settings
+from softjaw.study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+from softjaw.study.scene import Scene
 
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 
@@ -134,7 +134,7 @@ class OnWall:
             yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
 
     def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.storage.quantities``."""
+        """What the wall bears at one force, keyed as in ``study.result.quantities``."""
         shell = self.grips[0].problem.model.shell
         return wall_values(self.scene, self.held[0], solved.grips[0], shell)
 

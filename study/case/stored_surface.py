@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friction.motion import fibonacci_twists
-from friction.patch import ContactPatch
-from friction.wrench import friction_wrench
-from lsfit.ellipsoid import Ellipsoid
-from lsfit.form import exponents
-from lsfit.quartic import Quartic
-from lsfit.surface import LimitSurface
-from lsfit.tilted import TiltedEllipsoid
-from study.data import Data
-from study.storage.layout import DONE
-from study.storage.quantity import MODELS
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.form import exponents
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.show.data import Data
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface
 

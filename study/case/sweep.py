@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from study.case.candidates import Candidate, candidates, groups
-from study.scene import Option, Scene
-from study.scene.units import UNITS, in_si, split_unit
+from softjaw.study.case.candidates import Candidate, candidates, groups
+from softjaw.study.scene import Option, Scene
+from softjaw.study.scene.units import UNITS, in_si, split_unit
 
 FloatArray = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Unit:
     cost : float
         Work, in element solves; only ratios mean something.
     probe : bool
-        Whether it is solved again with inputs changed, as `study.uncertainty` needs it.
+        Whether it is solved again with inputs changed, as `study.accuracy.uncertainty` needs it.
     """
 
     index: int

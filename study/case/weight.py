@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from scoring.contact import PolytopeBody, SoftContact
-from scoring.task import hold_task, weight_wrench
-from study.case.contact import Contact
-from study.case.limit_surface import Bound
-from study.scene import Scene
-from study.storage.quantity import MODELS
+from softjaw.scoring.contact import PolytopeBody, SoftContact
+from softjaw.scoring.task import hold_task, weight_wrench
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.limit_surface import Bound
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.scene import Scene
 
 
 def safety_factors(

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study.case.margin import MARGIN
-from study.case.sweep import axes
-from study.scene import Scene
-from study.storage.layout import DONE, Derived
+from softjaw.study.case.margin import MARGIN
+from softjaw.study.case.sweep import axes
+from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
-    from study.storage.store import ResultWriter
+    from softjaw.study.result.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 LOW, HIGH = "force_low", "force_high"
@@ -55,7 +55,7 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
 
 def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
-    from study.case.wall import thin_body
+    from softjaw.study.case.wall import thin_body
 
     limits = {"dent": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
     values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}

@@ -9,13 +9,13 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from study.exits import USAGE, StudyError
-from study.scene.errors import SceneError, first_of
-from study.scene.loading import NAMES
-from study.scene.shape import Section
-from study.scene.text import parse_toml, read_text
-from study.storage.quantities import quantities
-from study.storage.quantity import NEEDS
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.result.quantities import quantities
+from softjaw.study.result.quantity import NEEDS
+from softjaw.study.scene.errors import SceneError, first_of
+from softjaw.study.scene.loading import NAMES
+from softjaw.study.scene.shape import Section
+from softjaw.study.scene.text import parse_toml, read_text
 
 MOST_REPETITIONS, LONGEST = 3, 300  # in a regular expression
 COMPARED = ("travel", "e_n", "S")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from study.catalogue.model import MAPS
-from study.storage.layout import DONE, FAILED
-from study.storage.store import open_result
+from softjaw.study.catalogue.model import MAPS
+from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.store import open_result
 
 CHECKS = {"force_balance": max, "tension": max, "penetration": max, "min_det_f": min, "acoustic": min}
 

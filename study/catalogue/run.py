@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from study.catalogue.model import Case, Catalogue, load_catalogue
-from study.catalogue.outcome import Outcome, outcome
-from study.catalogue.scenes import case_scene
-from study.catalogue.table import table_text
-from study.catalogue.verdict import judge
-from study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
-from study.scene.errors import first_of
-from study.writing import make_folders
+from softjaw.study.catalogue.model import Case, Catalogue, load_catalogue
+from softjaw.study.catalogue.outcome import Outcome, outcome
+from softjaw.study.catalogue.scenes import case_scene
+from softjaw.study.catalogue.table import table_text
+from softjaw.study.catalogue.verdict import judge
+from softjaw.study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
+from softjaw.study.scene.errors import first_of
+from softjaw.study.writing import make_folders
 
 
 def folder_of(options: Namespace) -> Path:
@@ -30,8 +30,8 @@ def run_catalogue(options: Namespace, comm: Any) -> int:
 
     A case is solved by one rank, so none waits for another. Whatever a case dies of is its outcome.
     """
-    from study.execution.run import on_rank0
-    from study.execution.schedule import Claims
+    from softjaw.study.run.run import on_rank0
+    from softjaw.study.run.schedule import Claims
 
     path, folder = Path(options.scene), folder_of(options)
     catalogue = on_rank0(comm, load_catalogue, path)
@@ -65,8 +65,8 @@ def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: 
     """Solve one case alone on this rank: its exit code, and why it was refused."""
     from mpi4py import MPI
 
-    from study.execution.run import run_study
-    from study.execution.running import petsc_overrides, prepare, work
+    from softjaw.study.run.run import run_study
+    from softjaw.study.run.running import petsc_overrides, prepare, work
 
     overrides = [*options.overrides, *petsc_overrides(options.petsc)]
     own = Namespace(scene=str(path), overrides=overrides, petsc=[])
@@ -120,7 +120,7 @@ def check_text(path: Path, overrides: Sequence[str]) -> str:
 
 def _refusal(catalogue: Catalogue, case: Case, path: Path, overrides: Sequence[str]) -> str:
     """Why a scene of the catalogue is refused, or nothing."""
-    from study.case.build import check_object
+    from softjaw.study.case.build import check_object
 
     try:
         check_object(case_scene(catalogue, case, path, overrides))

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from study.catalogue.model import Case, Catalogue
-from study.exits import USAGE, StudyError
-from study.scene import Scene, parse_scene
-from study.scene.errors import SceneError
-from study.scene.loading import ALTERNATIVES
-from study.scene.text import parse_toml, read_text, toml_text
+from softjaw.study.catalogue.model import Case, Catalogue
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.scene import Scene, parse_scene
+from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.loading import ALTERNATIVES
+from softjaw.study.scene.text import parse_toml, read_text, toml_text
 
 WHOLE = {"object": ("shape",), "candidates": sum(ALTERNATIVES, ())}  # keys that make a section replace its base's
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from study.catalogue.model import Case
-from study.catalogue.outcome import Outcome
-from study.catalogue.verdict import Verdict
+from softjaw.study.catalogue.model import Case
+from softjaw.study.catalogue.outcome import Outcome
+from softjaw.study.catalogue.verdict import Verdict
 
 HEAD = ("class", "case", "outcome", "its.", "cuts", "s", "balance", "tension", "penetr.", "det F", "acoustic",
         "agrees to", "verdict")  # fmt: skip

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem import checks
-from study.catalogue.model import Case
-from study.catalogue.outcome import Outcome
-from study.flags import Flag
+from softjaw.fem.contact import checks
+from softjaw.study.catalogue.model import Case
+from softjaw.study.catalogue.outcome import Outcome
+from softjaw.study.flags import Flag
 
 FINITE = ("travel", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
 LIMITS = {

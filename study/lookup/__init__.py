@@ -13,12 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study.flags import Flag
-from study.lookup.interpolation import Corners, FloatArray, Nodes, bends, blend, circle, corners, error, place, plain
-from study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
-from study.lookup.source import Source, read_source, turning
-from study.storage.layout import DONE
-from study.storage.quantity import MODELS
+from softjaw.study.flags import Flag
+from softjaw.study.lookup.interpolation import (
+    Corners,
+    FloatArray,
+    Nodes,
+    bends,
+    blend,
+    circle,
+    corners,
+    error,
+    place,
+    plain,
+)
+from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
+from softjaw.study.lookup.source import Source, read_source, turning
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.quantity import MODELS
 
 NUMBER = (float, int)
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from study.flags import flags_in
-from study.lookup.interpolation import Corners, FloatArray
-from study.storage.layout import MISSING
+from softjaw.study.flags import flags_in
+from softjaw.study.lookup.interpolation import Corners, FloatArray
+from softjaw.study.result.layout import MISSING
 
 if TYPE_CHECKING:
-    from lsfit.surface import LimitSurface
-    from study.lookup import GraspMap
+    from softjaw.lsfit.surface import LimitSurface
+    from softjaw.study.lookup import GraspMap
 
 STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
 INSIDE, OUTSIDE, NO_RESULT, SNAP = range(4)
@@ -116,10 +116,10 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
-        from lsfit.ellipsoid import Ellipsoid
-        from lsfit.form import exponents
-        from lsfit.quartic import Quartic
-        from lsfit.tilted import TiltedEllipsoid
+        from softjaw.lsfit.ellipsoid import Ellipsoid
+        from softjaw.lsfit.form import exponents
+        from softjaw.lsfit.quartic import Quartic
+        from softjaw.lsfit.tilted import TiltedEllipsoid
 
         if finger not in (1, 2):
             raise ValueError(f"finger is {finger!r}: expected 1 or 2")

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from study.storage.layout import MODELS, ROOT
-from study.storage.store import open_result
-from study.tables.show import place
+from softjaw.study.result.layout import MODELS, ROOT
+from softjaw.study.result.store import open_result
+from softjaw.study.show.tables.show import place
 
 GROUPS = ("fingers", "limit_surface")
 TOO_LARGE = ("cor_wrench",)
@@ -103,7 +103,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
 
 
 def _size(key: str) -> float:
-    from study.scene.units import UNITS, split_unit
+    from softjaw.study.scene.units import UNITS, split_unit
 
     unit = split_unit(key)[1]
     return UNITS[unit].size if unit else 1.0
@@ -125,8 +125,8 @@ def turning(source: Source) -> tuple[float, bool]:
     Half a turn of the gripper is the same grasp with the fingers exchanged, if both stand alike (roll 0). A scene that
     this version cannot read has a whole turn as its period.
     """
-    from study.scene import parse_scene
-    from study.scene.errors import SceneError
+    from softjaw.study.scene import parse_scene
+    from softjaw.study.scene.errors import SceneError
 
     try:
         scene = parse_scene(source.scene, check_files=False)

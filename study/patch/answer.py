@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from friction.frame import FrameFlag
-from friction.orientation import wound
-from study.patch.evaluate import SPACE, Judged, minority, told_of
-from study.patch.grasp import ANTIPODAL, Grasp
-from study.storage.quantity import MODELS
+from softjaw.friction.frame import FrameFlag
+from softjaw.friction.orientation import wound
+from softjaw.study.patch.evaluate import SPACE, Judged, minority, told_of
+from softjaw.study.patch.grasp import ANTIPODAL, Grasp
+from softjaw.study.result.quantity import MODELS
 
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",

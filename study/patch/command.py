@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from study.exits import USAGE, StudyError
+from softjaw.study.exits import USAGE, StudyError
 
 PICTURES = (".png", ".svg")
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
@@ -45,7 +45,7 @@ def answer_text(options: argparse.Namespace) -> str:
     if options.picture and not options.picture.lower().endswith(PICTURES):
         text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
         raise StudyError(USAGE, f"{text}; for numbers write --json and lead the output into a file")
-    from study.patch.reading import Reading, read_patch
+    from softjaw.study.patch.reading import Reading, read_patch
 
     reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
     files = [options.file, *([options.other] if options.other else [])]
@@ -54,10 +54,10 @@ def answer_text(options: argparse.Namespace) -> str:
 
 
 def _told(options: argparse.Namespace, patches: list[Any]) -> str:
-    from study.patch.answer import Answer, as_json
-    from study.patch.evaluate import judge
-    from study.patch.grasp import grasp_of
-    from study.patch.text import as_text
+    from softjaw.study.patch.answer import Answer, as_json
+    from softjaw.study.patch.evaluate import judge
+    from softjaw.study.patch.grasp import grasp_of
+    from softjaw.study.patch.text import as_text
 
     judged = [judge(patch, options.mu, options.long_side) for patch in patches]
     grasp = None
@@ -66,7 +66,7 @@ def _told(options: argparse.Namespace, patches: list[Any]) -> str:
                                                                  options.contact_length)]  # fmt: skip
         grasp = grasp_of(judged[0], judged[1] if options.other else None, options.mu, options.surface, *lengths)
     if options.picture:
-        from study.patch.picture import write_picture
+        from softjaw.study.patch.picture import write_picture
 
         write_picture(judged, options.mu, options.surface, Path(options.picture))
     answer = Answer(options.mu, judged, grasp)

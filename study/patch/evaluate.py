@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from friction.frame import Frame, FrameFlag, contact_frame, contact_length, in_frame
-from friction.motion import fibonacci_twists
-from friction.orientation import behind
-from friction.patch import ContactPatch, FloatArray, NoContactError
-from friction.torque import pure_torque
-from friction.wrench import FrictionLimits, Model, friction_limits, friction_wrench
-from lsfit.body import ExactSurface
-from lsfit.ellipsoid import three_motion_ellipsoid
-from lsfit.misfit import Misfit, misfit
-from lsfit.samples import normalised_samples, sample_rank
-from study.case.limit_surface import STANDS_IN, fitted, judging_twists
-from study.exits import USAGE, StudyError
-from study.patch.faces import ReadPatch, refuse
-from study.scene.errors import Problem
-from study.storage.quantity import MODELS
+from softjaw.friction.frame import Frame, FrameFlag, contact_frame, contact_length, in_frame
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.orientation import behind
+from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import FrictionLimits, Model, friction_limits, friction_wrench
+from softjaw.lsfit.body import ExactSurface
+from softjaw.lsfit.ellipsoid import three_motion_ellipsoid
+from softjaw.lsfit.misfit import Misfit, misfit
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.study.case.limit_surface import STANDS_IN, fitted, judging_twists
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.patch.faces import ReadPatch, refuse
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.scene.errors import Problem
 
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")  # as a scene names them
 FITTED_ON = 500  # Fibonacci motions; a fit is judged on others

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from friction.orientation import slivers
-from friction.patch import ContactPatch, FloatArray
-from study.exits import USAGE, StudyError
-from study.scene.errors import Problem
+from softjaw.friction.orientation import slivers
+from softjaw.friction.patch import ContactPatch, FloatArray
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.scene.errors import Problem
 
 MOST_PROBLEMS = 10  # told of one file
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from friction.patch import FloatArray
-from scoring.contact import SoftContact
-from scoring.epsilon_search import EpsilonBound, epsilon
-from scoring.grasp import grasp_score
-from study.exits import USAGE, StudyError
-from study.patch.evaluate import Judged
-from study.storage.quantity import MODELS
+from softjaw.friction.patch import FloatArray
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.epsilon_search import EpsilonBound, epsilon
+from softjaw.scoring.grasp import grasp_score
+from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.patch.evaluate import Judged
+from softjaw.study.result.quantity import MODELS
 
 ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this the study flags a grasp; at 5 degrees rounding decides nothing
 ACROSS = 1e-6  # cosine between a normal and the line of the contacts: one across the line points neither way

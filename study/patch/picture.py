@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from friction.patch import FloatArray
-from study.patch.evaluate import Judged
-from study.pictures import SOFT, as_png, as_svg, figure, style
-from study.writing import write_file
+from softjaw.friction.patch import FloatArray
+from softjaw.study.patch.evaluate import Judged
+from softjaw.study.show.pictures import SOFT, as_png, as_svg, figure, style
+from softjaw.study.writing import write_file
 
 FORMS = {".png": as_png, ".svg": as_svg}
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")

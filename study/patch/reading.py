@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes
@@ -75,12 +75,12 @@ def read_patch(file: str, reading: Reading):
             raise StudyError(USAGE, f"{text}; export the contact surface alone")
     except OSError as error:
         raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
-    from study.patch.faces import checked
+    from softjaw.study.patch.faces import checked
 
     if ending == ".csv":
-        from study.patch.table_file import read_table
+        from softjaw.study.patch.table_file import read_table
 
         return checked(read_table(path, reading), reading.flip_normals)
-    from study.patch.vtk_file import read_vtk
+    from softjaw.study.patch.vtk_file import read_vtk
 
     return checked(read_vtk(path, reading), reading.flip_normals)

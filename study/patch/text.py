@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from study.patch.answer import DEFINITIONS, UNITS, Answer, as_record
-from study.storage.quantity import MODELS
-from study.tables.columns import DISPLAY
+from softjaw.study.patch.answer import DEFINITIONS, UNITS, Answer, as_record
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.show.tables.columns import DISPLAY
 
 FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
 SCORES = ("quality", "epsilon")

@@ -10,13 +10,13 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
-from friction.patch import FloatArray
-from study.exits import OTHER_FILE, USAGE, StudyError
-from study.patch.columns import UNITS, split_header
-from study.patch.faces import Faces, corner_geometry
-from study.patch.reading import Reading, check_count
-from study.scene.errors import Problem, closest
-from study.storage.trial import trouble
+from softjaw.friction.patch import FloatArray
+from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.patch.columns import UNITS, split_header
+from softjaw.study.patch.faces import Faces, corner_geometry
+from softjaw.study.patch.reading import Reading, check_count
+from softjaw.study.result.trial import trouble
+from softjaw.study.scene.errors import Problem, closest
 
 READERS = {".vtu": vtkXMLUnstructuredGridReader, ".vtp": vtkXMLPolyDataReader}
 TRIANGLE, QUAD, POLYGON, PIXEL = 5, 9, 7, 8

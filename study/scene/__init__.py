@@ -13,18 +13,18 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from study.scene import checks as scene_checks
-from study.scene.errors import Finding, KeyPath, Problem, SceneError, key_text
-from study.scene.file_checks import mesh_file
-from study.scene.gripper_checks import warnings
-from study.scene.limit_surface_checks import LEVELS
-from study.scene.loading import checked_sections, flat, known_keys, with_overrides
-from study.scene.score_sections import LimitSurface, Score, Task
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
-from study.scene.shapes import Mesh, Object, Section
-from study.scene.sweeps import NOT_SWEPT, put, sweep_findings
-from study.scene.text import key_lines, parse_toml, read_text, toml_text
-from study.scene.uncertainty_section import Uncertainty
+from softjaw.study.scene import checks as scene_checks
+from softjaw.study.scene.errors import Finding, KeyPath, Problem, SceneError, key_text
+from softjaw.study.scene.file_checks import mesh_file
+from softjaw.study.scene.gripper_checks import warnings
+from softjaw.study.scene.limit_surface_checks import LEVELS
+from softjaw.study.scene.loading import checked_sections, flat, known_keys, with_overrides
+from softjaw.study.scene.score_sections import LimitSurface, Score, Task
+from softjaw.study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
+from softjaw.study.scene.shapes import Mesh, Object, Section
+from softjaw.study.scene.sweeps import NOT_SWEPT, put, sweep_findings
+from softjaw.study.scene.text import key_lines, parse_toml, read_text, toml_text
+from softjaw.study.scene.uncertainty_section import Uncertainty
 
 Option = str | int | float | bool
 WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print

@@ -6,15 +6,15 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from study.scene.effect_checks import coupling
-from study.scene.errors import Finding, shown
-from study.scene.file_checks import output_file, petsc_options
-from study.scene.gripper_checks import pad_material, pad_mesh, sheet
-from study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
-from study.scene.sections import Candidates, GraspPose, Gripper, Load
-from study.scene.shapes import Box, Plate, Revolution, Shape
-from study.scene.uncertainty_section import no_sweep, uncertainty_checks, wall_is_there
-from study.scene.wall_checks import sections, wall
+from softjaw.study.scene.effect_checks import coupling
+from softjaw.study.scene.errors import Finding, shown
+from softjaw.study.scene.file_checks import output_file, petsc_options
+from softjaw.study.scene.gripper_checks import pad_material, pad_mesh, sheet
+from softjaw.study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
+from softjaw.study.scene.sections import Candidates, GraspPose, Gripper, Load
+from softjaw.study.scene.shapes import Box, Plate, Revolution, Shape
+from softjaw.study.scene.uncertainty_section import no_sweep, uncertainty_checks, wall_is_there
+from softjaw.study.scene.wall_checks import sections, wall
 
 SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
 

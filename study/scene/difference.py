@@ -5,8 +5,8 @@ from __future__ import annotations
 import tomllib
 from typing import Any
 
-from study.scene.errors import shown
-from study.scene.loading import flat
+from softjaw.study.scene.errors import shown
+from softjaw.study.scene.loading import flat
 
 MOST_NAMED, WIDTH = 5, 30
 

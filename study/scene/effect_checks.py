@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study.scene.errors import Finding
-from study.scene.sections import Effects
-from study.scene.shape import Shape, Walled
+from softjaw.study.scene.errors import Finding
+from softjaw.study.scene.sections import Effects
+from softjaw.study.scene.shape import Shape, Walled
 
 
 def coupling(shape: Shape, effects: Effects) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from study.tables.printable import printable
+from softjaw.study.show.tables.printable import printable
 
 KeyPath = tuple[str | int, ...]
 MOST_TOLD = 50  # problems in one message

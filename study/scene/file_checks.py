@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from fem.file_limits import ENDINGS, LARGEST_FILE
-from study.scene.errors import Finding, shown
-from study.scene.sections import Output
-from study.scene.shapes import Mesh
+from softjaw.fem.objects.file_limits import ENDINGS, LARGEST_FILE
+from softjaw.study.scene.errors import Finding, shown
+from softjaw.study.scene.sections import Output
+from softjaw.study.scene.shapes import Mesh
 
 OTHERS = "others go into the environment variable PETSC_OPTIONS"
 

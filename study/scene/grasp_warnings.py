@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from study.scene.sections import Candidates, Gripper
-from study.scene.shapes import Shape, Span
+from softjaw.study.scene.sections import Candidates, Gripper
+from softjaw.study.scene.shapes import Shape, Span
 
 WITH_ENDS = ("elliptic_cylinder", "box", "mesh", "revolution", "sections")
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it

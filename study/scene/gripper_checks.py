@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from study.scene.errors import Finding, shown
-from study.scene.sections import Accuracy, Effects, Friction, Gripper, Load
+from softjaw.study.scene.errors import Finding, shown
+from softjaw.study.scene.sections import Accuracy, Effects, Friction, Gripper, Load
 
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
-ROUNDING = 1e-9  # of a length: fem.sheet finds nodes this close to the support's rim on it, too
+ROUNDING = 1e-9  # of a length: fem.pad.backing_plate finds nodes this close to the support's rim on it, too
 
 
 def pad_mesh(gripper: Gripper, effects: Effects) -> Iterator[Finding]:

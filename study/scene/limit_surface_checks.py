@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study.scene.errors import Finding, closest, shown
-from study.scene.score_sections import LimitSurface, Task
-from study.scene.sections import Candidates, Effects
+from softjaw.study.scene.errors import Finding, closest, shown
+from softjaw.study.scene.score_sections import LimitSurface, Task
+from softjaw.study.scene.sections import Candidates, Effects
 
 LEVELS = {  # level of the effect: models of [limit_surface]
     "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),

@@ -9,14 +9,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from study.scene import checks as scene_checks
-from study.scene.errors import Finding, KeyPath, Problem, closest, shown
-from study.scene.score_sections import LimitSurface, Score, Task
-from study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
-from study.scene.sentences import model_findings
-from study.scene.shapes import SHAPES, Section
-from study.scene.uncertainty_section import Uncertainty
-from study.tables.printable import UNPRINTABLE, shortened
+from softjaw.study.scene import checks as scene_checks
+from softjaw.study.scene.errors import Finding, KeyPath, Problem, closest, shown
+from softjaw.study.scene.score_sections import LimitSurface, Score, Task
+from softjaw.study.scene.sections import Accuracy, Candidates, Effects, Friction, Gripper, Load, Output, Run
+from softjaw.study.scene.sentences import model_findings
+from softjaw.study.scene.shapes import SHAPES, Section
+from softjaw.study.scene.uncertainty_section import Uncertainty
+from softjaw.study.show.tables.printable import UNPRINTABLE, shortened
 
 SECTIONS: dict[str, type[Section]] = {
     "gripper": Gripper,

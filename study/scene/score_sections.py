@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from study.scene.sections import Vector
-from study.scene.shapes import Section
-from study.scene.units import si
+from softjaw.study.scene.sections import Vector
+from softjaw.study.scene.shapes import Section
+from softjaw.study.scene.units import si
 
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 

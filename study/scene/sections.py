@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from study.scene.shapes import Section
-from study.scene.units import si
+from softjaw.study.scene.shapes import Section
+from softjaw.study.scene.units import si
 
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Count = Annotated[int, Field(ge=2, le=400)]

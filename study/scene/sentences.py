@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from study.scene.errors import Finding, KeyPath, closest, key_text, shown
-from study.scene.units import UNITS, split_unit
+from softjaw.study.scene.errors import Finding, KeyPath, closest, key_text, shown
+from softjaw.study.scene.units import UNITS, split_unit
 
 EXAMPLES = {
     "stations_mm": "[25, 50, 75]", "station_range_mm": "[25, 175]", "angles_deg": "[0, 90]", "size_mm": "[60, 40, 120]",

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from study.scene.shape import Length, Point, Section, Shape, Span, Walled
-from study.scene.units import UNITS, si
+from softjaw.study.scene.shape import Length, Point, Section, Shape, Span, Walled
+from softjaw.study.scene.units import UNITS, si
 
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 

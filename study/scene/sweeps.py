@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from study.scene.errors import Finding, closest, key_text, shown
-from study.scene.loading import SECTIONS, checked_sections, keys_by_place
-from study.scene.sentences import unknown_key
-from study.scene.shapes import SHAPES, Section
+from softjaw.study.scene.errors import Finding, closest, key_text, shown
+from softjaw.study.scene.loading import SECTIONS, checked_sections, keys_by_place
+from softjaw.study.scene.sentences import unknown_key
+from softjaw.study.scene.shapes import SHAPES, Section
 
 NOT_SWEPT = {
     "object.shape": "write one scene per shape",

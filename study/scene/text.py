@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from study.scene.errors import KeyPath, Problem, SceneError, closest, key_text, shown
+from softjaw.study.scene.errors import KeyPath, Problem, SceneError, closest, key_text, shown
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
 CURES = {  # start of tomllib's sentence: what to do

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from study.scene.errors import Finding
-from study.scene.sections import Effects
-from study.scene.shape import Shape, Walled
-from study.scene.shapes import Sections
+from softjaw.study.scene.errors import Finding
+from softjaw.study.scene.sections import Effects
+from softjaw.study.scene.shape import Shape, Walled
+from softjaw.study.scene.shapes import Sections
 
 THICKEST = 0.1  # of the smallest extent: a thicker wall is no shell
 WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",

@@ -8,12 +8,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from fem.contact import ContactProblem
-from fem.grip_problem import GripProblem
-from fem.petsc import PETSc
-from study import pipeline
-from study.execution.plan import make_plan
-from study.scene import load_scene
+from softjaw.fem.contact.problem import ContactProblem
+from softjaw.fem.petsc import PETSc
+from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.study import pipeline
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import load_scene
 from tests.benchmark.table import line, title
 
 REPEATS = 3

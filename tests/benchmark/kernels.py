@@ -10,25 +10,25 @@ from functools import partial
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from friction.frame import contact_frame
-from friction.kernel import friction_sums_reference
-from friction.motion import cor_grid, fibonacci_twists
-from friction.quadrature import gauss_patch
-from friction.torque import pure_torque
-from friction.wrench import friction_limits, friction_wrench
-from lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from lsfit.misfit import misfit
-from lsfit.quartic import convex_quartic, least_squares_quartic
-from lsfit.samples import normalised_samples
-from lsfit.six import convex_span_quartic, six_samples
-from lsfit.zhou import ZhouWeights, zhou_quartic
-from scoring.contact import EllipsoidBody, SoftContact, contact_axes
-from scoring.epsilon import epsilon_linf
-from scoring.epsilon_search import epsilon
-from scoring.polytope import fibonacci_vertices, polytope_volume
-from scoring.pose import pose_volume
-from scoring.score import score
-from scoring.volume import volume_linf
+from softjaw.friction.frame import contact_frame
+from softjaw.friction.kernel import friction_sums_reference
+from softjaw.friction.motion import cor_grid, fibonacci_twists
+from softjaw.friction.quadrature import gauss_patch
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples
+from softjaw.lsfit.six import convex_span_quartic, six_samples
+from softjaw.lsfit.zhou import ZhouWeights, zhou_quartic
+from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon_linf
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.polytope import fibonacci_vertices, polytope_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import score
+from softjaw.scoring.volume import volume_linf
 from tests.benchmark.table import fastest, line, span, title
 from tests.generators import (
     build,

@@ -17,14 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from fem import kernel as element_kernel
-from fem.materials import material
-from fem.objects import EllipticCylinder
-from fem.pad import Pad, PadShape
-from fem.pose import Pose
-from fem.press import Press
-from study.case.model import approach
-from study.environment import launch_environment, mpirun
+from softjaw.fem.contact.press import Press
+from softjaw.fem.materials import material
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.shapes import EllipticCylinder
+from softjaw.fem.pad import hexahedra as element_kernel
+from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.study.case.model import approach
+from softjaw.study.environment import launch_environment, mpirun
 from tests.benchmark import factors, kernels
 from tests.benchmark.table import fastest, line, title
 
@@ -88,7 +88,7 @@ def whole_map(scene: Path) -> None:
 
 
 def _whole_map(scene: Path, folder: Path) -> None:
-    softjaw = [sys.executable, "-m", "study", "run", str(scene), "-o"]
+    softjaw = [sys.executable, "-m", "softjaw", "run", str(scene), "-o"]
     seconds = {}
     for ranks in (1, 2):
         command = mpirun(ranks)
@@ -110,11 +110,11 @@ def writing_share(scene: Path, folder: Path) -> float:
     """Share of a one-rank run that goes into creating and writing the file."""
     from mpi4py import MPI
 
-    from study import pipeline
-    from study.execution import run
-    from study.execution.plan import make_plan
-    from study.scene import load_scene
-    from study.storage import store
+    from softjaw.study import pipeline
+    from softjaw.study.result import store
+    from softjaw.study.run import run
+    from softjaw.study.run.plan import make_plan
+    from softjaw.study.scene import load_scene
 
     spent = [0.0]
 

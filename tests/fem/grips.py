@@ -4,16 +4,16 @@ from functools import cache
 
 import numpy as np
 
-from fem.grip import Grip
-from fem.grip_problem import GripProblem
-from fem.materials import material
-from fem.outer_surface import of_revolution
-from fem.pad import Pad
-from fem.pad_shape import PadShape
-from fem.pose import Pose
-from fem.revolution import Revolution
-from fem.thin_walled import ThinWalled, WallMesh, grasp, wall_between
-from fem.wall_material import WallMaterial, wall_material
+from softjaw.fem.materials import material
+from softjaw.fem.objects.outer_surface import of_revolution
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.revolution import Revolution
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.shell.grip import Grip
+from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 
 SIZE = (0.03, 0.02, 0.02)
 COARSE = WallMesh(0.003, 0.005, 0.010)

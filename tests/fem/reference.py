@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.pose import Pose
+from softjaw.fem.objects.pose import Pose
 
 # -- energies per reference volume [Pa] of one deformation gradient (3, 3) --------------------------------------------
 
@@ -152,7 +152,7 @@ def cylinder(R):
 
 
 def placed(obj, pose):
-    """Gap function of an object of ``fem.objects`` in the frame of a pad that stands at ``pose``."""
+    """Gap function of an object of ``fem.objects.shapes`` in the frame of a pad that stands at ``pose``."""
     R = pose.rotation
 
     def gap(x):

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fem.shell_mesh import patch
-from fem.shell_model import Shell
+from softjaw.fem.shell.mesh import patch
+from softjaw.fem.shell.model import Shell
 
 UX, UY, UZ = np.eye(6)[:3]  # a force on a node
 

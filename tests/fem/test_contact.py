@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem.contact import ContactProblem, Control
-from fem.materials import material
-from fem.objects import EllipticCylinder, Sphere
-from fem.pad import Pad, PadShape
+from softjaw.fem.contact.problem import ContactProblem, Control
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.pad.mesh import Pad, PadShape
 from tests.fem import reference
 
 G = 0.020e6

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fem.extract import extract
-from fem.materials import material
-from fem.objects import EllipticCylinder
-from fem.pad import Pad, PadShape
-from fem.press import Press
-from friction.frame import FrameFlag, contact_frame, in_frame
-from friction.wrench import friction_limits
+from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.press import Press
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder
+from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
+from softjaw.friction.wrench import friction_limits
 from tests.fem import reference
 
 FOAM = material("blatz_ko", 0.040e6)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fem.facing import FAR, Wall, face
-from fem.spline_surface import spline_surface
+from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.shell.facing import FAR, Wall, face
 
 R, LENGTH, STEP = 0.03, 0.1, 1e-7
 

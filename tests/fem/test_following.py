@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fem.contact import Control
-from fem.errors import ConvergenceError
-from fem.following import Following
-from fem.materials import material
-from fem.objects import EllipticCylinder, Revolution, Sphere
-from fem.pad import Pad, PadShape
-from fem.press import Press
-from fem.stepping import Settings, Stepping, Work
+from softjaw.fem.contact.following import Following
+from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
+from softjaw.fem.contact.press import Press
+from softjaw.fem.contact.problem import Control
+from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder, Revolution, Sphere
+from softjaw.fem.pad.mesh import Pad, PadShape
 from tests.fem import reference
 from tests.fem.test_linear_pad import e_n
 
@@ -215,8 +215,8 @@ NECK = np.array([
 @pytest.mark.parametrize("station", [166.17647, 170.58824, 175.0])
 def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
     """Travels of 9.85 and 15.24 mm, 9.95 and 12.45 mm, 8.34 and 9.27 mm at 13 N came of these lists."""
-    from study.case.candidates import axis_poses
-    from study.case.model import approach
+    from softjaw.study.case.candidates import axis_poses
+    from softjaw.study.case.model import approach
 
     finger = approach(Revolution(MM * NECK), axis_poses(station * MM, 0.0, 0.0)[0], SIZE)
     states = []

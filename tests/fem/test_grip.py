@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fem.contact import Control
-from fem.extract import extract
-from fem.press import Press
-from fem.stepping import Work
-from fem.thin_walled import WallMesh
-from fem.wall_material import WallMaterial
-from friction.frame import contact_frame, in_frame
-from friction.wrench import friction_limits
+from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.load_stepping import Work
+from softjaw.fem.contact.press import Press
+from softjaw.fem.contact.problem import Control
+from softjaw.fem.shell.thin_walled import WallMesh
+from softjaw.fem.shell.wall_material import WallMaterial
+from softjaw.friction.frame import contact_frame, in_frame
+from softjaw.friction.wrench import friction_limits
 from tests.fem.grips import _gap, grip, pose, thin
 
 FORCES = (0.5, 2.0)

@@ -5,15 +5,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fem.collapse import Opening
-from fem.errors import CheckError
-from fem.extract import extract, half_turned
-from fem.facing import FAR, Wall, face
-from fem.pose import Pose
-from fem.shell_body import body_mesh
-from fem.shell_grid import MeshSize
-from fem.thin_walled import WallMesh, grasp
-from fem.wall_material import WallMaterial
+from softjaw.fem.contact.extract import extract, half_turned
+from softjaw.fem.errors import CheckError
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.shell.body import body_mesh
+from softjaw.fem.shell.collapse import Opening
+from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.fem.shell.grid import MeshSize
+from softjaw.fem.shell.thin_walled import WallMesh, grasp
+from softjaw.fem.shell.wall_material import WallMaterial
 from tests.fem.grips import grip, pose, thin
 from tests.fem.test_grip import e_n
 

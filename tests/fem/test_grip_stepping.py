@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem.contact import Control
-from fem.errors import ConvergenceError
-from fem.grip import Grip
-from fem.stepping import Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
+from softjaw.fem.contact.problem import Control
+from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.shell.grip import Grip
 
 MM = 1e-3
 

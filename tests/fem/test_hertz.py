@@ -14,9 +14,9 @@ a / R`` of the half width at the rim: 0.08 % at the ``a / R = 0.002`` used here,
 import numpy as np
 import pytest
 
-from fem.materials import material
-from fem.pad import Pad, PadShape
-from fem.press import Press
+from softjaw.fem.contact.press import Press
+from softjaw.fem.materials import material
+from softjaw.fem.pad.mesh import Pad, PadShape
 from tests.fem import reference
 
 E, R = 1e6, 0.02

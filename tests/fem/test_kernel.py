@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fem import kernel
-from fem.materials import material
-from fem.pad import Pad, PadShape
+from softjaw.fem.materials import material
+from softjaw.fem.pad import hexahedra as kernel
+from softjaw.fem.pad.mesh import Pad, PadShape
 
 G = 0.020e6
 SIZE = (0.06, 0.03, 0.015)

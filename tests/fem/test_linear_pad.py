@@ -5,18 +5,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from fem.contact import ContactProblem, Control
-from fem.errors import CheckError, ConvergenceError
-from fem.extract import extract
-from fem.linear_pad import CondensedPad, departure, linearised
-from fem.linear_press import FrontSolver, linear_press
-from fem.materials import material
-from fem.objects import EllipticCylinder, Sphere
-from fem.pad import Pad, PadShape
-from fem.press import Press
-from fem.spring_bed import SpringBed
-from friction.frame import contact_frame, in_frame
-from friction.wrench import friction_limits
+from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.linear_press import FrontSolver, linear_press
+from softjaw.fem.contact.press import Press
+from softjaw.fem.contact.problem import ContactProblem, Control
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.pad.linear_pad import CondensedPad, departure, linearised
+from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.spring_bed import SpringBed
+from softjaw.friction.frame import contact_frame, in_frame
+from softjaw.friction.wrench import friction_limits
 from tests.fem import reference
 
 G = 0.040e6

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem.materials import Material, material, principal, stress
+from softjaw.fem.materials import Material, material, principal, stress
 from tests.fem import reference
 
 G = 0.020e6

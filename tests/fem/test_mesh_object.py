@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from fem.closest import ellipse_gap
-from fem.crossing import crossing_pairs
-from fem.mesh_check import MeshError, sound_mesh, winding_number
-from fem.mesh_object import MeshObject, read_triangles
-from fem.objects import Sphere
-from fem.pose import Pose
-from fem.touch import NoContactError, first_touch
+from softjaw.fem.objects.closest import ellipse_gap
+from softjaw.fem.objects.crossing import crossing_pairs
+from softjaw.fem.objects.mesh_check import MeshError, sound_mesh, winding_number
+from softjaw.fem.objects.mesh_object import MeshObject, read_triangles
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.shapes import Sphere
+from softjaw.fem.objects.touch import NoContactError, first_touch
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
@@ -75,7 +75,7 @@ def test_region_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_
 
 def test_spline_alone_is_of_fourth_order():
     """Samples of a sphere's distance, without triangles: orders 4, 3, 2 for the value and its derivatives."""
-    from fem.tricubic import coefficients, evaluate
+    from softjaw.fem.objects.tricubic import coefficients, evaluate
 
     x, errors = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)), []
     for n in (21, 41, 81):
@@ -344,7 +344,7 @@ def test_file_with_nan_wrong_unit_missing_or_too_large_is_refused(tmp_path, monk
         MeshObject.from_file(tmp_path / "none.stl", "mm")
     with pytest.raises(MeshError, match="not a finite number"):
         MeshObject.from_file(stl(tmp_path / "nan.stl", *spoilt(np.nan)), "m")
-    monkeypatch.setattr("fem.mesh_file.LARGEST_FILE", 1000)
+    monkeypatch.setattr("softjaw.fem.objects.mesh_file.LARGEST_FILE", 1000)
     with pytest.raises(MeshError, match="decimate the mesh"):
         MeshObject.from_file(FLASK, "mm")
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fem.objects import Box, EllipticCylinder, Plane, Revolution, Sphere
-from fem.pose import Pose
-from fem.touch import NoContactError, first_touch
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.shapes import Box, EllipticCylinder, Plane, Revolution, Sphere
+from softjaw.fem.objects.touch import NoContactError, first_touch
 
 MM = 1e-3
 BOTTLE = MM * np.array(

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fem.materials import material
-from fem.pad import Pad, PadShape, lagrange
+from softjaw.fem.materials import material
+from softjaw.fem.pad.mesh import Pad, PadShape, lagrange
 
 FOAM = material("blatz_ko", 0.020e6)
 SIZE = (0.06, 0.03, 0.015)

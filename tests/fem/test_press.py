@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.errors import CheckError, ConvergenceError
-from fem.materials import material
-from fem.objects import EllipticCylinder, Sphere
-from fem.pad import Pad, PadShape
-from fem.press import Press
+from softjaw.fem.contact.press import Press
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.pad.mesh import Pad, PadShape
 from tests.fem import reference
 
 G = 0.040e6

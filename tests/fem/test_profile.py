@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, PchipInterpolator
 
-from fem.outer_surface import Section, of_sections
-from fem.profile import b_splines
-from fem.revolution import Revolution
+from softjaw.fem.objects.outer_surface import Section, of_sections
+from softjaw.fem.objects.profile import b_splines
+from softjaw.fem.objects.revolution import Revolution
 
 
 @pytest.mark.parametrize("order", range(4))

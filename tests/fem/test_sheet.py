@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fem.contact import ContactProblem, Control
-from fem.linear_pad import CondensedPad, linearised
-from fem.linear_press import linear_press
-from fem.materials import material
-from fem.objects import EllipticCylinder, Sphere
-from fem.pad import Pad, PadShape
-from fem.press import Press
-from fem.sheet import Sheet, back_stiffness, relative_compliance
-from fem.spring_bed import SpringBed
+from softjaw.fem.contact.linear_press import linear_press
+from softjaw.fem.contact.press import Press
+from softjaw.fem.contact.problem import ContactProblem, Control
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.pad.backing_plate import Sheet, back_stiffness, relative_compliance
+from softjaw.fem.pad.linear_pad import CondensedPad, linearised
+from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.spring_bed import SpringBed
 from tests.fem import reference
 from tests.fem.test_linear_pad import e_n
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem.shell_linear import LinearShell
-from fem.shell_mesh import ShellMesh, grid_elements, patch
-from fem.shell_model import Shell
-from fem.shell_stress import faces
+from softjaw.fem.shell.linear import LinearShell
+from softjaw.fem.shell.mesh import ShellMesh, grid_elements, patch
+from softjaw.fem.shell.model import Shell
+from softjaw.fem.shell.stress import faces
 
 E, NU, THICKNESS = 2e9, 0.38, 0.02
 RNG = np.random.default_rng(7)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.errors import ConvergenceError
-from fem.path import follow
-from fem.shell_linear import LinearShell
-from fem.shell_solve import ShellProblem, load_steps
+from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.shell.arc_length import follow
+from softjaw.fem.shell.linear import LinearShell
+from softjaw.fem.shell.solve import ShellProblem, load_steps
 from tests.fem import shell_problems
 
 TABLES = json.loads((Path(__file__).parents[1] / "data" / "shell_tables.json").read_text(encoding="utf-8"))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem.objects import EllipticCylinder, Revolution
-from fem.outer_surface import Section, of_sections
-from fem.pose import Pose
-from fem.spline_surface import spline_surface
-from fem.stacked import Stacked
+from softjaw.fem.objects.outer_surface import Section, of_sections
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.shapes import EllipticCylinder, Revolution
+from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.objects.stacked import Stacked
 
 PROFILE = [
     (0.0, 0.03),

@@ -6,22 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.mesh_check import MeshError
-from fem.mesh_object import MeshObject
-from fem.outer_surface import Section, of_sections
-from fem.revolution import Revolution
-from fem.section_rays import cast, centroids
-from fem.shape import grid_triangles
-from fem.shell_body import body_mesh
-from fem.shell_grid import MeshSize
-from fem.shell_linear import LinearShell
-from fem.shell_support import supported
-from fem.smoothing import smooth_rings, smooth_spline
-from fem.stacked import Stacked
-from fem.thin_walled import ThinWalled
-from fem.traced_surface import traced
-from fem.turned import Turned
-from fem.wall_material import wall_material
+from softjaw.fem.objects.gap import grid_triangles
+from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.outer_surface import Section, of_sections
+from softjaw.fem.objects.revolution import Revolution
+from softjaw.fem.objects.section_rays import cast, centroids
+from softjaw.fem.objects.smoothing import smooth_rings, smooth_spline
+from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.traced_surface import traced
+from softjaw.fem.objects.turned import Turned
+from softjaw.fem.shell.body import body_mesh
+from softjaw.fem.shell.grid import MeshSize
+from softjaw.fem.shell.linear import LinearShell
+from softjaw.fem.shell.support import supported
+from softjaw.fem.shell.thin_walled import ThinWalled
+from softjaw.fem.shell.wall_material import wall_material
 from tests.fem.grips import can, grip, thin
 from tests.fem.test_grip import e_n
 

@@ -15,7 +15,7 @@ from numpy import cos, pi, sin
 from scipy.integrate import quad
 from scipy.special import beta, ellipe, ellipeinc
 
-from friction.patch import ContactPatch
+from softjaw.friction.patch import ContactPatch
 from tests.generators import (
     PRESSURES,
     arc_lengths,

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from friction.motion import SLIDE_X, SLIDE_Y, TURN_Z, fibonacci_twists
-from friction.patch import ContactPatch
-from friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z, fibonacci_twists
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from tests.generators import cylinder_grid, lcg_patch
 
 # The same examples on every rank and every day, and no folder of past failures beside the project.

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from friction.motion import SLIDE_X, SLIDE_Y
-from friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y
+from softjaw.friction.wrench import friction_limits, friction_wrench
 from tests.friction.closed_forms import ALPHA, FORMS, mean_distance
 from tests.generators import arc_lengths, cylinder_grid, ellcyl_grid
 

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from friction.frame import FrameFlag, contact_frame, in_frame
-from friction.motion import SLIDE_X, TURN_Z
-from friction.orientation import wound
-from friction.patch import ContactPatch, NoContactError
-from friction.torque import pure_torque
-from friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
+from softjaw.friction.motion import SLIDE_X, TURN_Z
+from softjaw.friction.orientation import wound
+from softjaw.friction.patch import ContactPatch, NoContactError
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits, friction_wrench
 from tests.generators import cap_polar, cyl_mesh, cylinder_grid, grid_mesh, mesh_patch, points_patch
 
 X = np.array([1.0, 0.0, 0.0])

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from scipy.spatial.transform import Rotation
 
-from friction.foot import ContactFace, foot
-from friction.frame import FrameFlag, contact_frame
+from softjaw.friction.foot import ContactFace, foot
+from softjaw.friction.frame import FrameFlag, contact_frame
 from tests.friction.test_decisions import REPEATABLE, seeds, shaken
 from tests.generators import cyl_mesh, cylinder_grid, grid_mesh, mesh_patch
 

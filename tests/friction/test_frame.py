@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from friction.patch import NoContactError, moved
-from friction.wrench import friction_limits
+from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
+from softjaw.friction.patch import NoContactError, moved
+from softjaw.friction.wrench import friction_limits
 from tests.generators import (
     bump,
     cyl_mesh,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.patch import ContactPatch, NoContactError, moved
 from tests.generators import grid_mesh, lcg_patch, mesh_patch
 
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from friction.frame import FrameFlag, contact_frame
-from friction.quadrature import gauss_patch
-from friction.wrench import friction_limits
+from softjaw.friction.frame import FrameFlag, contact_frame
+from softjaw.friction.quadrature import gauss_patch
+from softjaw.friction.wrench import friction_limits
 from tests.friction.closed_forms import ALPHA, FORMS, mean_distance
 from tests.generators import cyl_mesh, grid_mesh, mesh_patch
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from friction.motion import TURN_Z
-from friction.patch import ContactPatch, NoContactError, moved
-from friction.torque import pure_torque
-from friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.friction.motion import TURN_Z
+from softjaw.friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from tests.generators import build, cylinder_grid, lcg_patch, points_patch, rect_grid
 
 TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]

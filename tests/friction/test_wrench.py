@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friction.kernel import friction_sums, friction_sums_reference
-from friction.motion import SLIDE_X, SLIDE_Y, cor_grid, cor_twists, screw_twist
-from friction.wrench import FrictionLimits, friction_limits, friction_support, friction_wrench
+from softjaw.friction.kernel import friction_sums, friction_sums_reference
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_grid, cor_twists, screw_twist
+from softjaw.friction.wrench import FrictionLimits, friction_limits, friction_support, friction_wrench
 from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch
 
 SEEDS = range(1, 21)

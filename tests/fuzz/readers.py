@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fem.mesh_check import MeshError
-from study.exits import StudyError
-from study.scene.errors import SceneError
+from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.study.exits import StudyError
+from softjaw.study.scene.errors import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
 
 
@@ -100,42 +100,42 @@ def ply(binary):
 
 
 def _scene(path):
-    from study.scene import load_scene
+    from softjaw.study.scene import load_scene
 
     scene = load_scene(path)
     return scene.effective_toml(), scene.digest
 
 
 def _catalogue(path):
-    from study.catalogue.run import check_text
+    from softjaw.study.catalogue.run import check_text
 
     return check_text(path, [])
 
 
 def _patch(path):
-    from study.patch.reading import Reading, read_patch
+    from softjaw.study.patch.reading import Reading, read_patch
 
     return read_patch(str(path), Reading("mm", "kpa"))
 
 
 def _mesh(path):
-    from fem.mesh_object import MeshObject
+    from softjaw.fem.objects.mesh_object import MeshObject
 
     return MeshObject.from_file(path, "mm")
 
 
 def _result(path):
-    from study.storage.store import open_result
-    from study.tables.export import as_csv
-    from study.tables.show import as_json, best
-    from study.tables.status import status_text
+    from softjaw.study.result.store import open_result
+    from softjaw.study.show.tables.export import as_csv
+    from softjaw.study.show.tables.show import as_json, best
+    from softjaw.study.show.tables.status import status_text
 
     with open_result(path) as result:
         return as_csv(result), as_json(best(result, None, 3, whole_lines=False)), status_text(result, 80)
 
 
 def _cost(path):
-    from study.cost.file import load
+    from softjaw.study.accuracy.cost.file import load
 
     return load(path)
 
@@ -153,8 +153,8 @@ QUICK = {
 
 def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
-    from study.cost.file import CostStudy, save
-    from study.cost.measure import Measured
+    from softjaw.study.accuracy.cost.file import CostStudy, save
+    from softjaw.study.accuracy.cost.measure import Measured
     from tests.study.formula_results import make
     from tests.study.patch_files import cylinder_mesh, vtk
 

@@ -15,18 +15,18 @@ import h5py
 import numpy as np
 import pytest
 
-from fem.mesh_check import MeshError
-from fem.mesh_file import read_polygons
-from study.catalogue.model import load_catalogue
-from study.cli import main
-from study.exits import OTHER_FILE, USAGE, StudyError
-from study.patch.reading import Reading, read_patch
-from study.scene import SceneError, load_scene, parse_scene
-from study.storage.store import open_result
-from study.storage.trial import trouble
-from study.tables.columns import csv_text
-from study.tables.printable import UNPRINTABLE
-from study.view.server import server
+from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.objects.mesh_file import read_polygons
+from softjaw.study.catalogue.model import load_catalogue
+from softjaw.study.cli import main
+from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.patch.reading import Reading, read_patch
+from softjaw.study.result.store import open_result
+from softjaw.study.result.trial import trouble
+from softjaw.study.scene import SceneError, load_scene, parse_scene
+from softjaw.study.show.tables.columns import csv_text
+from softjaw.study.show.tables.printable import UNPRINTABLE
+from softjaw.study.show.view.server import server
 from tests.fuzz.lies import EVIL, LIES
 from tests.fuzz.readers import CATALOGUE, QUICK, SCENE, obj, ply, stl
 from tests.study.formula_results import make
@@ -297,9 +297,9 @@ def test_the_server_has_one_page_for_this_machine_alone(page):
 
 
 def test_limits_are_stated_where_users_look():
-    from fem import file_limits
-    from study.patch import reading
-    from study.scene import text
+    from softjaw.fem.objects import file_limits
+    from softjaw.study.patch import reading
+    from softjaw.study.scene import text
 
     told = (ROOT / "docs" / "files-from-elsewhere.md").read_text()
     limits = [file_limits.MOST_TRIANGLES, file_limits.MOST_POINTS, file_limits.MOST_CORNERS, file_limits.MOST_LINES,

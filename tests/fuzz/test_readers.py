@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.tables.printable import UNPRINTABLE
+from softjaw.study.show.tables.printable import UNPRINTABLE
 from tests.fuzz.edits import BINARY, edited, edits
 from tests.fuzz.readers import QUICK, slow_readers
 
@@ -109,8 +109,8 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
     "text", ["=", "a=b=c", "\x1b[2J=1", "x.y=" + "[" * 3000, "load.normal_force_n=[1e999]", "." * 99]
 )
 def test_an_override_is_taken_or_refused(tmp_path, text):
-    from study.scene import load_scene
-    from study.scene.errors import SceneError
+    from softjaw.study.scene import load_scene
+    from softjaw.study.scene.errors import SceneError
 
     path = tmp_path / "scene.toml"
     path.write_bytes(QUICK["scene"].content)

@@ -31,7 +31,7 @@ def test_a_catalogue_is_solved_judged_and_printed_again(once, shared_path, ranks
 
     def run(*words):
         path = catalogue(shared_path, *CASES)
-        return launch(ranks, "-m", "study", "run", path, "-o", folder, *words)
+        return launch(ranks, "-m", "softjaw", "run", path, "-o", folder, *words)
 
     code, output, errors = once(run)
     assert code == 6
@@ -52,10 +52,10 @@ def test_every_hard_case_comes_to_what_is_right_for_it(once, shared_path):
     import subprocess
     import sys
 
-    from study.environment import launch_environment
+    from softjaw.study.environment import launch_environment
     from tests.study.launching import ROOT
 
-    words = [sys.executable, "-m", "study", "run", str(HARD), "-o", str(shared_path / "hard")]
+    words = [sys.executable, "-m", "softjaw", "run", str(HARD), "-o", str(shared_path / "hard")]
     done = once(
         lambda: subprocess.run(words, env=launch_environment(), cwd=ROOT, capture_output=True, text=True, timeout=3600)
     )
@@ -67,7 +67,7 @@ def test_every_hard_case_comes_to_what_is_right_for_it(once, shared_path):
 @pytest.mark.launches
 def test_files_of_other_scenes_are_told_of_and_no_rank_waits(once, shared_path):
     path = catalogue(shared_path, *CASES[:2])
-    words = ("-m", "study", "run", path, "-o", shared_path / "out")
+    words = ("-m", "softjaw", "run", path, "-o", shared_path / "out")
     assert once(launch, 2, *words)[0] == 0
     code, output, _ = once(launch, 2, *words, "--set", "friction.mu=0.5")
     assert code == 6

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem.errors import CheckError, ConvergenceError, NotReachedError
-from fem.materials import material
-from fem.objects import Sphere
-from fem.pad import Pad, PadShape
-from fem.reasons import explained, refuse_fall
-from fem.spring_bed import SpringBed
+from softjaw.fem.contact.reasons import explained, refuse_fall
+from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
+from softjaw.fem.materials import material
+from softjaw.fem.objects.shapes import Sphere
+from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.spring_bed import SpringBed
 from tests.fem import reference
 
 STUCK = ConvergenceError("stuck at 3 N")

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.catalogue.model import Case, is_catalogue, load_catalogue
-from study.catalogue.outcome import Outcome
-from study.catalogue.run import check_text
-from study.catalogue.scenes import case_scene, merged
-from study.catalogue.table import table_text
-from study.catalogue.verdict import FINITE, judge
-from study.exits import StudyError
-from study.flags import Flag
+from softjaw.study.catalogue.model import Case, is_catalogue, load_catalogue
+from softjaw.study.catalogue.outcome import Outcome
+from softjaw.study.catalogue.run import check_text
+from softjaw.study.catalogue.scenes import case_scene, merged
+from softjaw.study.catalogue.table import table_text
+from softjaw.study.catalogue.verdict import FINITE, judge
+from softjaw.study.exits import StudyError
+from softjaw.study.flags import Flag
 from tests.study.launching import ROOT
 
 HARD = ROOT / "jobs" / "hard-cases.toml"

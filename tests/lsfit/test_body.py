@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from friction.wrench import friction_wrench
-from lsfit.body import ExactSurface, hull_volume, tangent_volume
-from lsfit.geometry import directions
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.body import ExactSurface, hull_volume, tangent_volume
+from softjaw.lsfit.geometry import directions
 from tests.generators import disc_polar, points_patch
 
 

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from friction.motion import fibonacci_twists
-from friction.wrench import friction_limits, friction_wrench
-from lsfit.body import ExactSurface, hull_volume
-from lsfit.closed import Closed, closed
-from lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from lsfit.flag import FitError, FitFlag, OpenBodyError, UndecidedError
-from lsfit.form import exponents, substitute
-from lsfit.geometry import directions
-from lsfit.gram import ball_gram, gram_certificate, gram_map
-from lsfit.misfit import misfit
-from lsfit.quartic import Quartic, convex_quartic
-from lsfit.samples import normalised_samples, sample_rank
-from lsfit.six import convex_span_quartic, six_samples, span_quartic
-from lsfit.span import span_samples, sphere_motions
-from lsfit.surface import Image
-from lsfit.tilted import TiltedEllipsoid
-from lsfit.zhou import SIX_WEIGHTS, zhou_quartic
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.lsfit.body import ExactSurface, hull_volume
+from softjaw.lsfit.closed import Closed, closed
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.flag import FitError, FitFlag, OpenBodyError, UndecidedError
+from softjaw.lsfit.form import exponents, substitute
+from softjaw.lsfit.geometry import directions
+from softjaw.lsfit.gram import ball_gram, gram_certificate, gram_map
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.quartic import Quartic, convex_quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.six import convex_span_quartic, six_samples, span_quartic
+from softjaw.lsfit.span import span_samples, sphere_motions
+from softjaw.lsfit.surface import Image
+from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
 
 TURNS = 200

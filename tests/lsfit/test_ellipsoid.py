@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from friction.motion import fibonacci_twists
-from friction.wrench import friction_limits, friction_support, friction_wrench
-from lsfit.body import body_volume, hull_volume, shadow_area
-from lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
-from lsfit.misfit import misfit
-from lsfit.samples import normalised_samples, sample_rank
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.lsfit.body import body_volume, hull_volume, shadow_area
+from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.samples import normalised_samples, sample_rank
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 
 AXES = np.array([0.8, 0.6, 0.15])

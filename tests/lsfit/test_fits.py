@@ -8,19 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from friction.motion import cor_grid, cor_twists, fibonacci_twists
-from friction.wrench import friction_limits, friction_wrench
-from lsfit.body import ExactSurface, body_volume
-from lsfit.certificate import certify
-from lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
-from lsfit.flag import FitError, FitFlag
-from lsfit.geometry import directions
-from lsfit.lowest import lowest_eigenvalues, smallest_eigenvalue
-from lsfit.misfit import misfit
-from lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
-from lsfit.round import ball_coefficients
-from lsfit.samples import normalised_samples, sample_rank
-from lsfit.sos import MARGIN, ball_freedom, gram_matrix, least_in_cone, quadratic_parts
+from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
+from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.lsfit.body import ExactSurface, body_volume
+from softjaw.lsfit.certificate import certify
+from softjaw.lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.geometry import directions
+from softjaw.lsfit.lowest import lowest_eigenvalues, smallest_eigenvalue
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
+from softjaw.lsfit.round import ball_coefficients
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.sos import MARGIN, ball_freedom, gram_matrix, least_in_cone, quadratic_parts
 from tests.generators import (
     build,
     cylinder_grid,

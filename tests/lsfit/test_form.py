@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lsfit.form import (
+from softjaw.lsfit.form import (
     derivative,
     exponents,
     hessian_tensor,

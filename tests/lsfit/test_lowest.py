@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from lsfit.form import exponents, hessian_tensor, monomials, substitute
-from lsfit.lowest import lies_above, lowest_eigenvalues, smallest_eigenvalue, smallest_value
-from lsfit.quartic import convex_quartic
-from lsfit.round import ball_coefficients
-from lsfit.surface import Image
+from softjaw.lsfit.form import exponents, hessian_tensor, monomials, substitute
+from softjaw.lsfit.lowest import lies_above, lowest_eigenvalues, smallest_eigenvalue, smallest_value
+from softjaw.lsfit.quartic import convex_quartic
+from softjaw.lsfit.round import ball_coefficients
+from softjaw.lsfit.surface import Image
 
 
 def coefficients(P, d):

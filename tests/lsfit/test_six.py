@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from friction.motion import fibonacci_twists
-from friction.wrench import friction_support, friction_wrench
-from lsfit.ellipsoid import full_ellipsoid
-from lsfit.flag import FitError, FitFlag
-from lsfit.form import exponents, monomials
-from lsfit.gram import ball_gram, gram_certificate, gram_map, quadratic_map
-from lsfit.interior import least_quadratic
-from lsfit.quartic import convex_quartic
-from lsfit.quartic_surface import Quartic
-from lsfit.samples import normalised_samples, sample_rank
-from lsfit.six import convex_span_quartic, six_samples, span_ellipsoid, span_quartic
-from lsfit.span import CollapsedFitError, span_samples, sphere_motions
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_support, friction_wrench
+from softjaw.lsfit.ellipsoid import full_ellipsoid
+from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.gram import ball_gram, gram_certificate, gram_map, quadratic_map
+from softjaw.lsfit.interior import least_quadratic
+from softjaw.lsfit.quartic import convex_quartic
+from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.six import convex_span_quartic, six_samples, span_ellipsoid, span_quartic
+from softjaw.lsfit.span import CollapsedFitError, span_samples, sphere_motions
 from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
 
 RHO = 2.0

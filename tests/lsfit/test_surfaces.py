@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from lsfit.ellipsoid import Ellipsoid
-from lsfit.flag import FitFlag, OpenBodyError, UndecidedError
-from lsfit.form import exponents, monomials
-from lsfit.geometry import directions, quartic_volume, shadow_area, sphere_rule, supported_shadow
-from lsfit.lowest import smallest_eigenvalue, smallest_value
-from lsfit.misfit import misfit
-from lsfit.quartic import Quartic
-from lsfit.surface import Image
-from lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.flag import FitFlag, OpenBodyError, UndecidedError
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.geometry import directions, quartic_volume, shadow_area, sphere_rule, supported_shadow
+from softjaw.lsfit.lowest import smallest_eigenvalue, smallest_value
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import Image
+from softjaw.lsfit.tilted import TiltedEllipsoid
 
 AXES = np.array([1.0, 0.7, 0.1])
 E = exponents(3, 4)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
-from friction.wrench import friction_wrench
-from lsfit.flag import FitFlag
-from lsfit.misfit import misfit
-from lsfit.samples import normalised_samples
-from lsfit.six import six_samples
-from lsfit.span import CollapsedFitError, sphere_motions
-from lsfit.tilted import TiltedEllipsoid
-from lsfit.zhou import SIX_WEIGHTS, ZhouWeights, zhou_ellipsoid, zhou_quartic
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.samples import normalised_samples
+from softjaw.lsfit.six import six_samples
+from softjaw.lsfit.span import CollapsedFitError, sphere_motions
+from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.zhou import SIX_WEIGHTS, ZhouWeights, zhou_ellipsoid, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
 
 DISC = disc_polar(1, 40, 96)

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scoring.boundary import ellipsoid_matrix
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.epsilon_search import epsilon, separating_wrench
-from scoring.grasp import grasp_score
-from scoring.graspit import graspit_score
-from scoring.inscribed import is_ellipsoid
-from scoring.polytope import graspit_vertices, hull_volume
-from scoring.pose import pose_volume
-from scoring.rays import ray_volume
-from scoring.score import ScoreFlag, contact_flag, score
-from scoring.task import hold_task, least_grip_force
+from softjaw.scoring.boundary import ellipsoid_matrix
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.epsilon_search import epsilon, separating_wrench
+from softjaw.scoring.grasp import grasp_score
+from softjaw.scoring.graspit import graspit_score
+from softjaw.scoring.inscribed import is_ellipsoid
+from softjaw.scoring.polytope import graspit_vertices, hull_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.rays import ray_volume
+from softjaw.scoring.score import ScoreFlag, contact_flag, score
+from softjaw.scoring.task import hold_task, least_grip_force
 
 TURNS = 200
 ULP = np.finfo(float).eps

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.epsilon import epsilon_l1, epsilon_linf
-from scoring.epsilon_search import epsilon, separating_wrench
-from scoring.gauge import gauge, joint_support
-from scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from scoring.polytope import fibonacci_vertices
-from scoring.reach import reach
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
+from softjaw.scoring.epsilon_search import epsilon, separating_wrench
+from softjaw.scoring.gauge import gauge, joint_support
+from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
+from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.scoring.reach import reach
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.grasp import grasp_score
-from scoring.polytope import fibonacci_vertices
-from scoring.pose import pose_volume
-from scoring.score import ScoreFlag, score
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.grasp import grasp_score
+from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import ScoreFlag, score
 
 A, B = (0.8, 0.6, 0.015), (0.5, 0.9, 0.025)
 LENGTHS = 0.2, 0.05

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from scoring import graspit
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.epsilon_search import epsilon
-from scoring.graspit import graspit_score, linearisation_bias, linearised_contacts
-from scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
-from scoring.volume import volume_linf
+from softjaw.scoring import graspit
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.graspit import graspit_score, linearisation_bias, linearised_contacts
+from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
+from softjaw.scoring.volume import volume_linf
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
 RHO = 0.7

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from scoring.boundary import ellipsoid_matrix, sphere_mesh, surface_mesh, touching_points
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.plane import fan_area, joint_pairs, mixed_area, polygon_area
-from scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
-from scoring.pose import pose_volume
-from scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.boundary import ellipsoid_matrix, sphere_mesh, surface_mesh, touching_points
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.plane import fan_area, joint_pairs, mixed_area, polygon_area
+from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.volume import volume_l1, volume_linf
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
 PADS = EllipsoidBody(A), EllipsoidBody(B)

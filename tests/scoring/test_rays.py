@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
-from scoring.polytope import fibonacci_vertices
-from scoring.pose import cone_volume, pose_volume
-from scoring.rays import ray_volume
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
+from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.scoring.pose import cone_volume, pose_volume
+from softjaw.scoring.rays import ray_volume
 
 
 def somewhere(rng, axes):

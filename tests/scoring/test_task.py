@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from scoring.polytope import fibonacci_vertices
-from scoring.reach import body_point
-from scoring.simplex import best_columns
-from scoring.task import GRAVITY, hold_task, least_grip_force, weight_wrench
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
+from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.scoring.reach import body_point
+from softjaw.scoring.simplex import best_columns
+from softjaw.scoring.task import GRAVITY, hold_task, least_grip_force, weight_wrench
 
 A, B = (0.8, 0.6, 0.010), (0.5, 0.9, 0.008)
 D = 0.06

@@ -25,9 +25,9 @@ FACES, FORCES = 6, 3
 
 def fake_plan(digest="scene", stations=6, derived=True):
     """Stations x two angles x three forces; both angles of an even station are one unit."""
-    from study.execution.plan import Plan
-    from study.storage.layout import Derived, Header, Layout
-    from study.storage.reading import StoredAxis
+    from softjaw.study.result.layout import Derived, Header, Layout
+    from softjaw.study.result.reading import StoredAxis
+    from softjaw.study.run.plan import Plan
 
     axes = (
         StoredAxis("station", np.linspace(0, 0.1, stations), "m", "station along the object's axis"),
@@ -47,7 +47,7 @@ def fake_plan(digest="scene", stations=6, derived=True):
 
 def fake_result(row):
     """Every value from the row alone."""
-    from study.storage.result import CaseResult
+    from softjaw.study.result.result import CaseResult
 
     random = np.random.default_rng(row)
     values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n", "f_x_max", "tau_z_max")}
@@ -59,7 +59,7 @@ def fake_result(row):
 
 def fake_ladder(options):
     """The injected solver; rows are named by the first candidate that a unit serves."""
-    from study.storage.result import CaseFailure
+    from softjaw.study.result.result import CaseFailure
 
     def solve_unit(unit):
         for k, row in enumerate(unit.rows[0]):
@@ -106,10 +106,10 @@ def main():
     options = parser.parse_args()
     from mpi4py import MPI
 
-    from study.execution.run import Work, run_study
-    from study.exits import StudyError
-    from study.speaking import complain
-    from study.tables.status import summary
+    from softjaw.study.exits import StudyError
+    from softjaw.study.run.run import Work, run_study
+    from softjaw.study.show.tables.status import summary
+    from softjaw.study.speaking import complain
 
     comm = MPI.COMM_WORLD
     if options.file_limit:

@@ -7,9 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from study.storage.layout import Derived, Header, Layout
-from study.storage.reading import StoredAxis
-from study.storage.store import create
+from softjaw.study.result.layout import Derived, Header, Layout
+from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.store import create
 from tests.study.sealing import sealed
 
 SCENE = """

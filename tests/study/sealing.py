@@ -5,11 +5,11 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from study.storage import checksums
-from study.storage.datasets import CLOSING, MISSING, STATE, SUMS
-from study.storage.guarded import GuardedFile
-from study.storage.layout import ROOT
-from study.storage.reading import Result
+from softjaw.study.result import checksums
+from softjaw.study.result.datasets import CLOSING, MISSING, STATE, SUMS
+from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.layout import ROOT
+from softjaw.study.result.reading import Result
 
 
 def sealed(path):

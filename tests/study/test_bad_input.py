@@ -11,10 +11,10 @@ import sys
 import numpy as np
 import pytest
 
-from study.cli import main
-from study.environment import launch_environment
-from study.flags import Flag
-from study.storage.store import open_result
+from softjaw.study.cli import main
+from softjaw.study.environment import launch_environment
+from softjaw.study.flags import Flag
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
 
 pytestmark = pytest.mark.launches
@@ -51,7 +51,7 @@ def folder(shared_path, once):
 
 
 def run(ranks, folder, *words, scene="scene.toml"):
-    return launch(ranks, "-m", "study", "run", folder / scene, "-o", folder / "out.hdf", *words)
+    return launch(ranks, "-m", "softjaw", "run", folder / scene, "-o", folder / "out.hdf", *words)
 
 
 def refused(answer, folder, code, *words, sentences=1):
@@ -165,7 +165,8 @@ def test_a_misspelt_option_of_the_solver_is_refused(once, folder):
 
 def every_rank(folder, *words):
     """Exit codes of two ranks, each told by a shell of its own, and standard error."""
-    program = [sys.executable, "-m", "study", "run", str(folder / "scene.toml"), "-o", str(folder / "out.hdf"), *words]
+    scene, out = str(folder / "scene.toml"), str(folder / "out.hdf")
+    program = [sys.executable, "-m", "softjaw", "run", scene, "-o", out, *words]
     done = subprocess.run(
         ["timeout", "-k", "5", "60", "mpirun", "-n", "2", "--oversubscribe", "sh", "-c", '"$@"; echo "code $?"', "sh",
          *program],

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from study.storage.store import open_result
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
 from tests.study.test_vtkhdf import steps_of
 
@@ -92,7 +92,7 @@ def web():
 def result(tmp_path_factory):
     """A study of 3 stations x 2 angles x 2 forces, solved by the program."""
     path = tmp_path_factory.mktemp("browsing") / "cylinder.hdf"
-    code, output, errors = launch(0, "-m", "study", "run", ROOT / "jobs/smoke.toml", "-o", path, *STATIONS)
+    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs/smoke.toml", "-o", path, *STATIONS)
     assert code == 0, output + errors
     return path
 

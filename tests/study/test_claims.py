@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.scene import load_scene
+from softjaw.study.scene import load_scene
 
 BOTTLE = "jobs/bottle-rigid.toml"
 
 
 def solved(*overrides, file=BOTTLE):
     """Results of all cases of a scene, in the order of its units and forces."""
-    from study import pipeline
-    from study.case.sweep import units
+    from softjaw.study import pipeline
+    from softjaw.study.case.sweep import units
 
     found = []
     for unit in units(load_scene(file, list(overrides)), lambda point: point.axis_symmetry):
@@ -51,7 +51,7 @@ def test_both_definitions_of_e_n_and_the_projected_one():
 @pytest.mark.long
 def test_friction_that_acts_back_moves_what_auto_leaves_out():
     """At 78 mm by less than 2 %, at 73.5 mm by 5 %, at 175 mm by a third; all of it is told, none of it is taken."""
-    from study.storage.quantities import REASONS
+    from softjaw.study.result.quantities import REASONS
 
     where = ["candidates.stations_mm=[73.5294, 77.9412, 175]", "load.normal_force_n=[1, 2, 13]"]
     auto, coupled = solved(*where), solved(*where, 'effects.friction_pressure_coupling="tangential"')
@@ -68,11 +68,12 @@ def test_friction_that_acts_back_moves_what_auto_leaves_out():
 @pytest.mark.launches
 def test_errors_of_the_lookup_between_stations(tmp_path):
     """Every second station of the bottle's map is looked up between the others."""
-    from study.lookup import GraspMap
+    from softjaw.study.lookup import GraspMap
     from tests.study.launching import launch
 
     for count in (18, 35):
-        words = ["-m", "study", "run", BOTTLE, "-o", tmp_path / f"{count}.hdf", "--set", f"candidates.stations={count}"]
+        path, stations = tmp_path / f"{count}.hdf", f"candidates.stations={count}"
+        words = ["-m", "softjaw", "run", BOTTLE, "-o", path, "--set", stations]
         assert launch(0, *words, "--set", "output.patches=none")[0] == 0
     coarse, fine = (GraspMap(tmp_path / f"{count}.hdf") for count in (18, 35))
     station, force = np.meshgrid(fine.axes[0].x[1::2], fine.axes[2].x, indexing="ij")

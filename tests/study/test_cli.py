@@ -17,12 +17,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-import study
-from study.cli import main, program
-from study.environment import launch_environment
-from study.execution.running import petsc_overrides
-from study.exits import MEANING, StudyError
-from study.help import GROUPS
+from softjaw import study
+from softjaw.study.cli import main, program
+from softjaw.study.environment import launch_environment
+from softjaw.study.exits import MEANING, StudyError
+from softjaw.study.help import GROUPS
+from softjaw.study.run.running import petsc_overrides
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
@@ -195,10 +195,10 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
 
 def fake_pipeline(monkeypatch):
     """What the commands need of ``study.pipeline``."""
-    module = ModuleType("study.pipeline")
+    module = ModuleType("softjaw.study.pipeline")
     module.patch_faces = lambda scene: 200
     module.axis_symmetry = lambda scene: 0
-    monkeypatch.setitem(sys.modules, "study.pipeline", module)
+    monkeypatch.setitem(sys.modules, "softjaw.study.pipeline", module)
     monkeypatch.setattr(study, "pipeline", module, raising=False)
 
 
@@ -264,7 +264,7 @@ def test_schema_is_json(capsys):
 
 def loaded(*words):
     """Modules that a command imports, and its exit code."""
-    command = [sys.executable, "-X", "importtime", "-m", "study", *map(str, words)]
+    command = [sys.executable, "-X", "importtime", "-m", "softjaw", *map(str, words)]
     told = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     lines = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]
     return {line.partition(".")[0] for line in lines}, told.returncode
@@ -295,7 +295,7 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once
 @pytest.mark.launches
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished, once):
-    words = ["-m", "study", *map(str, QUICK[command](scene, finished))]
+    words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
     libraries = ["-c", "import h5py, numpy, study.scene"]
     spent = [once(lambda w=w: processor_seconds(sys.executable, *w)) for w in (words, libraries)]
     assert spent[0] < 2.0 * spent[1]
@@ -303,7 +303,7 @@ def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, 
 
 @pytest.mark.launches
 def test_a_bad_scene_is_told_once_by_all_ranks_together(once, tmp_path):
-    code, output, errors = once(lambda: launch(2, "-m", "study", "run", tmp_path / "no.toml"))
+    code, output, errors = once(lambda: launch(2, "-m", "softjaw", "run", tmp_path / "no.toml"))
     assert code == 2
     assert output == ""
     assert errors.count("error: ") == 1
@@ -319,7 +319,7 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
 def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
     def piped():
         small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0]"
-        run = f"{sys.executable} -m study run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
+        run = f"{sys.executable} -m softjaw run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
         done = subprocess.run(
             ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=shared_path,
             env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,

@@ -6,8 +6,8 @@ import subprocess
 
 import pytest
 
-from study.cli import main, program
-from study.completion import SHELLS, script
+from softjaw.study.cli import main, program
+from softjaw.study.completion import SHELLS, script
 
 # What bash does at the tab key, without a terminal.
 TAB = """

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.scene import parse_scene
+from softjaw.study.scene import parse_scene
 
 CYLINDER = """
 [object]
@@ -50,7 +50,7 @@ def scene(text=CYLINDER, overrides=()):
 
 @pytest.mark.parametrize("order", [0.8, 1.5, 2.0, 2.9])
 def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
-    from study.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.extrapolate import limit
 
     h, scale = np.array([3.0, 2.1, 1.0]), np.array([0.1, -0.02, 0.3])
     exact = np.array([1.0, 2.0, 0.5])
@@ -71,7 +71,7 @@ def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
     ],
 )
 def test_an_order_that_is_not_there_is_not_seen(values, why):
-    from study.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.extrapolate import limit
 
     found = limit([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
     assert math.isnan(found.order)
@@ -80,7 +80,7 @@ def test_an_order_that_is_not_there_is_not_seen(values, why):
 
 
 def test_an_order_above_the_formal_one_is_not_trusted():
-    from study.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.extrapolate import limit
 
     h = np.array([4.0, 2.0, 1.0])
     found = limit(h, (1.0 + 0.01 * h**4)[:, None], formal=2.0)
@@ -89,7 +89,7 @@ def test_an_order_above_the_formal_one_is_not_trusted():
 
 
 def test_the_front_is_what_nothing_beats():
-    from study.cost.pareto import front
+    from softjaw.study.accuracy.cost.pareto import front
 
     random = np.random.default_rng(3)
     t, e = random.random((2, 50))
@@ -103,16 +103,16 @@ def test_the_front_is_what_nothing_beats():
 
 
 def finger_on(obj, gripper):
-    from study.case import model
-    from study.case.candidates import axis_poses
+    from softjaw.study.case import model
+    from softjaw.study.case.candidates import axis_poses
 
     return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
 
 
 def test_springs_on_a_plane_carry_alike():
     """Uniform pressure, travel F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
-    from fem.objects import Plane
-    from study.cost.winkler import winkler_pad
+    from softjaw.fem.objects.shapes import Plane
+    from softjaw.study.accuracy.cost.winkler import winkler_pad
 
     gripper = scene().gripper
     pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
@@ -123,8 +123,8 @@ def test_springs_on_a_plane_carry_alike():
 
 def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     """p = k (d - y^2 / 2R): F = 2/3 k L a^3 / R for narrow contacts, order 2 in the spacing of the springs."""
-    from fem.objects import EllipticCylinder
-    from study.cost.winkler import stiffness, winkler_pad
+    from softjaw.fem.objects.shapes import EllipticCylinder
+    from softjaw.study.accuracy.cost.winkler import stiffness, winkler_pad
 
     gripper, R, force = scene().gripper, 0.2, 1.0
     finger = finger_on(EllipticCylinder(R, R, 1.0), gripper)
@@ -144,7 +144,7 @@ def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
 
 
 def test_every_level_is_a_scene_and_refused_ones_say_why():
-    from study.cost.knobs import contact_knobs, with_level
+    from softjaw.study.accuracy.cost.knobs import contact_knobs, with_level
 
     own = scene(BOTTLE.format(wall=0.4), COARSE_WALL)
     knobs, _ = contact_knobs(own)
@@ -162,7 +162,7 @@ def test_every_level_is_a_scene_and_refused_ones_say_why():
 
 
 def test_a_level_that_the_scene_refuses_is_skipped_with_its_reason():
-    from study.cost.knobs import Level, refusal
+    from softjaw.study.accuracy.cost.knobs import Level, refusal
 
     assert not refusal(scene(), Level("good", (("gripper.elements", [8, 4, 2]),)))
     assert "gripper.elements" in refusal(scene(), Level("odd", (("gripper.elements", [7, 4, 2]),)))
@@ -182,9 +182,9 @@ def e_n_of(point):
 
 def formula_study(own):
     """A study of the formula on two probes, and how it solves what it lacks."""
-    from study.cost.knobs import weight, with_level
-    from study.cost.measure import Measured
-    from study.cost.study import costs, new_study, plain
+    from softjaw.study.accuracy.cost.knobs import weight, with_level
+    from softjaw.study.accuracy.cost.measure import Measured
+    from softjaw.study.accuracy.cost.study import costs, new_study, plain
 
     own = plain(own)
     probes = [SimpleNamespace(label=f"probe {i}", forces=(1.0, 2.0)) for i in range(2)]
@@ -207,8 +207,8 @@ def formula_study(own):
 
 
 def test_a_study_comes_back_from_its_file(tmp_path):
-    from study.cost.file import load, save
-    from study.cost.knobs import Skipped
+    from softjaw.study.accuracy.cost.file import load, save
+    from softjaw.study.accuracy.cost.knobs import Skipped
 
     _, study, *_ = formula_study(scene(overrides=COARSE))
     study.skipped.append(Skipped("pad mesh, hex8", "huge", "would take 3 h; raise --time-limit"))
@@ -224,8 +224,8 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 
 def test_another_file_is_refused(tmp_path):
-    from study.cost.file import load
-    from study.exits import OTHER_FILE, StudyError
+    from softjaw.study.accuracy.cost.file import load
+    from softjaw.study.exits import OTHER_FILE, StudyError
 
     (tmp_path / "text.hdf").write_text("no HDF5")
     for name in ("text.hdf", "missing.hdf"):
@@ -253,8 +253,8 @@ def test_errors_and_orders_are_those_of_the_formula():
     ],
 )
 def test_the_choice_meets_the_target_at_the_least_cost(text, target):
-    from study.cost.choose import choose, combinations
-    from study.cost.knobs import with_level
+    from softjaw.study.accuracy.cost.choose import choose, combinations
+    from softjaw.study.accuracy.cost.knobs import with_level
 
     what, study, probes, solve, _ = formula_study(scene(text, [*COARSE, *(COARSE_WALL if "wall" in text else [])]))
     choice = choose(what, study, target, {}, probes, (), solve)
@@ -272,7 +272,7 @@ def test_the_choice_meets_the_target_at_the_least_cost(text, target):
 
 
 def test_what_the_scene_gives_itself_stays():
-    from study.cost.choose import choose, explicit
+    from softjaw.study.accuracy.cost.choose import choose, explicit
 
     own = scene(overrides=[*COARSE, "gripper.element=hex8", "accuracy.e_n=0.01"])
     what, study, probes, solve, _ = formula_study(own)
@@ -286,7 +286,7 @@ def test_what_the_scene_gives_itself_stays():
 
 
 def test_a_second_choice_solves_nothing_and_chooses_the_same():
-    from study.cost.choose import choose
+    from softjaw.study.accuracy.cost.choose import choose
 
     own = scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL])
     what, study, probes, solve, calls = formula_study(own)
@@ -298,7 +298,7 @@ def test_a_second_choice_solves_nothing_and_chooses_the_same():
 
 
 def test_a_run_without_a_study_climbs_no_further_than_needed():
-    from study.cost.quick import ladder, quick_choice
+    from softjaw.study.accuracy.cost.quick import ladder, quick_choice
 
     own = scene(overrides=["accuracy.e_n=0.02"])
     _, study, probes, solve, calls = formula_study(own)
@@ -316,8 +316,8 @@ def test_a_run_without_a_study_climbs_no_further_than_needed():
 
 
 def test_a_given_mesh_leaves_nothing_to_choose():
-    from study.cost.quick import quick_choice
-    from study.cost.target import with_choice
+    from softjaw.study.accuracy.cost.quick import quick_choice
+    from softjaw.study.accuracy.cost.target import with_choice
 
     own = scene(overrides=[*COARSE, "accuracy.e_n=0.02"])
     _, study, probes, solve, _ = formula_study(own)
@@ -329,8 +329,8 @@ def test_a_given_mesh_leaves_nothing_to_choose():
 
 @pytest.mark.long
 def test_words_tell_price_and_need():
-    from study.cost.page import cost_page
-    from study.cost.words import sentences
+    from softjaw.study.accuracy.cost.page import cost_page
+    from softjaw.study.accuracy.cost.words import sentences
 
     what, study, *_ = formula_study(scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL]))
     tables = what.errors(study)
@@ -343,8 +343,8 @@ def test_words_tell_price_and_need():
 
 
 def test_ranks_are_refused(monkeypatch):
-    from study.cost.command import refuse_ranks
-    from study.exits import USAGE, StudyError
+    from softjaw.study.accuracy.cost.command import refuse_ranks
+    from softjaw.study.exits import USAGE, StudyError
 
     for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"):
         monkeypatch.delenv(name, raising=False)
@@ -373,10 +373,10 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
     """All that is predicted much cheaper than the choice is solved too: none within 1 % costs below 2/3."""
     from dataclasses import replace
 
-    from study.cost.choose import choose, combinations, reference
-    from study.cost.measure import measure
-    from study.cost.probes import probes
-    from study.cost.study import Measuring, costs, new_study, setting_of
+    from softjaw.study.accuracy.cost.choose import choose, combinations, reference
+    from softjaw.study.accuracy.cost.measure import measure
+    from softjaw.study.accuracy.cost.probes import probes
+    from softjaw.study.accuracy.cost.study import Measuring, costs, new_study, setting_of
 
     own, target = scene(text, overrides), 0.01
     what = costs(own, with_judging=False)
@@ -406,9 +406,9 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
 
 @pytest.mark.long
 def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
-    from study.cli import main
-    from study.cost.file import load
-    from study.exits import DONE, OTHER_FILE, USAGE
+    from softjaw.study.accuracy.cost.file import load
+    from softjaw.study.cli import main
+    from softjaw.study.exits import DONE, OTHER_FILE, USAGE
 
     file, out = tmp_path / "small.toml", tmp_path / "small-cost.hdf"
     file.write_text(CYLINDER)
@@ -434,13 +434,13 @@ def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
 @pytest.mark.long
 @pytest.mark.launches
 def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, once):
-    from study.exits import DONE
-    from study.storage.store import open_result
+    from softjaw.study.exits import DONE
+    from softjaw.study.result.store import open_result
     from tests.study.launching import launch
 
     file, out = tmp_path / "small.toml", tmp_path / "small.hdf"
     file.write_text(CYLINDER)
-    words = ["-m", "study", "run", file, "-o", out, "--set", "accuracy.e_n=0.03"]
+    words = ["-m", "softjaw", "run", file, "-o", out, "--set", "accuracy.e_n=0.03"]
     code, told, _ = once(launch, 0, *words)
     assert code == DONE
     assert "predicted error" in told

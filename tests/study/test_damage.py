@@ -9,19 +9,19 @@ import h5py
 import numpy as np
 import pytest
 
-from study import pipeline
-from study.case import sweep
-from study.cli import main
-from study.execution.plan import make_plan
-from study.exits import OTHER_FILE, StudyError
-from study.lookup import GraspMap
-from study.scene import parse_scene
-from study.storage import guarded
-from study.storage.derived import finalise
-from study.storage.layout import DONE, MISSING
-from study.storage.record import record
-from study.storage.repair import repair
-from study.storage.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study import pipeline
+from softjaw.study.case import sweep
+from softjaw.study.cli import main
+from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.lookup import GraspMap
+from softjaw.study.result import guarded
+from softjaw.study.result.derived import finalise
+from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.record import record
+from softjaw.study.result.repair import repair
+from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import parse_scene
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 

@@ -41,7 +41,7 @@ def moved(values, seed):
 @tries
 @given(scores, seeds)
 def test_equal_grasps_keep_their_order(values, seed):
-    from study.tables.ranking import falling, largest, ranking
+    from softjaw.study.show.tables.ranking import falling, largest, ranking
 
     flags = np.random.default_rng(seed).choice([0, 1024], len(values))
     assert ranking(moved(values, seed), flags).tolist() == ranking(np.array(values), flags).tolist()
@@ -53,7 +53,7 @@ def test_equal_grasps_keep_their_order(values, seed):
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
-    from study.tables.ranking import TIE, falling
+    from softjaw.study.show.tables.ranking import TIE, falling
 
     order = falling(np.array(values))
     assert sorted(order.tolist()) == list(range(len(values)))
@@ -64,7 +64,7 @@ def test_a_ranking_is_one(values):
 @tries
 @given(st.floats(0.1, 50.0), st.floats(1e-3, 10.0), seeds)
 def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
-    from study.tables.ranking import nearest
+    from softjaw.study.show.tables.ranking import nearest
 
     forces = low + step * np.arange(4)
     wanted = moved([low + 1.5 * step], seed)[0]
@@ -75,8 +75,8 @@ def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
 @tries
 @given(scores, seeds)
 def test_rounding_is_no_difference_of_two_maps_without_errors(values, seed):
-    from study.tables.compare import Difference
-    from study.uncertainty.verdict import Sure
+    from softjaw.study.accuracy.uncertainty.verdict import Sure
+    from softjaw.study.show.tables.compare import Difference
 
     one, other = np.array(values), moved(values, seed)
     difference = Difference("e_n", "m", (one, other), np.zeros(one.shape), (True, True))
@@ -87,8 +87,8 @@ def test_rounding_is_no_difference_of_two_maps_without_errors(values, seed):
 
 
 def test_a_difference_above_the_errors_is_still_one():
-    from study.tables.compare import Difference
-    from study.uncertainty.verdict import Sure
+    from softjaw.study.accuracy.uncertainty.verdict import Sure
+    from softjaw.study.show.tables.compare import Difference
 
     values = np.array([1.0, 1.0]), np.array([1.1, 1.01])
     assert Difference("e_n", "m", values, np.full(2, 0.05), (True, True)).beyond.tolist() == [True, False]
@@ -98,7 +98,7 @@ def test_a_difference_above_the_errors_is_still_one():
 @tries
 @given(seeds)
 def test_a_band_of_a_probe_is_that_of_its_images(seed):
-    from study.uncertainty.carrying import at_least_own
+    from softjaw.study.accuracy.uncertainty.carrying import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
     band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
@@ -112,7 +112,7 @@ def test_a_band_of_a_probe_is_that_of_its_images(seed):
 @given(st.lists(st.sampled_from([0.5, 1.0, 1.5]), min_size=1, max_size=5), seeds)
 def test_a_window_ends_at_the_same_force(values, seed):
     """Values that just reach the limit, also where they fall again or the forces end."""
-    from study.case.window import first_crossing
+    from softjaw.study.case.window import first_crossing
 
     forces = 1.0 + np.arange(len(values))
     one = first_crossing(forces, values, 1.0)
@@ -123,8 +123,8 @@ def test_a_window_ends_at_the_same_force(values, seed):
 @tries
 @given(seeds)
 def test_a_grasp_that_just_holds_is_not_too_weak(seed):
-    from study.flags import Flag
-    from study.tables.ranking import judged
+    from softjaw.study.flags import Flag
+    from softjaw.study.show.tables.ranking import judged
 
     factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
     layout = SimpleNamespace(derived=[SimpleNamespace(name="force_low")])
@@ -137,9 +137,9 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
-    from study.case import coupling_level, pad_level, sheet_level, wall
-    from study.case.margin import surely_below
-    from study.scene import parse_scene
+    from softjaw.study.case import coupling_level, pad_level, sheet_level, wall
+    from softjaw.study.case.margin import surely_below
+    from softjaw.study.scene import parse_scene
 
     scene = parse_scene(SPHERE)
     on = 1.0 + ulp
@@ -169,7 +169,7 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
 
 def facing(turn, lean, distance=0.06, free=0.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
-    from friction.frame import FrameFlag
+    from softjaw.friction.frame import FrameFlag
 
     made = []
     for side, angle in ((1.0, lean), (-1.0, np.pi)):
@@ -188,9 +188,9 @@ def facing(turn, lean, distance=0.06, free=0.0):
 @given(seeds)
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
-    from scoring.score import ScoreFlag
-    from study.case.contact import ANTIPODAL, flags
-    from study.flags import Flag
+    from softjaw.scoring.score import ScoreFlag
+    from softjaw.study.case.contact import ANTIPODAL, flags
+    from softjaw.study.flags import Flag
 
     none = ScoreFlag(0)
     turn = Rotation.random(random_state=seed)
@@ -204,8 +204,8 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
 @given(seeds)
 def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
     """Without friction the force on a straight wall's support is rounding; a newton is not."""
-    from study.case import wall
-    from study.flags import Flag
+    from softjaw.study.case import wall
+    from softjaw.study.flags import Flag
 
     random = np.random.default_rng(seed)
     scene = SimpleNamespace(friction=SimpleNamespace(mu=0.0), object=None)
@@ -226,7 +226,7 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
 @given(st.floats(-3.0, 3.0), seeds)
 def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
     """The gap that closes it is just as wide as is allowed."""
-    from study.lookup.interpolation import WIDER, circle
+    from softjaw.study.lookup.interpolation import WIDER, circle
 
     step = math.pi / (1 + WIDER)
     angles = np.array([first, first + step])
@@ -237,9 +237,9 @@ def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
 @pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
 def test_equal_places_give_the_first_ones_as_probes(shift):
     """Pads all along a cylinder touch it alike, but for rounding."""
-    from study.case.sweep import units
-    from study.cost.probes import demanding, spread
-    from study.scene import parse_scene
+    from softjaw.study.accuracy.cost.probes import demanding, spread
+    from softjaw.study.case.sweep import units
+    from softjaw.study.scene import parse_scene
 
     text = """
 [object]

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from study import doctor, environment
-from study.environment import Answer, ask, launch_environment, outside_mpi
+from softjaw.study import doctor, environment
+from softjaw.study.environment import Answer, ask, launch_environment, outside_mpi
 
 
 def answering(code, output="", errors=""):

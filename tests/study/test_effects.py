@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study import pipeline
-from study.case import coupling_level, model
-from study.case.build import build_object
-from study.case.coupling_level import neglected_traction
-from study.case.sweep import units
-from study.scene import load_scene, parse_scene
-from study.storage.quantities import EFFECTS, REASONS
-from study.storage.result import CaseFailure
+from softjaw.study import pipeline
+from softjaw.study.case import coupling_level, model
+from softjaw.study.case.build import build_object
+from softjaw.study.case.coupling_level import neglected_traction
+from softjaw.study.case.sweep import units
+from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.result.result import CaseFailure
+from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -124,7 +124,10 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
         assert min(row[2] for row in own) <= job.PANELS[effect][0]
 
 
-CHOOSING = {"study.case.solving": ("choose_level", "choose_pad_level"), "study.pipeline": ("effects_of",)}
+CHOOSING = {
+    "softjaw.study.case.solving": ("choose_level", "choose_pad_level"),
+    "softjaw.study.pipeline": ("effects_of",),
+}
 
 
 def cpu_share_of_choosing(file, overrides, monkeypatch):

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from study import doctor, environment
-from study.environment import COMPILED, compiled_loops_pass, keep_compiled_loops
+from softjaw.study import doctor, environment
+from softjaw.study.environment import COMPILED, compiled_loops_pass, keep_compiled_loops
 
 CODE = """
 import os, sys
-from study.environment import keep_compiled_loops
+from softjaw.study.environment import keep_compiled_loops
 keep_compiled_loops()
 print(os.environ.get("NUMBA_CACHE_DIR", ""), "numba" in sys.modules)
 """
@@ -71,7 +71,7 @@ def test_folders_are_judged_without_being_made(tmp_path):
 def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
     def told():
         # a home that cannot be, and packages that numba could not write beside
-        code = "import study.environment as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
+        code = "import softjaw.study.environment as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
         surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
         command = [sys.executable, "-c", code]
         done = subprocess.run(
@@ -87,6 +87,7 @@ def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
 
 
 def test_every_package_with_compiled_loops_is_looked_at():
-    users = {p.relative_to(environment.ROOT).parts[0] for name in ("fem", "friction", "lsfit", "scoring", "study")
-             for p in (environment.ROOT / name).rglob("*.py") if "njit(cache" in p.read_text()}  # fmt: skip
+    home = environment.ROOT / "softjaw"
+    users = {p.parent.relative_to(home).as_posix() for name in ("fem", "friction", "lsfit", "scoring", "study")
+             for p in (home / name).rglob("*.py") if "njit(cache" in p.read_text()}  # fmt: skip
     assert users == set(COMPILED)

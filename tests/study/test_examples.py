@@ -10,8 +10,8 @@ import sys
 
 import pytest
 
-from study.cli import program
-from study.environment import launch_environment
+from softjaw.study.cli import program
+from softjaw.study.environment import launch_environment
 from tests.study.launching import ROOT, launch
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
@@ -29,7 +29,7 @@ EXAMPLES = [
 def solved(tmp_path_factory):
     """A finished study of seconds, which stands in for all results that the examples name."""
     path = tmp_path_factory.mktemp("solved") / "smoke.hdf"
-    code, output, errors = launch(0, "-m", "study", "run", ROOT / "jobs" / "smoke.toml", "-o", path)
+    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path)
     assert code == 0, output + errors
     return path
 
@@ -41,7 +41,7 @@ def test_an_example_does_what_it_says(example, solved, tmp_path):
     made = re.findall(r"(?:-o|>|--screenshot) (\S+)", example)
     for name in set(re.findall(r"results/\S+\.hdf", example)) - set(made):
         shutil.copy(solved, tmp_path / name)
-    command = example.replace("mpirun -n 8 ", "").replace("softjaw ", f"{sys.executable} -m study ", 1)
+    command = example.replace("mpirun -n 8 ", "").replace("softjaw ", f"{sys.executable} -m softjaw ", 1)
     done = subprocess.run(
         ["bash", "-c", command], cwd=tmp_path, env={**launch_environment(), "PYTHONPATH": str(ROOT)},
         capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL,

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.cli import main
-from study.data import Data
-from study.exits import OTHER_FILE, StudyError
-from study.figures import JOBS, fig5, fig6, fig7, fig8, rendering
-from study.figures.command import chosen, draw, targets
-from study.figures.table import FIGURES, Figure, find
-from study.storage.layout import DONE
-from study.storage.store import open_result
+from softjaw.study.cli import main
+from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.store import open_result
+from softjaw.study.show.data import Data
+from softjaw.study.show.figures import JOBS, fig5, fig6, fig7, fig8, rendering
+from softjaw.study.show.figures.command import chosen, draw, targets
+from softjaw.study.show.figures.table import FIGURES, Figure, find
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 
@@ -29,7 +29,7 @@ def test_every_figure_has_scenes_something_that_draws_it_and_a_picture_for_the_r
     assert figure.scenes
     assert all((JOBS / f"{scene}.toml").is_file() for scene in figure.scenes)
     assert figure.draw.__doc__
-    assert figure.draw.__module__ == f"study.figures.fig{figure.name[0]}"
+    assert figure.draw.__module__ == f"softjaw.study.show.figures.fig{figure.name[0]}"
     picture = ROOT / "docs" / figure.file
     assert picture.read_bytes().startswith(PNG)
     assert picture.stat().st_size <= MOST
@@ -89,7 +89,7 @@ def test_failed_cases_are_told_of_where_a_figure_needs_them(tmp_path):
 
 def test_a_scene_that_cannot_be_solved_is_not_drawn(tmp_path, capsys, monkeypatch):
     asked = []
-    monkeypatch.setattr("study.cli.main", lambda words: asked.append(words) or OTHER_FILE)
+    monkeypatch.setattr("softjaw.study.cli.main", lambda words: asked.append(words) or OTHER_FILE)
     assert main(["figure", "4c", "--results", str(tmp_path), "-o", str(tmp_path / "x.png")]) == OTHER_FILE
     assert asked == [["run", str(JOBS / "fig4-curvature.toml"), "-o", str(tmp_path / "fig4-curvature.hdf")]]
     assert "or choose another folder with --results" in capsys.readouterr().err
@@ -136,7 +136,7 @@ def coarse(tmp_path_factory):
     for name, (scene, overrides) in COARSE.items():
         found[name] = folder / f"{name}.hdf"
         words = [word for value in overrides for word in ("--set", value)]
-        code, output, errors = launch(0, "-m", "study", "run", JOBS / f"{scene}.toml", "-o", found[name], *words)
+        code, output, errors = launch(0, "-m", "softjaw", "run", JOBS / f"{scene}.toml", "-o", found[name], *words)
         assert (code, errors) == (0, ""), output
     return found
 
@@ -169,7 +169,7 @@ def test_every_figure_is_drawn_from_coarse_results(coarse, tmp_path, figure):
 @pytest.mark.long
 @pytest.mark.launches
 def test_the_command_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_path):
-    words = ("-m", "study", "figure", "5a", "--results", tmp_path, "-o", tmp_path / "a.png")
+    words = ("-m", "softjaw", "figure", "5a", "--results", tmp_path, "-o", tmp_path / "a.png")
     for ranks, told in ((2, "new file, 1 of 1 cases"), (0, "0 of 1 cases to solve")):
         code, output, errors = launch(ranks, *words)
         assert (code, errors) == (0, ""), output

@@ -10,23 +10,22 @@ from pathlib import Path
 
 import pytest
 
-import study
-from friction.frame import FrameFlag
-from scoring.score import ScoreFlag
-from study import pipeline
-from study.case import sweep
-from study.cli import main
-from study.execution.plan import make_plan
-from study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
-from study.lookup import GraspMap
-from study.scene import parse_scene
-from study.storage.datasets import MESSAGE
-from study.storage.map_quantities import MAPS
-from study.storage.record import record
-from study.storage.store import ResultWriter, create, open_result
-from study.tables.show_text import FLAGS_WIDTH
+from softjaw.friction.frame import FrameFlag
+from softjaw.scoring.score import ScoreFlag
+from softjaw.study import pipeline
+from softjaw.study.case import sweep
+from softjaw.study.cli import main
+from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
+from softjaw.study.lookup import GraspMap
+from softjaw.study.result.datasets import MESSAGE
+from softjaw.study.result.map_quantities import MAPS
+from softjaw.study.result.record import record
+from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import parse_scene
+from softjaw.study.show.tables.show_text import FLAGS_WIDTH
 
-ROOT = Path(study.__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 BITWISE = (ast.BitOr, ast.BitAnd)
 PARTS = (ast.Name, ast.Attribute, ast.BinOp, ast.Constant)
 TABLE = sum(Flag)  # all bits that have a row

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.cli import main
-from study.storage.layout import DONE
-from study.storage.store import open_result
+from softjaw.study.cli import main
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
 
 JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}
@@ -44,7 +44,7 @@ def test_every_shipped_scene_passes_check(name, capsys):
 
 
 def run(name, path, *words):
-    return launch(0, "-m", "study", "run", JOBS[name], "-o", path, *words)
+    return launch(0, "-m", "softjaw", "run", JOBS[name], "-o", path, *words)
 
 
 @pytest.mark.launches

@@ -14,10 +14,10 @@ from pathlib import Path
 import h5py
 import pytest
 
-from study.environment import launch_environment
-from study.execution.lock import holder
-from study.storage.layout import DONE, MISSING
-from study.storage.store import open_result, rows_of
+from softjaw.study.environment import launch_environment
+from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.store import open_result, rows_of
+from softjaw.study.run.lock import holder
 from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
@@ -109,7 +109,7 @@ def test_no_kill_loses_a_result(once, shared_path):
 @pytest.mark.parametrize("victim", VICTIMS)
 def test_a_real_study_goes_on_to_the_same_bits(once, shared_path, victim):
     path, whole = shared_path / "killed.hdf", shared_path / "whole.hdf"
-    scene = ("-m", "study", "run", "jobs/smoke.toml", "--set", "candidates.stations_mm=[-10, 0, 10]", "-o")
+    scene = ("-m", "softjaw", "run", "jobs/smoke.toml", "--set", "candidates.stations_mm=[-10, 0, 10]", "-o")
 
     def interrupt():
         words = command(2, *scene, path)

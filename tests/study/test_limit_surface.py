@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from friction.motion import fibonacci_twists
-from friction.patch import ContactPatch
-from friction.wrench import friction_wrench
-from lsfit.flag import FitError
-from lsfit.form import exponents, monomials
-from lsfit.quartic import Quartic
-from scoring.contact import EllipsoidBody, SoftContact
-from scoring.pose import pose_volume
-from study.case import limit_surface
-from study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
-from study.flags import Flag
-from study.storage.quantity import MODELS
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.quartic import Quartic
+from softjaw.scoring.contact import EllipsoidBody, SoftContact
+from softjaw.scoring.pose import pose_volume
+from softjaw.study.case import limit_surface
+from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
+from softjaw.study.flags import Flag
+from softjaw.study.result.quantity import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
 WEIGHT = 9.80665

@@ -15,17 +15,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fem.blas_buffers import take_buffers
-from fem.petsc import NonlinearSolver
-from study import exits
-from study.environment import launch_environment
-from study.execution import memory
-from study.execution.memory import available, limited_memory
-from study.execution.standing import Standing
-from study.execution.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
-from study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
-from study.storage.layout import DONE, FAILED, MISSING
-from study.storage.store import open_result
+from softjaw.fem.blas_buffers import take_buffers
+from softjaw.fem.petsc import NonlinearSolver
+from softjaw.study import exits
+from softjaw.study.environment import launch_environment
+from softjaw.study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.result.store import open_result
+from softjaw.study.run import memory
+from softjaw.study.run.memory import available, limited_memory
+from softjaw.study.run.standing import Standing
+from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 
@@ -48,7 +48,7 @@ def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
 
 
 def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
-    monkeypatch.setattr("study.execution.stopping.AGAIN", 0.05)
+    monkeypatch.setattr("softjaw.study.run.stopping.AGAIN", 0.05)
 
     def deaf():
         with contextlib.suppress(TimeLimitError):  # as what is raised inside a finaliser is
@@ -87,7 +87,7 @@ def smoke(tmp_path, *words, addresses=None, ranks=0):
     start = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks else []
     bound = (lambda: resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))) if addresses else None
     done = subprocess.run(
-        [*start, sys.executable, "-m", "study", "run", "jobs/smoke.toml", "-o", tmp_path / "out.hdf", *words],
+        [*start, sys.executable, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", tmp_path / "out.hdf", *words],
         cwd=ROOT, env=launch_environment(), preexec_fn=bound, capture_output=True, text=True, timeout=60,
         stdin=subprocess.DEVNULL,
     )  # fmt: skip

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.lookup import GraspMap
-from study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
-from study.storage.reading import StoredAxis
+from softjaw.study.lookup import GraspMap
+from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
+from softjaw.study.result.reading import StoredAxis
 from tests.study.formula_results import (
     ANGLES,
     FORCES,
@@ -283,7 +283,7 @@ def test_bounds_of_the_force_are_maps_too(tmp_path):
 def test_it_needs_neither_mpi_nor_petsc(tmp_path):
     path = make(tmp_path / "a.hdf")
     code = (
-        f"import sys; from study.lookup import GraspMap; print(GraspMap({str(path)!r}).at(0.01, 0.1, 2).e_n);"
+        f"import sys; from softjaw.study.lookup import GraspMap; print(GraspMap({str(path)!r}).at(0.01, 0.1, 2).e_n);"
         "print(sorted({'mpi4py', 'petsc4py', 'numba', 'skfem', 'scipy', 'matplotlib'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -317,7 +317,7 @@ def test_the_readme_says_how(tmp_path, monkeypatch):
     (tmp_path / "results").mkdir()
     make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "README.md").read_text(encoding="utf-8").partition("from study.lookup")[2]
+    text = (ROOT / "README.md").read_text(encoding="utf-8").partition("from softjaw.study.lookup")[2]
     names: dict = {"stations": np.zeros(3), "angles": np.linspace(0, 1, 3), "forces": 1.5}
-    exec("from study.lookup" + text.partition("```")[0], names)
+    exec("from softjaw.study.lookup" + text.partition("```")[0], names)
     assert names["e_n"] == pytest.approx(names["grasps"].at(0, [0, 0.5, 1], 1.5).e_n)

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from friction.torque import pure_torque
-from friction.wrench import friction_limits
-from study import pipeline
-from study.case.build import build_object
-from study.case.sweep import units
-from study.scene import load_scene
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_limits
+from softjaw.study import pipeline
+from softjaw.study.case.build import build_object
+from softjaw.study.case.sweep import units
+from softjaw.study.scene import load_scene
 from tests.friction.test_torque import centred, two_ends
 from tests.study.launching import ROOT
 

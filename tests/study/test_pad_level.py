@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.case import pad_level
-from study.storage.quantities import REASONS
+from softjaw.study.case import pad_level
+from softjaw.study.result.quantities import REASONS
 from tests.study.test_pipeline import BALL, BOX, OVAL, cases, solved
 from tests.study.test_walls import CUP, scene_of
 from tests.study.test_walls import solved as on_wall

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from friction.frame import FrameFlag
-from friction.patch import ContactPatch
-from study.case.contact import ANTIPODAL as CASE_ANTIPODAL
-from study.case.contact import angles
-from study.cli import main
-from study.exits import StudyError
-from study.patch.evaluate import SURFACES, judge, principal_direction
-from study.patch.faces import corner_geometry
-from study.patch.grasp import ANTIPODAL, _angle, _check_facing
-from study.patch.picture import PLANES, section
-from study.patch.reading import Reading, read_patch
+from softjaw.friction.frame import FrameFlag
+from softjaw.friction.patch import ContactPatch
+from softjaw.study.case.contact import ANTIPODAL as CASE_ANTIPODAL
+from softjaw.study.case.contact import angles
+from softjaw.study.cli import main
+from softjaw.study.exits import StudyError
+from softjaw.study.patch.evaluate import SURFACES, judge, principal_direction
+from softjaw.study.patch.faces import corner_geometry
+from softjaw.study.patch.grasp import ANTIPODAL, _angle, _check_facing
+from softjaw.study.patch.picture import PLANES, section
+from softjaw.study.patch.reading import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT

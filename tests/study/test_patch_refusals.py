@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.cli import main
+from softjaw.study.cli import main
 from tests.study.launching import ROOT
 from tests.study.patch_files import centres, cylinder_mesh, vtk
 from tests.study.test_patch import EXAMPLE, faceted

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import pipeline
-from study.case import solving
-from study.case.build import build_object
-from study.case.sweep import units
-from study.environment import launch_environment
-from study.flags import Flag
-from study.scene import parse_scene
-from study.storage.quantity import MODELS
-from study.storage.result import CaseFailure
+from softjaw.study import pipeline
+from softjaw.study.case import solving
+from softjaw.study.case.build import build_object
+from softjaw.study.case.sweep import units
+from softjaw.study.environment import launch_environment
+from softjaw.study.flags import Flag
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.result.result import CaseFailure
+from softjaw.study.scene import parse_scene
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))
 MU = 0.8
@@ -340,10 +340,10 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
 
 PRESSED_FLAT = """
 import numpy as np
-from fem.materials import material
-from fem.pad import Pad
-from fem.pad_shape import PadShape
-from fem.press import Press
+from softjaw.fem.materials import material
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.contact.press import Press
 
 def plane(x):
     return -x[:, 2], np.tile([0.0, 0.0, -1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
@@ -359,8 +359,9 @@ print(state.travel)
 def test_a_changed_material_takes_effect_although_its_callers_were_compiled_before(tmp_path):
     """A foam twice as stiff yields less, also with the machine code of the last run at hand."""
     root = Path(__file__).parents[2]
+    (tmp_path / "softjaw").mkdir()
     for package in ("fem", "friction"):
-        shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(root / package, tmp_path / "softjaw" / package, ignore=shutil.ignore_patterns("__pycache__"))
 
     def travel():
         program = [sys.executable, "-c", PRESSED_FLAT]
@@ -369,7 +370,7 @@ def test_a_changed_material_takes_effect_although_its_callers_were_compiled_befo
         return float(told.stdout)
 
     soft = travel()
-    law = tmp_path / "fem" / "materials.py"
+    law = tmp_path / "softjaw" / "fem" / "materials.py"
     text = law.read_text()
     changed = text.replace("P[i, j] = G * (", "P[i, j] = 2 * G * (").replace("m] = G * (", "m] = 2 * G * (")
     assert changed != text
@@ -410,7 +411,7 @@ def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
 
 def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):
     jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
-    monkeypatch.setattr("fem.following.Following._leaves", jumps)
+    monkeypatch.setattr("softjaw.fem.contact.following.Following._leaves", jumps)
     found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
     for _, ladder in found:
         assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in ladder] == [False, True, True]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import h5py
 
-from study.storage.layout import REPORT
-from study.storage.plain_report import plain, plain_report
-from study.storage.store import open_result
+from softjaw.study.result.layout import REPORT
+from softjaw.study.result.plain_report import plain, plain_report
+from softjaw.study.result.store import open_result
 from tests.study.sealing import sealed
 from tests.study.view_files import make
 

@@ -7,8 +7,8 @@ import io
 import numpy as np
 import pytest
 
-from study.execution.progress import Progress
-from study.storage.layout import DONE, MISSING
+from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.run.progress import Progress
 
 
 class Run:

@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from study.environment import launch_environment
-from study.storage.layout import DONE
-from study.storage.store import open_result
+from softjaw.study.environment import launch_environment
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, contents, differing, launch, wait_for
 
 pytestmark = pytest.mark.launches
@@ -53,7 +53,7 @@ CASES = 12
 SLOWLY = """
 import os, sys, time
 os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
-from study import pipeline
+from softjaw.study import pipeline
 solve = pipeline.solve_unit
 
 def slow(unit):
@@ -62,7 +62,7 @@ def slow(unit):
         yield case
 
 pipeline.solve_unit = slow
-from study.cli import main
+from softjaw.study.cli import main
 sys.exit(main())
 """
 
@@ -88,7 +88,7 @@ def alone(tmp_path_factory, scene, comm):
 
 
 def run(ranks, scene, path, *words):
-    return launch(ranks, "-m", "study", "run", scene, "-o", path, *words)
+    return launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
 
 
 def done(path):

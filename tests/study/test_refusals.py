@@ -7,11 +7,11 @@ from argparse import Namespace
 
 import pytest
 
-from study.case.build import check_object, shapes_of, warnings
-from study.cli import main
-from study.execution.running import petsc_overrides, prepare
-from study.exits import StudyError
-from study.scene import SceneError, load_scene, parse_scene
+from softjaw.study.case.build import check_object, shapes_of, warnings
+from softjaw.study.cli import main
+from softjaw.study.exits import StudyError
+from softjaw.study.run.running import petsc_overrides, prepare
+from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
@@ -79,7 +79,7 @@ def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
     def run():
         text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
         (shared_path / "scene.toml").write_text(text)
-        return launch(2, "-m", "study", "run", shared_path / "scene.toml", "-o", shared_path / "out.hdf")
+        return launch(2, "-m", "softjaw", "run", shared_path / "scene.toml", "-o", shared_path / "out.hdf")
 
     code, output, errors = once(run)
     assert (code, output) == (2, "")
@@ -108,7 +108,7 @@ def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options,
 @pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
 def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
     words = ("-o", shared_path / "out.hdf", "--", *options.split())
-    code, output, errors = once(lambda: launch(0, "-m", "study", "run", ROOT / "jobs" / "smoke.toml", *words))
+    code, output, errors = once(lambda: launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", *words))
     assert (code, output) == (2, "")
     assert errors.count("\n") == 1
     assert errors.startswith(f"error: petsc: PETSc refuses the options {options}: ")
@@ -118,12 +118,12 @@ def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, 
 
 @pytest.mark.launches
 def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
-    words = ("-X", "importtime", "-m", "study", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
+    words = ("-X", "importtime", "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
     code, _, errors = once(lambda: launch(0, *words))
     assert code == 2
     assert "error: " in errors
     loaded = {line.rpartition("|")[2].strip() for line in errors.splitlines() if line.startswith("import time:")}
-    assert loaded.isdisjoint({"numba", "skfem", "fem.petsc", "study.pipeline"})
+    assert loaded.isdisjoint({"numba", "skfem", "softjaw.fem.petsc", "softjaw.study.pipeline"})
 
 
 @pytest.mark.parametrize("command", ["plan", "run"])

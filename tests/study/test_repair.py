@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 import pytest
 
-from study.execution.lock import Lock
-from study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
-from study.storage import repair as repairing
-from study.storage.layout import DONE, MISSING
-from study.storage.record import record
-from study.storage.repair import repair
-from study.storage.store import ResultWriter, create, open_result
+from softjaw.study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
+from softjaw.study.result import repair as repairing
+from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.record import record
+from softjaw.study.result.repair import repair
+from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.run.lock import Lock
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import contents, differing, launch
 
@@ -153,11 +153,11 @@ def test_a_real_file_that_was_cut_off_or_repacked_goes_on_to_the_same_bits(once,
     whole, cut = shared_path / "whole.hdf", shared_path / "cut.hdf"
 
     def spoil():
-        assert launch(0, "-m", "study", "run", "jobs/smoke.toml", "-o", whole)[0] == 0
+        assert launch(0, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", whole)[0] == 0
         cut.write_bytes(whole.read_bytes()[: int(0.3 * whole.stat().st_size)])
-        assert launch(0, "-m", "study", "run", "jobs/smoke.toml", "-o", cut)[0] == OTHER_FILE
-        assert launch(0, "-m", "study", "repair", cut, "--in-place")[0] == 0
-        return launch(0, "-m", "study", "run", "jobs/smoke.toml", "-o", cut)
+        assert launch(0, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", cut)[0] == OTHER_FILE
+        assert launch(0, "-m", "softjaw", "repair", cut, "--in-place")[0] == 0
+        return launch(0, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", cut)
 
     code, output, errors = once(spoil)
     assert code == 0, errors
@@ -168,9 +168,9 @@ def test_a_real_file_that_was_cut_off_or_repacked_goes_on_to_the_same_bits(once,
 
         def pack():
             subprocess.run(["h5repack", "-f", "GZIP=4", whole, packed], check=True, capture_output=True)
-            assert launch(0, "-m", "study", "run", "jobs/smoke.toml", "-o", packed)[0] == OTHER_FILE
-            assert launch(0, "-m", "study", "repair", packed, "--write")[0] == 0
-            return launch(0, "-m", "study", "run", "jobs/smoke.toml", "-o", shared_path / "packed.repaired.hdf")
+            assert launch(0, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", packed)[0] == OTHER_FILE
+            assert launch(0, "-m", "softjaw", "repair", packed, "--write")[0] == 0
+            return launch(0, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", shared_path / "packed.repaired.hdf")
 
         assert once(pack)[0] == 0
         assert once(differing, shared_path / "packed.repaired.hdf", once(contents, whole)) == []
@@ -180,6 +180,6 @@ def test_a_real_file_that_was_cut_off_or_repacked_goes_on_to_the_same_bits(once,
 @pytest.mark.launches
 def test_the_command_says_in_one_line_why_it_cannot(once, shared_path):
     once((shared_path / "x.hdf").write_text, "my notes")
-    code, _, errors = once(launch, 0, "-m", "study", "repair", shared_path / "x.hdf")
+    code, _, errors = once(launch, 0, "-m", "softjaw", "repair", shared_path / "x.hdf")
     assert code == OTHER_FILE
     assert errors.count("error: ") == len(errors.splitlines()) == 1

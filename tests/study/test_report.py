@@ -16,22 +16,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import pictures
-from study.data import Data, number
-from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.flags import Flag
-from study.outline import read_scene, shape_outline, slice_polygon
-from study.report import cases, object_view, words
-from study.report.curvature import difference_pictures
-from study.report.patch import cells, friction_directions
-from study.report.writing import build, write_report
-from study.scene.shapes import EllipticCylinder, Sphere
-from study.storage.layout import Derived, Header, Layout
-from study.storage.reading import StoredAxis
-from study.storage.record import record
-from study.storage.result import CaseResult
-from study.storage.store import ResultWriter, create, open_result
-from study.tables.show import best
+from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.flags import Flag
+from softjaw.study.result.layout import Derived, Header, Layout
+from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.record import record
+from softjaw.study.result.result import CaseResult
+from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.scene.shapes import EllipticCylinder, Sphere
+from softjaw.study.show import pictures
+from softjaw.study.show.data import Data, number
+from softjaw.study.show.outline import read_scene, shape_outline, slice_polygon
+from softjaw.study.show.report import cases, object_view, words
+from softjaw.study.show.report.curvature import difference_pictures
+from softjaw.study.show.report.patch import cells, friction_directions
+from softjaw.study.show.report.writing import build, write_report
+from softjaw.study.show.tables.show import best
 
 ROOT = Path(__file__).parent.parent.parent
 FACES = (6, 4)
@@ -449,5 +449,5 @@ def test_numbers_for_people(value, text):
 
 
 def test_nothing_is_imported_before_a_picture_is_drawn():
-    code = "import sys, study.report.writing; sys.exit(any(m.startswith('matplotlib') for m in sys.modules))"
+    code = "import sys, study.show.report.writing; sys.exit(any(m.startswith('matplotlib') for m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0

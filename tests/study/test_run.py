@@ -12,8 +12,8 @@ import time
 import numpy as np
 import pytest
 
-from study.storage.layout import DONE, FAILED, MISSING
-from study.storage.store import open_result
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 pytestmark = pytest.mark.launches
@@ -215,7 +215,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
         process = start(ranks, path, "--delay", 1.0)
         wait_for(lambda: begun(path))
         told = subprocess.run(
-            [sys.executable, "-m", "study", "status", str(path)], cwd=ROOT, capture_output=True, text=True
+            [sys.executable, "-m", "softjaw", "status", str(path)], cwd=ROOT, capture_output=True, text=True
         )
         answer = study(0, path)
         process.send_signal(signal.SIGUSR1)

@@ -10,11 +10,11 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from fem.units import LENGTHS
-from study.catalogue.model import is_catalogue
-from study.scene import Scene, SceneError, load_scene, parse_scene
-from study.scene.shapes import SHAPES, Mesh
-from study.scene.units import in_si
+from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.study.catalogue.model import is_catalogue
+from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
+from softjaw.study.scene.shapes import SHAPES, Mesh
+from softjaw.study.scene.units import in_si
 
 ROOT = Path(__file__).parents[2]
 JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]
@@ -511,7 +511,8 @@ def test_lines_are_found_in_all_ways_of_writing_toml():
 
 def test_checking_a_scene_starts_no_heavy_machinery():
     code = (
-        "import sys; from study.scene import load_scene, Scene; load_scene(sys.argv[1]); Scene.model_json_schema();"
+        "import sys; from softjaw.study.scene import load_scene, Scene; load_scene(sys.argv[1]);"
+        "Scene.model_json_schema();"
         "heavy = {'numpy', 'scipy', 'numba', 'mpi4py', 'petsc4py', 'h5py', 'pyvista', 'skfem', 'matplotlib'};"
         "sys.exit(' '.join(heavy & set(sys.modules)) or 0)"
     )

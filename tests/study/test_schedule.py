@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.environment import launch_environment
-from study.execution.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
-from study.execution.scaling import Ladder, Machine, replay, replayed, segmented
+from softjaw.study.environment import launch_environment
+from softjaw.study.run.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
+from softjaw.study.run.scaling import Ladder, Machine, replay, replayed, segmented
 
 CLAIMS = """
 from mpi4py import MPI
-from study.execution.schedule import Claims
+from softjaw.study.run.schedule import Claims
 import time
 comm = MPI.COMM_WORLD
 node = comm.Split({color}) if {color} is not None else None

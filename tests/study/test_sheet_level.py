@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.case.sheet_level import STIFF
-from study.storage.quantities import REASONS
+from softjaw.study.case.sheet_level import STIFF
+from softjaw.study.result.quantities import REASONS
 from tests.study.test_pad_level import e_n
 from tests.study.test_pipeline import OVAL, cases, solved
 from tests.study.test_walls import CUP

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from friction.frame import FrameFlag
-from study.cli import main
-from study.flags import Flag, raised
-from study.storage.layout import DONE, FAILED
-from study.storage.quantities import MAPS, quantities
-from study.storage.reading import StoredAxis
-from study.tables.show import as_csv, as_text, best, place
-from study.tables.status import reasons
+from softjaw.friction.frame import FrameFlag
+from softjaw.study.cli import main
+from softjaw.study.flags import Flag, raised
+from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.quantities import MAPS, quantities
+from softjaw.study.result.reading import StoredAxis
+from softjaw.study.show.tables.show import as_csv, as_text, best, place
+from softjaw.study.show.tables.status import reasons
 
 FORCES = np.array([1.0, 5.0])
 

@@ -8,8 +8,8 @@ import subprocess
 
 import pytest
 
-from study.cli import main
-from study.start import HERE
+from softjaw.study.cli import main
+from softjaw.study.scene.start import HERE
 from tests.study.launching import ROOT, wait_for
 
 pytestmark = pytest.mark.launches

@@ -8,11 +8,11 @@ import tomllib
 
 import pytest
 
-from study.cli import main
-from study.environment import launch_environment
-from study.exits import CANNOT_WRITE, USAGE
-from study.scene import load_scene
-from study.start import KINDS
+from softjaw.study.cli import main
+from softjaw.study.environment import launch_environment
+from softjaw.study.exits import CANNOT_WRITE, USAGE
+from softjaw.study.scene import load_scene
+from softjaw.study.scene.start import KINDS
 from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
@@ -64,7 +64,7 @@ def test_what_is_written_runs(kind, tmp_path):
     assert started(kind, "-o", "mine") == 0
     changes = [word for change in ["gripper.elements=[8,4,2]", *SMALL[kind]] for word in ("--set", change)]
     done = subprocess.run(
-        [sys.executable, "-m", "study", "run", "mine.toml", *changes], cwd=tmp_path, capture_output=True, text=True,
+        [sys.executable, "-m", "softjaw", "run", "mine.toml", *changes], cwd=tmp_path, capture_output=True, text=True,
         env={**launch_environment(), "PYTHONPATH": str(ROOT)}, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

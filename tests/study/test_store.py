@@ -12,18 +12,18 @@ import h5py
 import numpy as np
 import pytest
 
-from study.execution.lock import Lock, holder
-from study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from study.storage.finger_quantities import PATCH
-from study.storage.grid import Surface
-from study.storage.layout import Derived, Header, Layout, layout_from_options
-from study.storage.plots import axes_of, groups, view_slice
-from study.storage.quantities import MAPS, quantities
-from study.storage.quantity import MODELS, NEEDS
-from study.storage.reading import StoredAxis
-from study.storage.record import blank, record, text_bytes
-from study.storage.result import CaseResult
-from study.storage.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.result.finger_quantities import PATCH
+from softjaw.study.result.grid import Surface
+from softjaw.study.result.layout import Derived, Header, Layout, layout_from_options
+from softjaw.study.result.plots import axes_of, groups, view_slice
+from softjaw.study.result.quantities import MAPS, quantities
+from softjaw.study.result.quantity import MODELS, NEEDS
+from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.record import blank, record, text_bytes
+from softjaw.study.result.result import CaseResult
+from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.run.lock import Lock, holder
 from tests.study.fake_run import fake_result
 
 HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lsfit.ellipsoid import Ellipsoid
-from lsfit.form import exponents, monomials
-from lsfit.quartic import Quartic
-from study import pictures
-from study.case.stored_surface import circle, shadow_outline, stored_surface
-from study.data import Data
-from study.report.surface import misfit_curves, surface_pictures
-from study.storage.finger_quantities import MONOMIALS
-from study.storage.layout import Layout
-from study.storage.store import open_result
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.quartic import Quartic
+from softjaw.study.case.stored_surface import circle, shadow_outline, stored_surface
+from softjaw.study.result.finger_quantities import MONOMIALS
+from softjaw.study.result.layout import Layout
+from softjaw.study.result.store import open_result
+from softjaw.study.show import pictures
+from softjaw.study.show.data import Data
+from softjaw.study.show.report.surface import misfit_curves, surface_pictures
 from tests.study.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02

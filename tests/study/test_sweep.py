@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.case import candidates, sweep
-from study.scene import load_scene, parse_scene
+from softjaw.study.case import candidates, sweep
+from softjaw.study.scene import load_scene, parse_scene
 
 JOBS = Path(__file__).parents[2] / "jobs"
 Z = np.array([0.0, 0.0, 1.0])

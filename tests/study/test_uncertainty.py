@@ -7,23 +7,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lsfit.ellipsoid import Ellipsoid
-from scoring.volume import volume_linf
-from study.case import sweep
-from study.case.candidates import axis_poses
-from study.lookup import GraspMap
-from study.scene import parse_scene
-from study.scene.errors import SceneError
-from study.storage.layout import Derived, Layout
-from study.storage.store import open_result
-from study.tables.compare import compare
-from study.tables.export import cases
-from study.tables.show import as_text, best
-from study.uncertainty import carrying, probing
-from study.uncertainty.rescoring import _volume
-from study.uncertainty.stored import derived
-from study.uncertainty.variations import by_formula, moved_poses, variations
-from study.uncertainty.verdict import Sure, sure, verdict
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.volume import volume_linf
+from softjaw.study.accuracy.uncertainty import carrying, probing
+from softjaw.study.accuracy.uncertainty.rescoring import _volume
+from softjaw.study.accuracy.uncertainty.stored import derived
+from softjaw.study.accuracy.uncertainty.variations import by_formula, moved_poses, variations
+from softjaw.study.accuracy.uncertainty.verdict import Sure, sure, verdict
+from softjaw.study.case import sweep
+from softjaw.study.case.candidates import axis_poses
+from softjaw.study.lookup import GraspMap
+from softjaw.study.result.layout import Derived, Layout
+from softjaw.study.result.store import open_result
+from softjaw.study.scene import parse_scene
+from softjaw.study.scene.errors import SceneError
+from softjaw.study.show.tables.compare import compare
+from softjaw.study.show.tables.export import cases
+from softjaw.study.show.tables.show import as_text, best
 from tests.study.formula_results import grid_axes, make
 
 BALL = """
@@ -51,7 +51,7 @@ def scene(*overrides):
 
 
 def facing(distance):
-    """Two contacts that face each other, as `study.uncertainty.rescoring` reads them from a file."""
+    """Two contacts that face each other, as `study.accuracy.uncertainty.rescoring` reads them from a file."""
     turned = np.diag([1.0, -1.0, -1.0])
     return {
         "frame_origin": np.zeros((2, 3)), "frame_axes": np.array([np.eye(3)] * 2),
@@ -157,7 +157,7 @@ def test_files_of_scenes_without_bands_keep_their_digest():
 
 
 def test_named_probes_are_those_that_are_solved():
-    from study.uncertainty.probes import probe_candidates, with_probes
+    from softjaw.study.accuracy.uncertainty.probes import probe_candidates, with_probes
 
     given = scene(*ALL, 'uncertainty.probes=["20 mm, 90 deg", 0]')
     units = sweep.units(given, lambda point: point.axis_symmetry)
@@ -266,8 +266,8 @@ def test_a_file_without_errors_knows_none():
 
 def solved(given, name):
     """A map ``(units, forces)`` of a scene, NaN where a case fails, and the units."""
-    from study.pipeline import solve_unit
-    from study.storage.result import CaseFailure
+    from softjaw.study.pipeline import solve_unit
+    from softjaw.study.result.result import CaseFailure
 
     units = sweep.units(given, lambda point: point.axis_symmetry)
     found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)
@@ -299,9 +299,9 @@ def test_the_change_by_the_modulus_is_that_of_further_solves():
 
 @pytest.mark.long
 def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
-    from study.scene import load_scene
-    from study.tables.ranking import LOST
-    from study.uncertainty.probes import probe_candidates
+    from softjaw.study.accuracy.uncertainty.probes import probe_candidates
+    from softjaw.study.scene import load_scene
+    from softjaw.study.show.tables.ranking import LOST
 
     coarse = "gripper.elements=[12, 6, 4]", "candidates.stations=18", "candidates.angles_deg=[0]"
     given = load_scene("jobs/bottle-rigid.toml", [*coarse, "uncertainty.mesh=true"])

@@ -12,15 +12,15 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 
-from study.cli import main
-from study.cost.command import SIZES
-from study.environment import launch_environment
-from study.exits import CANNOT_WRITE, StudyError
-from study.figures import command as figures
-from study.report import writing as report
-from study.storage import repair as repairing
-from study.storage.layout import Header
-from study.writing import beside, make_folders, write_file
+from softjaw.study.accuracy.cost.command import SIZES
+from softjaw.study.cli import main
+from softjaw.study.environment import launch_environment
+from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.result import repair as repairing
+from softjaw.study.result.layout import Header
+from softjaw.study.show.figures import command as figures
+from softjaw.study.show.report import writing as report
+from softjaw.study.writing import beside, make_folders, write_file
 from tests.study.launching import ROOT, launch
 from tests.study.view_files import make
 
@@ -99,7 +99,7 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
 @pytest.mark.parametrize("words", [("run", SMOKE, "-o"), ("figure", "4c", "--results")])
 def test_a_run_says_what_it_cannot_write(tmp_path, words):
     with read_only(tmp_path, {}):
-        code, _, errors = launch(0, "-m", "study", *words, tmp_path / "x.hdf")
+        code, _, errors = launch(0, "-m", "softjaw", *words, tmp_path / "x.hdf")
     refused(code, errors, tmp_path)
 
 
@@ -120,7 +120,7 @@ def test_a_repair_says_what_it_cannot_write(file, tmp_path, capfd, monkeypatch, 
 def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
     words = {"export": (file, "--csv"), "schema": (), "compare": (file, file)}.get(command, (file,))
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([sys.executable, "-m", "study", command, *words], stdout=full, stderr=subprocess.PIPE,
+        done = subprocess.run([sys.executable, "-m", "softjaw", command, *words], stdout=full, stderr=subprocess.PIPE,
                               text=True, cwd=ROOT, env=launch_environment())  # fmt: skip
     assert done.returncode == CANNOT_WRITE, done.stderr
     assert done.stderr.startswith("error: ")

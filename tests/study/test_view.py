@@ -17,19 +17,19 @@ import matplotlib
 import numpy as np
 import pytest
 
-from fem.objects import Box, EllipticCylinder
-from study.cli import main
-from study.data import Data
-from study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
-from study.storage.store import open_result
-from study.storage.wall_quantities import ALONG, AROUND
-from study.view import colours, command, limits
-from study.view.model import quantity_of, view_of
-from study.view.pads import corners_of, pads
-from study.view.page import page, payload
-from study.view.server import server
-from study.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals
-from study.view.wall import Wall, between
+from softjaw.fem.objects.shapes import Box, EllipticCylinder
+from softjaw.study.cli import main
+from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
+from softjaw.study.result.store import open_result
+from softjaw.study.result.wall_quantities import ALONG, AROUND
+from softjaw.study.show.data import Data
+from softjaw.study.show.view import colours, command, limits
+from softjaw.study.show.view.model import quantity_of, view_of
+from softjaw.study.show.view.pads import corners_of, pads
+from softjaw.study.show.view.page import page, payload
+from softjaw.study.show.view.server import server
+from softjaw.study.show.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals
+from softjaw.study.show.view.wall import Wall, between
 from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
@@ -249,7 +249,7 @@ def test_limit_surface_has_the_reach_of_its_ellipsoid(shown):
 
 @pytest.mark.parametrize("name", ["quality", "e_n", "pressure", "dent", "wall_stress"])
 def test_colours_are_those_of_the_report(name):
-    from study.pictures import COLOURS
+    from softjaw.study.show.pictures import COLOURS
 
     rgb = np.array([[int(h[k : k + 2], 16) for k in (1, 3, 5)] for h in colours.table(name)])
     assert np.abs(rgb - 255 * matplotlib.colormaps[COLOURS[name]](np.linspace(0, 1, 256))[:, :3]).max() < 12
@@ -295,7 +295,7 @@ def test_the_page_is_well_formed_and_needs_nothing(shown):
 
 
 def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeypatch):
-    monkeypatch.setattr("study.view.page.MOST", 0)
+    monkeypatch.setattr("softjaw.study.show.view.page.MOST", 0)
     told = payload(*shown, "quality", "x")
     assert list(told["cases"]) == ["1 2"]
     assert told["notes"] == ["pads of the 9 worst cases are left out, or the page would be too large"]
@@ -352,8 +352,8 @@ def test_without_a_screen_the_page_is_served(file, monkeypatch, display, port, s
     if not display and command.sys.platform in ("darwin", "win32"):
         pytest.skip("these always have a screen")
     used = []
-    monkeypatch.setattr("study.view.server.serve", lambda html, port: used.append("page"))
-    monkeypatch.setattr("study.view.window.show_window", lambda *_: used.append("window"))
+    monkeypatch.setattr("softjaw.study.show.view.server.serve", lambda html, port: used.append("page"))
+    monkeypatch.setattr("softjaw.study.show.view.window.show_window", lambda *_: used.append("window"))
     assert main(["view", str(file), *([] if port is None else ["--port", port])]) == 0
     assert used == [shows]
 
@@ -385,7 +385,7 @@ def test_a_picture_without_a_screen_shows_object_pads_and_limit_surface(file, tm
 
 @pytest.mark.long
 def test_slider_and_click_of_the_window_change_the_case(shown):
-    from study.view import window
+    from softjaw.study.show.view import window
 
     view, index = shown
     plotter = window.plot(view, index, "quality", "x", off_screen=True)

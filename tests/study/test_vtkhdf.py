@@ -8,14 +8,14 @@ import pytest
 import pyvista as pv
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-from study.cli import main
-from study.execution.plan import make_plan
-from study.exits import CANNOT_WRITE, StudyError
-from study.scene import parse_scene
-from study.storage.grid_values import fill_grid
-from study.storage.record import record
-from study.storage.store import ResultWriter, create
-from study.storage.vtkhdf import write_grid
+from softjaw.study.cli import main
+from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.result.grid_values import fill_grid
+from softjaw.study.result.record import record
+from softjaw.study.result.store import ResultWriter, create
+from softjaw.study.result.vtkhdf import write_grid
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import parse_scene
 from tests.study.view_files import GRID, PRESSURE, SCENE, SIZE, make, quality, solved
 
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]

@@ -10,27 +10,28 @@ import h5py
 import numpy as np
 import pytest
 
-from study import pictures, pipeline
-from study.case import model, wall, window
-from study.case.build import build_object
-from study.case.solving import solver
-from study.data import Data
-from study.execution.plan import make_plan, memory, plan_text
-from study.execution.wall_cost import wall_size
-from study.flags import Flag
-from study.outline import read_scene, undeformed
-from study.report import cases, wall_words, words, writing
-from study.report.levels import level_picture, rule
-from study.report.wall_shape import Cut, shape_picture
-from study.report.window import window_picture
-from study.scene import parse_scene
-from study.storage.layout import DONE
-from study.storage.record import record
-from study.storage.store import ResultWriter, create, open_result
-from study.tables.overview import RULE, scene_text
-from study.tables.ranking import borne_level, judged, ranking
-from study.tables.show import as_csv, as_json, best
-from study.tables.show_text import as_text
+from softjaw.study import pipeline
+from softjaw.study.case import model, wall, window
+from softjaw.study.case.build import build_object
+from softjaw.study.case.solving import solver
+from softjaw.study.flags import Flag
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.record import record
+from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.run.plan import make_plan, memory, plan_text
+from softjaw.study.run.wall_cost import wall_size
+from softjaw.study.scene import parse_scene
+from softjaw.study.show import pictures
+from softjaw.study.show.data import Data
+from softjaw.study.show.outline import read_scene, undeformed
+from softjaw.study.show.report import cases, wall_words, words, writing
+from softjaw.study.show.report.levels import level_picture, rule
+from softjaw.study.show.report.wall_shape import Cut, shape_picture
+from softjaw.study.show.report.window import window_picture
+from softjaw.study.show.tables.overview import RULE, scene_text
+from softjaw.study.show.tables.ranking import borne_level, judged, ranking
+from softjaw.study.show.tables.show import as_csv, as_json, best
+from softjaw.study.show.tables.show_text import as_text
 from tests.study.sealing import sealed
 from tests.study.test_report import Page
 

@@ -7,14 +7,14 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from study import pipeline
-from study.case import wall
-from study.case.build import build_object
-from study.case.sweep import units
-from study.flags import Flag
-from study.scene import parse_scene
-from study.storage.quantities import REASONS
-from study.storage.result import CaseFailure
+from softjaw.study import pipeline
+from softjaw.study.case import wall
+from softjaw.study.case.build import build_object
+from softjaw.study.case.sweep import units
+from softjaw.study.flags import Flag
+from softjaw.study.result.quantities import REASONS
+from softjaw.study.result.result import CaseFailure
+from softjaw.study.scene import parse_scene
 from tests.study.test_pipeline import SCALES, differing
 
 CUP = """shape = "revolution"
@@ -173,7 +173,7 @@ def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
 
 
 def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
-    from fem.collapse import Opening
+    from softjaw.fem.shell.collapse import Opening
 
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
     ladder = [r for _, r in pipeline.solve_unit(units_of(CUP, forces="[0.2, 3, 4]")[0])]

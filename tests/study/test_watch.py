@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from study.cli import main
-from study.storage.layout import DONE, FAILED, MISSING
-from study.tables import watch_view
-from study.tables.watch import INTERRUPTED, watch
+from softjaw.study.cli import main
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.show.tables import watch_view
+from softjaw.study.show.tables.watch import INTERRUPTED, watch
 from tests.study.formula_results import grid_axes, make
 from tests.study.sealing import sealed
 

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from study.storage.layout import Header, Layout
-from study.storage.reading import StoredAxis
-from study.storage.record import record
-from study.storage.result import CaseResult
-from study.storage.store import ResultWriter, create
+from softjaw.study.result.layout import Header, Layout
+from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.record import record
+from softjaw.study.result.result import CaseResult
+from softjaw.study.result.store import ResultWriter, create
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)

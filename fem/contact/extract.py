@@ -1,0 +1,105 @@
+"""The contact patch of a pressed pad: the deformed front in small faces, with pressures, unfolded to the whole pad.
+
+Every hexahedron of the front gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
+triquadratic ones).  A face takes point, normal and load from its quadrature point, so that sums over the patch are
+the integrals of the solution: the loads add up to ``S``, their components along the approach to the normal force.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.fem.contact.press import Pressed
+from softjaw.fem.pad.mesh import Pad, lagrange
+from softjaw.friction.patch import ContactPatch
+
+FloatArray = NDArray[np.float64]
+
+
+def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
+    """Patch of the whole pad at this state, in the pad's frame at first touch.
+
+    ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area``
+    that of the deformed face and ``pressure`` the load over that area.  Faces are numbered along the width
+    first, and their number does not depend on symmetry.
+    """
+    points = pressed.points
+    load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
+    nodes = pressed.front.reshape(*pad.front_grid, 3)
+    for axis in range(2):
+        nodes = _subdivide(nodes, axis, pad.side_weights)
+    nodes = _unfold(pad, nodes, shared=True)
+    corners = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
+    return ContactPatch(
+        centroid=_unfold(pad, _as_grid(pad, points.position), False).reshape(-1, 3),
+        area=area,
+        normal=-_unfold(pad, _as_grid(pad, points.normal), False).reshape(-1, 3),
+        pressure=load / area,
+        corners=corners,
+    )
+
+
+def half_turned(patch: ContactPatch) -> ContactPatch:
+    """Patch of a pad that was solved turned by half a turn about its approach, in the pad's own frame."""
+    sign = np.array([-1.0, -1.0, 1.0])
+    return ContactPatch(
+        patch.centroid[::-1] * sign,
+        patch.area[::-1],
+        patch.normal[::-1] * sign,
+        patch.pressure[::-1],
+        patch.corners[::-1][:, [2, 3, 0, 1]] * sign,
+    )
+
+
+def mirrored(pad: Pad, patch: ContactPatch) -> ContactPatch:
+    """Patch of the other finger where a plane of symmetry lies between them: the image in the pad's plane y = 0."""
+    sign = np.array([1.0, -1.0, 1.0])
+
+    def flipped(values: FloatArray) -> FloatArray:
+        return np.flip(values.reshape(*pad.shape.patch_faces, *values.shape[1:]), 1).reshape(values.shape)
+
+    return ContactPatch(
+        flipped(patch.centroid) * sign,
+        flipped(patch.area),
+        flipped(patch.normal) * sign,
+        flipped(patch.pressure),
+        flipped(patch.corners)[:, [3, 2, 1, 0]] * sign,
+    )
+
+
+def _non_negative(load: FloatArray) -> FloatArray:
+    """Loads ``(faces, points)`` without the negative parts of quadratic pressures; each hexahedron keeps its sum."""
+    clipped = np.maximum(load, 0.0)
+    total = clipped.sum(axis=1, keepdims=True)
+    return clipped * (np.maximum(load.sum(axis=1, keepdims=True), 0.0) / np.where(total > 0, total, 1.0))
+
+
+def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
+    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed front ``(i, j, c)``."""
+    nx, ny = (n // 2 if half else n for n, half in zip(pad.shape.elements, pad.symmetry, strict=False))
+    k = pad.shape.per_side
+    return values.reshape(nx, ny, k, k, -1).transpose(0, 2, 1, 3, 4).reshape(nx * k, ny * k, -1)
+
+
+def _subdivide(grid: FloatArray, axis: int, weights: FloatArray) -> FloatArray:
+    """Node positions along an axis replaced by corners of faces: sides are cut in proportion to the weights."""
+    grid = np.moveaxis(grid, axis, 0)
+    parts = len(weights)
+    order = parts - 1  # of the shape functions along a side
+    fine = np.stack([lagrange(parts, s) for s in np.cumsum(weights) - weights])
+    elements = np.stack([grid[k : len(grid) - order + k : order] for k in range(parts)], axis=1)
+    inside = np.einsum("sk,nk...->ns...", fine, elements).reshape(-1, *grid.shape[1:])
+    return np.moveaxis(np.concatenate([inside, grid[-1:]]), 0, axis)
+
+
+def _unfold(pad: Pad, grid: FloatArray, shared: bool) -> FloatArray:
+    """Mirror a grid ``(i, j, c)`` to the whole pad, vectors with sign; ``shared``: the first row is on the mirror."""
+    for axis in range(2):
+        if pad.symmetry[axis]:
+            mirrored = np.flip(grid, axis).copy()
+            if grid.shape[2] == 3:
+                mirrored[..., axis] *= -1.0
+            grid = np.concatenate([np.delete(mirrored, -1, axis) if shared else mirrored, grid], axis)
+    return grid

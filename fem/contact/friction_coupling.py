@@ -1,0 +1,111 @@
+"""Friction that acts back on the contact: tangential traction while the pad is pressed, with stick and slip.
+
+At every quadrature point of the front a traction ``t`` resists what the point moves along the object's surface::
+
+    d = t_0 - k (x - x_0)             x_0, t_0: of the last accepted state, k: stiffness of the regularised stick
+    t = P d                where |P d| <= mu p, P = I - n n^T     (stick)
+    t = mu p P d / |P d|   elsewhere                              (slip)
+
+A point that was open at the last state starts without traction. So the result depends on the way to it, as friction
+does; `way` divides the forces finely enough. The tangent is exact.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap
+from softjaw.fem.pad.foam import gather
+from softjaw.fem.pad.mesh import Pad
+
+FloatArray = NDArray[np.float64]
+STICK = 100.0  # stiffness of stick in units of E / thickness; three times as much moves e_n by less than 0.1 %
+GROWTH, START = 1.5, 0.02  # of the force from step to step, and of the first force at the first step
+
+
+def way(reached: float, force: float) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
+
+    >>> way(2.0, 4.0)
+    [2.8284271247461903, 4.0]
+    """
+    low = reached or START * force
+    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
+    between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
+    return [*([] if reached else [low]), *between, force]
+
+
+class CoupledProblem(ContactProblem):
+    """A pad pressed on an object with friction coefficient ``mu``; for the rest a `ContactProblem`."""
+
+    def __init__(self, pad: Pad, gap: Gap, mu: float) -> None:
+        super().__init__(pad, gap)
+        self.mu, self.stick = mu, STICK * self.kappa
+        self._at, self._before = np.zeros((*pad.face_area.shape, 3)), np.zeros((*pad.face_area.shape, 3))
+        self._closed = np.zeros(pad.face_area.shape, dtype=bool)
+
+    def accept(self, x: FloatArray) -> None:
+        """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
+        self._contact(x, tangent=False)
+        self._before = self._traction(x)[0]
+        self._at, self._closed = self._points.copy(), self._pressure(x) > 0.0
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """As that of the frictionless problem, with the tractions' forces on the pad."""
+        R = super().residual(x)
+        if np.isnan(R[0]):
+            return R
+        pad = self.pad
+        force = np.einsum("fq,qa,fqi->fia", pad.face_area, pad.face_N, self._traction(x)[0])
+        return R - gather(self._face_dofs, force, self.size)
+
+    def tangent(self, x: FloatArray) -> FloatArray:
+        """Entries of the tangent in the order of ``rows`` and ``columns``."""
+        values = super().tangent(x)
+        N, weight = self.pad.face_N, self.pad.face_area
+        _, by_place, by_pressure = self._traction(x, derivatives=True)
+        self._K_uu -= np.einsum("fq,qa,qb,fqik->fiakb", weight, N, N, by_place, optimize=True)
+        entries = self._parts()[2]
+        entries -= self.kappa * np.einsum("fq,qb,qa,fqi->fbia", weight, N, N, by_pressure, optimize=True).ravel()
+        return values
+
+    def keep(self, x: FloatArray, first: bool) -> bool:
+        """As that of the frictionless problem, but every accepted state changes the tangent."""
+        return not first and super().keep(x, first)
+
+    def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
+        """As that of the frictionless problem, with the friction forces of the points."""
+        pressure, gap, p = super().contact_state(x)
+        friction = self.pad.face_area[..., None] * self._traction(x)[0]
+        return pressure, gap, ContactPoints(p.position, p.normal, p.gap, p.load, friction)
+
+    def _pressure(self, x: FloatArray) -> FloatArray:
+        """Nominal pressures of the points ``(faces, points)`` [Pa], negative ones of quadratic faces cut off."""
+        return np.maximum(self.kappa * x[self._pressures][self._face_pressures] @ self.pad.face_N.T, 0.0)
+
+    def _traction(self, x: FloatArray, derivatives: bool = False) -> tuple[FloatArray, ...]:
+        """Traction on the pad ``(faces, points, 3)`` [Pa] where `_contact` was evaluated, and its derivatives.
+
+        They are those by the points' places ``(..., 3, 3)`` [Pa/m] and by the pressure ``(..., 3)`` [-].
+        """
+        n, closed, most = self._normal, self._closed[..., None], self.mu * self._pressure(x)
+        d = np.where(closed, self._before - self.stick * (self._points - self._at), 0.0)
+        across = np.einsum("fqi,fqi->fq", n, d)
+        trial = d - across[..., None] * n
+        size = np.linalg.norm(trial, axis=-1)
+        slips = (size > most)[..., None]
+        along = trial / np.where(size > 0.0, size, 1.0)[..., None]
+        t = np.where(slips, most[..., None] * along, trial)
+        if not derivatives:
+            return (t,)
+        share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
+        P = np.eye(3) - n[..., :, None] * n[..., None, :]
+        bent = (
+            across[..., None, None] * self._hessian + n[..., :, None] * (self._hessian @ d[..., None])[..., None, :, 0]
+        )
+        D = np.where(closed[..., None], -self.stick * P, 0.0) - bent
+        D = np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
+        return t, share * D, np.where(slips & (most > 0.0)[..., None], self.mu * along, 0.0)

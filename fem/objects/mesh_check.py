@@ -1,0 +1,238 @@
+"""What a triangle mesh has to be before a distance to it means anything: closed, simple, turned outwards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from softjaw.fem.objects.crossing import crossing_pairs
+from softjaw.fem.objects.file_limits import MOST_TRIANGLES
+from softjaw.fem.objects.gap import IntArray
+from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.fem.objects.pose import FloatArray
+
+MOST_PIECES = 50
+SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
+TOLERATED_CROSSINGS = 1e-3  # share of crossing triangle pairs that is a scan's blemish, not a wrong shape
+DEBRIS = 0.02  # loose pieces below this share of the object's diagonal are dropped
+ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
+FLAT = 1e-6  # volume of a piece over its area and size, below which it has no inside
+SURE = 1e-3  # winding numbers this close to 0 and 1 are those of points outside and inside; others lie on the surface
+MOST_ASKED = 100  # corners of a piece that are asked whether they lie in another
+UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
+
+
+class MeshError(ValueError):
+    """A mesh that cannot serve as an object; the message says why and what to do."""
+
+
+def sound_mesh(
+    points: FloatArray, triangles: IntArray, unit: str = "m"
+) -> tuple[FloatArray, IntArray, tuple[str, ...]]:
+    """Mesh in metres, points merged, closed, oriented outwards, and notes on what was repaired or tolerated.
+
+    Repaired: doubled points, collapsed triangles, orientation, specks of debris, shells inside the object. Tolerated: a
+    few crossing triangles. Refused: all else that leaves inside and outside undefined, also where they are undecided:
+    pieces without volume, and pieces whose corners all lie on another one.
+
+    Parameters
+    ----------
+    points : (k, 3) array
+        Corners, in ``unit``.
+    triangles : (m, 3) array of int
+        Corners of each triangle.
+    unit : str
+        One of ``UNITS``.
+
+    Raises
+    ------
+    MeshError
+        With one sentence on the first thing found.
+    """
+    points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
+    if unit not in UNITS:
+        raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
+    _check_numbers(points, triangles)
+    points, triangles, notes = _merged(points, triangles)
+    if not _every_edge_twice(triangles):  # corners that rounding moved apart are only looked for where there is need
+        points, triangles, notes = _merged(_snapped(points), triangles, notes)
+    _check_size(float(np.ptp(points, axis=0).max()), unit)
+    points = points * UNITS[unit]
+    neighbours = _closed(triangles)
+    triangles, turned = _oriented(points, triangles, *neighbours)
+    crossings = crossing_pairs(points, triangles)
+    if len(crossings) > TOLERATED_CROSSINGS * len(triangles):
+        place = ", ".join(f"{x:.4g}" for x in points[triangles[crossings[0, 0]]].mean(axis=0))
+        raise MeshError(
+            f"the mesh intersects itself: {len(crossings)} pairs of triangles cross, the first near ({place}) m of the "
+            "file's frame; unite its parts into one outer surface (a boolean union or remeshing does it)"
+        )
+    if len(crossings):
+        notes.append(f"{len(crossings)} pairs among {len(triangles)} triangles cross; tolerated")
+    points, triangles, dropped = _outer_pieces(points, triangles)
+    return points, triangles, tuple(notes + turned + dropped)
+
+
+def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
+    """Refuse what would crash or silently spoil everything after it."""
+    if points.ndim != 2 or points.shape[1:] != (3,) or not len(points) or not len(triangles):
+        raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
+    if len(triangles) > MOST_TRIANGLES:
+        raise MeshError(f"the mesh has {len(triangles)} triangles, more than {MOST_TRIANGLES}; decimate it, to about a "
+                        "tenth of the pad's element size nothing is lost")
+    astray = (triangles < 0) | (triangles >= len(points))
+    if astray.any():
+        raise MeshError(f"a triangle refers to point {triangles[astray][0]}, but there are only {len(points)} (counted "
+                        "from 0); the file is damaged, export it again")
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        raise MeshError(f"{bad.sum()} of {len(points)} points have a coordinate that is not a finite number, "
+                        f"the first is point {np.flatnonzero(bad)[0]} (counted from 0); repair the file")
+
+
+def _check_size(extent: float, unit: str) -> None:
+    """Refuse an ``extent``, in the file's own numbers, that makes no plausible object in this unit."""
+    size = extent * UNITS[unit]
+    if (1 - ROUNDED) * SMALLEST <= size <= (1 + ROUNDED) * LARGEST:
+        return
+    fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
+    advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
+    raise MeshError(f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
+                    f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
+
+
+def _every_edge_twice(triangles: IntArray) -> bool:
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
+
+
+def _snapped(points: FloatArray) -> FloatArray:
+    """Points within rounding of each other moved to the first of them."""
+    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+    links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
+    group = connected_components(links, directed=False)[1]
+    return points[np.unique(group, return_index=True)[1]][group]
+
+
+def _merged(
+    points: FloatArray, triangles: IntArray, notes: Sequence[str] = ()
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """Equal points as one, unused ones left out, triangles that collapse dropped; adds to the notes."""
+    used, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
+    triangles = inverse.reshape(-1, 3).astype(np.int64)
+    a, b, c = triangles.T
+    whole = (a != b) & (b != c) & (c != a)
+    notes = [*notes, *([] if whole.all() else [f"dropped {np.sum(~whole)} triangles without area"])]
+    if not whole.any():
+        raise MeshError("the mesh is empty: all its triangles have collapsed to lines or points")
+    return used, triangles[whole], notes
+
+
+def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Pairs of triangles that share an edge ``(e,)``, ``(e,)``, and whether they run through it in the same sense."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    unique, inverse, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    if (count == 1).any():
+        raise MeshError(f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
+                        "triangle only; fill the holes in a mesh editor, or give the object as a profile")
+    if (count > 2).any():
+        raise MeshError(f"the mesh is not manifold: at {np.sum(count > 2)} edges more than two triangles meet; remove "
+                        "the inner walls or doubled triangles there")
+    order = np.argsort(inverse.ravel(), kind="stable").reshape(-1, 2)
+    return order[:, 0] // 3, order[:, 1] // 3, forward[order[:, 0]] == forward[order[:, 1]]
+
+
+def _oriented(
+    points: FloatArray, triangles: IntArray, i: IntArray, j: IntArray, clash: IntArray
+) -> tuple[IntArray, list[str]]:
+    """Triangles turned so that neighbours agree and every piece encloses a positive volume."""
+    n = len(triangles)
+    mirrored = np.where(clash, n, 0)
+    ends = np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]
+    links = coo_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
+    _, label = connected_components(links, directed=False)
+    if (label[:n] == label[n:]).any():
+        raise MeshError("the mesh has only one side (like a Moebius strip), so it has no inside; rebuild it as a solid")
+    flip = label[:n] > label[n:]
+    triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
+    piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
+    volume = np.bincount(piece, _volumes(points, triangles))
+    _refuse_flat(points, triangles, piece, volume)
+    inverted = volume < 0
+    triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
+    turned = int(np.sum(flip != inverted[piece]))
+    return np.ascontiguousarray(triangles), [f"turned {turned} of {n} triangles outwards"] if turned else []
+
+
+def _refuse_flat(points: FloatArray, triangles: IntArray, piece: IntArray, volume: FloatArray) -> None:
+    """Refuse pieces, specks aside, that enclose nothing: which of their sides is the outer one is not decided."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    area = np.bincount(piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+    low, high = np.full((2, len(area), 3), np.inf)
+    np.minimum.at(low, piece, points[triangles].min(axis=1))
+    np.minimum.at(high, piece, -points[triangles].max(axis=1))
+    size = np.linalg.norm(-high - low, axis=1)
+    flat = (np.abs(volume) <= FLAT * area * size) & (size >= DEBRIS * size.max())
+    if flat.any():
+        raise MeshError(
+            f"a piece of the mesh, {size[flat][0]:.4g} m large, encloses no volume: its two sides lie on each other; "
+            "give the object as a solid"
+        )
+
+
+def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Signed volumes ``(m,)`` of the tetrahedra from the bounding box's centre to each triangle [m^3]."""
+    a, b, c = (points[triangles] - 0.5 * (points.min(axis=0) + points.max(axis=0))).transpose(1, 0, 2)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+
+
+def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Mesh without debris and without shells inside another piece: the object is grasped from outside."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
+    count, label = connected_components(links, directed=False)
+    if count == 1:
+        return points, triangles, []
+    if count > MOST_PIECES:
+        raise MeshError(f"the mesh falls into {count} separate pieces; keep the object's outer surface only")
+    pieces = [triangles[label[triangles[:, 0]] == k] for k in range(count)]
+    size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
+    speck = size < DEBRIS * size.max()
+    inner = np.array([
+        any(_lies_inside(points, pieces[k], pieces[m]) for m in np.flatnonzero(~speck) if m != k)
+        for k in range(count)
+    ])
+    keep = ~speck & ~inner
+    if not keep.any():
+        raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
+    triangles = np.concatenate([piece for piece, wanted in zip(pieces, keep, strict=True) if wanted])
+    used, inverse = np.unique(triangles, return_inverse=True)
+    notes = [f"dropped {number} {kind}" for number, kind in
+             ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object")) if number]
+    return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
+
+
+def _lies_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
+    """Whether a piece lies inside another, by the first of its corners that does not lie on the other."""
+    corners = np.unique(piece)
+    for corner in corners[:: 1 + len(corners) // MOST_ASKED]:
+        if abs((turns := winding_number(points[corner], points, other)) - 0.5) > 0.5 - SURE:
+            return turns > 0.5
+    raise MeshError(
+        "two pieces of the mesh lie on each other: all corners of one are on the other; unite them into one surface, "
+        "or leave one out"
+    )
+
+
+def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:
+    """How often a closed mesh surrounds the point ``x (3,)``: 1 inside, 0 outside (solid angle over 4 pi)."""
+    a, b, c = (points[triangles] - x).transpose(1, 0, 2)
+    A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
+    lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
+    return float(np.arctan2(dot(a, np.cross(b, c)), lower).sum() / (2 * np.pi))

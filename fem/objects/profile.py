@@ -1,0 +1,272 @@
+"""Profile of a surface of revolution: a C2 curve (z, r)(s) through given points, closed to the axis at both ends.
+
+A cubic spline by chord length swings past straight runs: a bottle's wall given by five points would come out wavy. So
+three or more points on one line are drawn as exactly that line, and the points between two lines by a C2 cubic spline
+that leaves and meets them with their direction and without curvature (which takes one more knot in its first and last
+interval). Where two lines meet in a corner, the corner is rounded. An end that is not on the axis continues into a
+rounded rim and a flat cap; an end on the axis is met at right angles, so that the surface has no tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softjaw.fem.objects.pose import FloatArray
+
+COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step, are on it
+ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely
+ONE_WAY = 1e-9  # turn up to which two straight runs have one direction: there is no corner between them [rad]
+SHORTEST_CUT = 0.005  # of the rim: gentler corners are rounded by a larger radius, or rounding errors would bend them
+
+
+@dataclass(frozen=True)
+class End:
+    """What a spline has to fulfil at one end besides passing its point.
+
+    ``first`` and ``second`` are the derivatives (z, r) with respect to arc length; None means: not prescribed.
+    """
+
+    first: tuple[float | None, float | None] = (None, None)
+    second: tuple[float | None, float | None] = (None, None)
+
+    def conditions(self, component: int) -> list[tuple[int, float]]:
+        """Order and value of the derivatives that are prescribed for z (0) or r (1)."""
+        wanted = ((1, self.first[component]), (2, self.second[component]))
+        return [(order, value) for order, value in wanted if value is not None]
+
+
+FREE = End()
+POLE = End((0.0, None), (None, 0.0))  # on the axis: at right angles, r odd and z even like on a smooth surface
+
+
+def joint(first: FloatArray, second: FloatArray | None = None) -> End:
+    """End at which the neighbour's first and second derivative, zero by default, are taken over."""
+    d2 = np.zeros(2) if second is None else second
+    return End((float(first[0]), float(first[1])), (float(d2[0]), float(d2[1])))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Piecewise cubic ``(z, r)(s)``: on piece k the powers of ``s - breaks[k]`` have ``coefficients[k] (2, 4)``."""
+
+    breaks: FloatArray
+    coefficients: FloatArray
+
+    def derivative(self, s: FloatArray, order: int = 0) -> FloatArray:
+        """Derivative of the given order at ``s (n,)``: ``(n, 2)``; order 0 is the point itself."""
+        k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, len(self.breaks) - 2)
+        h = (s - self.breaks[k])[:, None]
+        c = self.coefficients[k]
+        for _ in range(order):
+            c = c[..., 1:] * np.arange(1, c.shape[-1])
+        value = np.zeros((len(s), 2))
+        for j in reversed(range(c.shape[-1])):
+            value = value * h + c[..., j]
+        return value
+
+    def curvature(self, s: FloatArray) -> FloatArray:
+        """Curvature ``(n,)`` [1/m], positive where the outside (left of the curve) is convex."""
+        d1, d2 = self.derivative(s, 1), self.derivative(s, 2)
+        return (d1[:, 1] * d2[:, 0] - d1[:, 0] * d2[:, 1]) / np.linalg.norm(d1, axis=1) ** 3
+
+    def inner(self, per_piece: int) -> FloatArray:
+        """Parameters of ``per_piece`` points on each piece, with its start and without its end."""
+        t = np.arange(per_piece) / per_piece
+        return (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * t).ravel()
+
+
+def joined(curves: list[Curve]) -> Curve:
+    """Curves one behind the other as one."""
+    breaks = [np.zeros(1)]
+    for curve in curves:
+        breaks.append(curve.breaks[1:] + breaks[-1][-1])
+    return Curve(np.concatenate(breaks), np.concatenate([curve.coefficients for curve in curves]))
+
+
+def line(p: FloatArray, q: FloatArray) -> Curve:
+    """Straight piece from p to q, by arc length."""
+    length = np.linalg.norm(q - p)
+    c = np.zeros((1, 2, 4))
+    c[0, :, 0], c[0, :, 1] = p, (q - p) / length
+    return Curve(np.array([0.0, length]), c)
+
+
+def spline(points: FloatArray, start: End, end: End, s: FloatArray | None = None) -> Curve:
+    """C2 cubic spline through ``points (n, 2)`` with the conditions of both ends.
+
+    ``s (n,)`` are the points' parameters, by default their chord length. Two conditions at an end are met with the help
+    of one more knot in the interval beside it; none at all by leaving the knot beside it out (with fewer than four
+    points: by a vanishing second derivative).
+    """
+    if s is None:
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    columns = [_component(points[:, c], s, start.conditions(c), end.conditions(c)) for c in (0, 1)]
+    breaks = np.unique(np.concatenate([knots for knots, _ in columns]))
+    c = np.empty((len(breaks) - 1, 2, 4))
+    for k, factor in enumerate((1, 1, 2, 6)):
+        for i, (knots, weights) in enumerate(columns):
+            c[:, i, k] = b_splines(knots, breaks[:-1], k) @ weights / factor
+    return Curve(breaks, c)
+
+
+def b_splines(t: FloatArray, x: FloatArray, order: int = 0) -> FloatArray:
+    """Derivatives of the cubic B-splines over the knots ``t`` at ``x (n,)``: ``(n, len(t) - 4)``.
+
+    By the recursion of Cox and de Boor; loading scipy's would take longer than an outline is worth.
+    """
+    piece = np.clip(np.searchsorted(t, x, side="right") - 1, 3, len(t) - 5)
+    B = (np.arange(len(t) - 1) == piece[:, None]).astype(float)
+    for degree in (1, 2, 3):
+        width = t[degree:] - t[:-degree]
+        share = B / np.where(width > 0, width, np.inf)
+        if degree > 3 - order:
+            B = degree * (share[:, :-1] - share[:, 1:])
+        else:
+            B = (x[:, None] - t[: -degree - 1]) * share[:, :-1] + (t[degree + 1 :] - x[:, None]) * share[:, 1:]
+    return B
+
+
+def _component(
+    values: FloatArray, s: FloatArray, start: list[tuple[int, float]], end: list[tuple[int, float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Knots of the spline of one coordinate, and the weights of its B-splines."""
+    n, knots = len(s), list(s[1:-1])
+    if n < 4:
+        start, end = start or [(2, 0.0)], end or [(2, 0.0)]
+    if not start:
+        knots.remove(s[1])
+    if not end:
+        knots.remove(s[-2])
+    both = n == 2 and len(start) == len(end) == 2
+    if len(start) == 2:
+        knots.append(s[0] + (s[1] - s[0]) / (3 if both else 2))
+    if len(end) == 2:
+        knots.append(s[-1] - (s[-1] - s[-2]) / (3 if both else 2))
+    t = np.concatenate([np.repeat(s[0], 4), sorted(knots), np.repeat(s[-1], 4)])
+    rows = [b_splines(t, s)]
+    rows += [b_splines(t, place, order) for place, wanted in ((s[:1], start), (s[-1:], end)) for order, _ in wanted]
+    right = np.concatenate([values, [value for _, value in start], [value for _, value in end]])
+    return t, np.linalg.solve(np.concatenate(rows), right)
+
+
+def straight_runs(points: FloatArray) -> list[tuple[int, int, bool]]:
+    """Cut the points into runs ``(first, last, is_straight)``, straight where three or more lie on one line."""
+    runs: list[tuple[int, int, bool]] = []
+    i, bent_from, last = 0, 0, len(points) - 1
+    while i < last:
+        j = i + 1
+        while j < last and _on_a_line(points[i : j + 2]):
+            j += 1
+        if j >= i + 2 or (last == 1 and _on_a_line(points)):
+            if bent_from < i:
+                runs.append((bent_from, i, False))
+            runs.append((i, j, True))
+            bent_from = i = j
+        else:
+            i += 1
+    if bent_from < last:
+        runs.append((bent_from, last, False))
+    return runs
+
+
+def _on_a_line(points: FloatArray) -> bool:
+    """Whether the points follow one straight line forwards; on the axis only a line at right angles counts."""
+    steps, chord = np.diff(points, axis=0), points[-1] - points[0]
+    e = chord / np.linalg.norm(chord)
+    tolerance = COLLINEAR * np.linalg.norm(steps, axis=1).min()
+    off = (points - points[0]) @ np.array([-e[1], e[0]])
+    tipped = (points[:, 1] == 0).any() and abs(e[0]) > COLLINEAR
+    return bool((steps @ e > 0).all() and np.abs(off).max() <= tolerance and not tipped)
+
+
+def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Points ``(n, 2)`` of the arc that leaves p along t and ends along u, and their arc length ``(n,)``."""
+    angle = np.arctan2(t[0] * u[1] - t[1] * u[0], t @ u)
+    angle = -np.pi if angle > np.pi - 1e-6 else angle
+    phi = np.linspace(0.0, angle, 1 + max(2, int(np.ceil(abs(angle) / ARC_STEP))))
+    left = np.sign(angle) * np.array([-t[1], t[0]])
+    arc = p + radius * (np.sin(np.abs(phi))[:, None] * t + (1 - np.cos(phi))[:, None] * left)
+    return arc, radius * np.abs(phi)
+
+
+def through(points: FloatArray, rim: float) -> tuple[Curve, Curve]:
+    """Curve through the points, and the same with both ends carried on to the axis.
+
+    ``rim`` is the radius of the rounding at corners and open ends [m].
+    """
+    runs = straight_runs(points)
+    found = (
+        (j, _corner(points, runs[k], runs[k + 1], rim))
+        for k, (_, j, flat) in enumerate(runs[:-1])
+        if flat and runs[k + 1][2]
+    )
+    corners = {j: corner for j, corner in found if corner is not None}
+    pieces: list[Curve] = []
+    for i, j, flat in runs:
+        if flat:
+            p = corners[i][0][-1] if i in corners else points[i]
+            q = corners[j][0][0] if j in corners else points[j]
+            if i in corners:
+                pieces.append(spline(corners[i][0], joint(corners[i][2]), joint(corners[i][3]), corners[i][1]))
+            pieces.append(line(p, q))
+        else:
+            start = _end(points, i, i - 1, runs) if i else _open_end(points[0])
+            end = _end(points, j, j, runs) if j < len(points) - 1 else _open_end(points[-1])
+            pieces.append(spline(points[i : j + 1], start, end))
+    given = joined(pieces)
+    return given, joined([*_lid(given, rim, first=True), given, *_lid(given, rim, first=False)])
+
+
+def _end(points: FloatArray, at: int, side: int, runs: list[tuple[int, int, bool]]) -> End:
+    """End of a bent run at a straight neighbour, which runs to or from the point ``at``."""
+    i, j, _ = next(run for run in runs if run[2] and (run[1] == at if side < at else run[0] == at))
+    return joint((points[j] - points[i]) / np.linalg.norm(points[j] - points[i]))
+
+
+def _open_end(p: FloatArray) -> End:
+    """First or last point of the profile: on the axis or free."""
+    return POLE if p[1] == 0 else FREE
+
+
+def _corner(
+    points: FloatArray, before: tuple[int, int, bool], after: tuple[int, int, bool], rim: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Rounding of the corner between two straight runs: points, arc length, direction before and after.
+
+    None where the runs have one direction up to rounding, as the two parts of a long line of rounded points may.
+    """
+    p, q, r = points[before[0]], points[before[1]], points[after[1]]
+    a, b = np.linalg.norm(q - p), np.linalg.norm(r - q)
+    t, u = (q - p) / a, (r - q) / b
+    turn = np.arctan2(abs(t[0] * u[1] - t[1] * u[0]), t @ u)
+    if turn <= ONE_WAY:
+        return None
+    half = np.tan(turn / 2)
+    cut = min(max(half, SHORTEST_CUT) * rim, 0.3 * a, 0.3 * b)
+    return *rounding(q - cut * t, t, u, cut / half), t, u
+
+
+def _lid(given: Curve, rim: float, *, first: bool) -> list[Curve]:
+    """Rounded rim and flat cap that carry one end of the profile to the axis; nothing where it ends there."""
+    s = given.breaks[:1] if first else given.breaks[-1:]
+    p, d1, d2 = (given.derivative(s, order)[0] for order in range(3))
+    if p[1] < 1e-9:  # rounded: the line that ends on the axis was given by its length
+        return []
+    mirror = np.array([-1.0, 1.0]) if first else np.ones(2)  # the first end is a last one, seen backwards
+    speed = np.linalg.norm(d1)
+    d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2  # by arc length, so that the rim starts evenly
+    t, axis = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
+    radius = min(rim, 0.25 * p[1])
+    pieces, start = [], p * mirror
+    if t @ axis < 1 - 1e-9:
+        arc, length = rounding(start, t, axis, radius)
+        start = arc[-1]
+        if first:
+            pieces.append(spline(arc[::-1] * mirror, joint(-axis), joint(d1, d2), length[-1] - length[::-1]))
+        else:
+            pieces.append(spline(arc, joint(d1, d2), joint(axis), length))
+    end = np.array([start[0], 0.0])
+    cap = line(end * mirror, start * mirror) if first else line(start, end)
+    return [cap, *pieces] if first else [*pieces, cap]

@@ -1,0 +1,171 @@
+"""Surface of revolution: bottles, cups and bulbs from the heights and radii of a profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from softjaw.fem.objects.gap import Analytic, Gap, Surface, grid_triangles
+from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.profile import Curve, straight_runs, through
+
+BLOCK = 8  # segments of the polyline that share one bounding circle
+TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
+CLOSEST_POINTS = 1e-6  # points of a profile closer than this are refused [m]
+ON_AXIS = 1e-9  # ends of a profile this close to the axis are on it, and a curve may not come as close on its way [m]
+TOUCH = 1e-9  # of the outline's extent: pieces of it this close to each other touch
+
+
+@dataclass(frozen=True, eq=False)
+class Revolution(Analytic):
+    """Body that a profile sweeps round the z axis.
+
+    Parameters
+    ----------
+    profile : (k, 2) array
+        Heights z and radii r [m] in order along the outside; r > 0, r = 0 allowed at the two ends. Three or more points
+        on a line give exactly this line, the others a smooth curve (see ``fem.objects.profile``).
+    rim : float
+        Radius of the rounding at corners between straight runs and where an open end meets its flat cap [m]; smaller
+        where the body is thin. An open end's cap lies beyond the last point by about this radius.
+
+    Raises
+    ------
+    ValueError
+        For points that make no body, with the number of the point.
+    """
+
+    profile: FloatArray
+    rim: float = 0.002
+    curve: Curve = field(init=False, repr=False)
+    smallest_radius: float = field(init=False)
+    overshoot: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Draw the curve, and refuse profiles that are no body's."""
+        points = _checked_points(self.profile)
+        if not (np.isfinite(self.rim) and self.rim > 0):
+            raise ValueError(f"rim must be a positive length in metres, found {self.rim}")
+        given, curve = through(points, self.rim)
+        places = _places(curve)
+        line = curve.derivative(places)
+        _check_line(line)
+        bend = np.abs(given.curvature(given.inner(16))).max()
+        values = {
+            "profile": points,
+            "curve": curve,
+            "smallest_radius": float(1 / bend) if bend > 1e-9 else np.inf,
+            "overshoot": _overshoot(points, given),
+            "_places": places,
+            "_line": line,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def gap(self, x: FloatArray) -> Gap:
+        """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
+        from softjaw.fem.objects.closest import (
+            profile_gap,  # with numba, which a scene that is only checked does not need
+        )
+
+        x = np.ascontiguousarray(x, dtype=float)
+        curve = self.curve
+        return profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places, self._blocks, BLOCK)
+
+    @cached_property
+    def _blocks(self) -> FloatArray:
+        from softjaw.fem.objects.closest import bounding_circles
+
+        return bounding_circles(self._line, BLOCK)
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Corners ``(2, 3)`` [m], caps included."""
+        (low, _), (high, r) = self._line.min(axis=0), self._line.max(axis=0)
+        return np.array([[-r, -r, low], [r, r, high]])
+
+    @property
+    def axis_symmetry(self) -> int:
+        """Every angle."""
+        return 0
+
+    def surface(self) -> Surface:
+        """Points and triangles: the profile, finest where it bends, at 48 angles."""
+        fine = self._places
+        s = fine if len(fine) < 60 else fine[np.linspace(0, len(fine) - 1, 60).round().astype(int)]
+        s = np.unique(np.concatenate([s, np.linspace(0, self.curve.breaks[-1], 25)]))
+        z, r = np.maximum(self.curve.derivative(s), [-np.inf, 0.0]).T[:, :, None]
+        phi = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+        points = np.stack([r * np.cos(phi), r * np.sin(phi), z + 0 * phi], axis=-1).reshape(-1, 3)
+        return points, grid_triangles(len(s), 48, closed=True)
+
+
+def _checked_points(profile: FloatArray) -> FloatArray:
+    """Profile as an array that runs upwards along the outside."""
+    points = np.array(profile, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+        raise ValueError(f"profile must be a list of at least two pairs (z, r), found shape {points.shape}")
+    if not np.isfinite(points).all():
+        raise ValueError(f"profile point {_first(~np.isfinite(points).all(axis=1))} is not a pair of finite numbers")
+    ends = points[[0, -1], 1]
+    points[[0, -1], 1] = np.where(np.abs(ends) <= ON_AXIS, 0.0, ends)
+    bad = points[:, 1] <= 0
+    bad[[0, -1]] = points[[0, -1], 1] < 0
+    if bad.any():
+        k = _first(bad)
+        raise ValueError(f"profile point {k} has radius {points[k - 1, 1]:g} m; only the two ends may lie on the axis, "
+                         "all other radii must be positive")
+    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < CLOSEST_POINTS
+    if short.any():
+        k = _first(short)
+        raise ValueError(f"profile points {k} and {k + 1} are the same; leave one out")
+    area = 0.5 * np.sum((points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0]))
+    if abs(area) < CLOSEST_POINTS * np.ptp(points, axis=0).max():
+        raise ValueError("profile encloses no area; it must lead from one end of the object to the other")
+    return points if area > 0 else points[::-1].copy()
+
+
+def _first(flags: FloatArray) -> int:
+    """Number, from 1, of the first element that is set."""
+    return int(np.flatnonzero(flags)[0]) + 1
+
+
+def _places(curve: Curve) -> FloatArray:
+    """Parameters of a polyline that turns by a small angle from vertex to vertex and keeps every break."""
+    h = np.diff(curve.breaks)
+    inner = curve.inner(16).reshape(-1, 16)
+    speed = np.linalg.norm(curve.derivative(inner.ravel(), 1), axis=1).reshape(inner.shape)
+    turn = (np.abs(curve.curvature(inner.ravel())).reshape(inner.shape) * speed).max(axis=1) * h
+    n = np.maximum(1, np.ceil(turn / TURN)).astype(int)
+    steps = [start + length * np.arange(k) / k for start, length, k in zip(curve.breaks[:-1], h, n, strict=True)]
+    return np.concatenate([*steps, curve.breaks[-1:]])
+
+
+def _check_line(line: FloatArray) -> None:
+    """Refuse a curve that touches the axis on the way, or itself; ``line (m + 1, 2)`` is its polyline."""
+    if line[1:-1, 1].min() <= ON_AXIS:
+        z = line[1 + line[1:-1, 1].argmin(), 0]
+        raise ValueError(f"the profile's curve swings to the axis near z = {z:g} m; add points there to hold it off")
+    a, d = line[:-1], np.diff(line, axis=0)
+    cross = lambda u, v: u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]  # noqa: E731
+    e, touch = d / np.linalg.norm(d, axis=1)[:, None], TOUCH * np.ptp(line, axis=0).max()
+    start = cross(e[:, None], a[None] - a[:, None])  # distances of all ends from all pieces' lines
+    end = cross(e[:, None], line[None, 1:] - a[:, None])
+    split = (start * end < 0) | (np.minimum(np.abs(start), np.abs(end)) <= touch)
+    low, high = np.minimum(a, line[1:]) - touch, np.maximum(a, line[1:])
+    near = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=-1)
+    i, _ = np.nonzero(np.triu(split & split.T & near, k=2))
+    if len(i):
+        raise ValueError(f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
+                         "the points in order along the outside, and more of them where it bends sharply")
+
+
+def _overshoot(points: FloatArray, given: Curve) -> float:
+    """Largest distance [m] of the curve from the polygon of its points, corners of straight runs left out."""
+    if all(flat for *_, flat in straight_runs(points)):
+        return 0.0
+    x, a, d = given.derivative(given.inner(16)), points[:-1], np.diff(points, axis=0)
+    t = np.clip(((x[:, None] - a) * d).sum(-1) / (d * d).sum(-1), 0, 1)
+    return float(np.linalg.norm(x[:, None] - a - t[..., None] * d, axis=-1).min(axis=1).max())

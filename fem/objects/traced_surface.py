@@ -1,0 +1,215 @@
+"""Outer surface of a thin-walled body traced on a triangle mesh: horizontal rays, smoothed and joined by splines.
+
+A shell needs a structured mesh and a smooth face with normals and curvature; triangles, scanned ones above all, offer
+neither. From a smooth centre line rays go out at even angles and at even steps along the outline. The radii they find
+are freed from waves of the facets' size (``smoothing``) and split into the outline ``(z, a)(s)``, ``a`` the mean
+radius, and the shape ``q(theta, s)`` of the sections: ``X = centre(z) + a q (cos theta, sin theta)``. Bottom and top
+are closed by rounded lids as on other bodies; there the shape of the last section goes on. Facets are chords: on a
+round body the traced surface lies inside by about two thirds of their sagitta, ``size^2 / (8 radius)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from scipy.interpolate import BSpline, CubicSpline
+
+from softjaw.fem.objects.jet import Jet
+from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.outer_surface import OuterSurface
+from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.profile import joined
+from softjaw.fem.objects.smoothing import smooth_spline
+from softjaw.fem.objects.spline_surface import SplineSurface, evaluate, spline_surface
+from softjaw.fem.objects.traced_outline import Wall, continued, curve_of, find_wall, lid
+from softjaw.fem.objects.traced_radii import Radii, trace_radii
+
+FACETS = 3.0  # in the shortest wave that is kept
+LONGEST = 0.15  # of the wall's height, for that wave
+LINES = 2  # of the shape's splines per knot of the outline
+SYMMETRIC = 1e-6  # of the size: how exactly a symmetry has to be fulfilled ...
+UNSURE = 0.01  # ... or of the facets' sagitta, which says nothing about the body
+OFF = 0.03  # of the mean radius: a surface further from its mesh is refused
+LID = 24  # places along a lid, and angles, at which its distance to the mesh is looked up
+
+
+@dataclass(frozen=True)
+class TraceReport:
+    """What was traced, and how well.
+
+    Attributes
+    ----------
+    heights : (float, float)
+        Covered by the wall [m]; below and above are lids.
+    largest, rms : float
+        Distance of the mesh's corners and middles of triangles on the wall to the traced surface [m].
+    place : (float, float)
+        Height [m] and angle [rad] of the largest.
+    lids : (float, float)
+        Largest distance of bottom and top, with their rounded edges, to the mesh [m]; NaN at an end that was asked for.
+    facet : float
+        Typical shortest side of the triangles [m].
+    wavelength : float
+        Waves of the surface shorter than this are smoothed out [m].
+    """
+
+    heights: tuple[float, float]
+    largest: float
+    rms: float
+    place: tuple[float, float]
+    lids: tuple[float, float]
+    facet: float
+    wavelength: float
+
+
+@dataclass(frozen=True, eq=False)
+class TracedSurface(OuterSurface):
+    """Closed surface ``X(theta, s)`` traced on a mesh; `traced` builds it.
+
+    The attributes of `OuterSurface` mean the same: ``shift_x`` and ``shift_y`` are the centre line, ``ratio`` the
+    sections' width along y over that along x, ``exponent`` is 2 on round bodies and NaN on others.
+
+    Attributes
+    ----------
+    shape : SplineSurface
+        ``q (cos theta, sin theta, 0)``: the sections in units of the mean radius.
+    round : bool
+        Whether every angle is a symmetry.
+    """
+
+    shape: SplineSurface = field(kw_only=True)
+    round: bool = field(kw_only=True)
+
+    def _parts(self, theta: FloatArray, s: FloatArray) -> tuple[list[Jet], Jet, list[Jet], Jet]:
+        """See `OuterSurface`."""
+        none = np.zeros_like(s)
+        d = [self.curve.derivative(s, order) for order in range(3)]
+        z, a = (Jet([d[0][:, i], none, d[1][:, i], none, none, d[2][:, i]]) for i in (0, 1))
+        shift = [z.through(*(f(z.rows[0], order) for order in range(3))) for f in (self.shift_x, self.shift_y)]
+        D = np.empty((len(s), 6, 3))
+        _evaluate(self.shape.theta, self.shape.s, self.shape.coefficients, theta, s, D)
+        return [Jet(D[:, :, 0].T), Jet(D[:, :, 1].T)], a, shift, z
+
+
+@njit(cache=True)
+def _evaluate(theta_lines, s_lines, coefficients, theta, s, D):
+    """Position and derivatives of a closed surface at many places."""
+    for n in range(theta.size):
+        evaluate(theta_lines, s_lines, coefficients, True, theta[n], s[n], D[n])
+
+
+def traced(
+    mesh: MeshObject,
+    heights: tuple[float, float] | None = None,
+    wavelength: float | None = None,
+    rim: float = 0.002,
+    largest_distance: float | None = None,
+) -> tuple[TracedSurface, TraceReport]:
+    """Smooth surface near a closed mesh with the axis z, for a thin-walled body of the same outside.
+
+    Parameters
+    ----------
+    mesh : MeshObject
+    heights : (float, float), optional
+        Part of the mesh to trace [m]; by default all of it but the bottom and the top.
+    wavelength : float, optional
+        Waves shorter than this are smoothed out [m]; by default three facets.
+    rim : float
+        Least rounding of the edges at bottom and top [m].
+    largest_distance : float, optional
+        Allowed between the mesh and the surface [m]; by default 3 % of the mean radius.
+
+    Raises
+    ------
+    MeshError
+        For sections that a ray from the centre line leaves more than once, and where the surface does not fit.
+    """
+    facet, size = facet_size(mesh), float(np.ptp(mesh.bounds, axis=0).max())
+    wall = find_wall(mesh, facet, rim, heights, SYMMETRIC * size)
+    length = wavelength or min(FACETS * facet, LONGEST * (wall.ends[1] - wall.ends[0]))
+    tolerance = max(SYMMETRIC * size, UNSURE * facet**2 / (8 * wall.radius))
+    radii = trace_radii(mesh, wall, facet, length, tolerance)
+    surface = _surface(wall, radii, rim)
+    report = _report(surface, mesh, wall, facet, radii.wavelength)
+    limit = OFF * wall.radius if largest_distance is None else largest_distance
+    if report.largest > limit:
+        z, angle = report.place
+        raise MeshError(
+            f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall lies {report.largest * 1e3:.3g} mm "
+            "off the mesh (a ledge, an edge or a part that sticks out): leave these heights out with "
+            "object.wall_heights_mm = [low, high], or treat the object as rigid"
+        )
+    return surface, report
+
+
+def facet_size(mesh: MeshObject) -> float:
+    """Median over the area of the triangles' shortest sides [m]."""
+    X = mesh.points[mesh.triangles]
+    side = np.linalg.norm(X - np.roll(X, 1, axis=1), axis=2).min(axis=1)
+    area = np.linalg.norm(np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]), axis=1)
+    order = np.argsort(side)
+    total = np.cumsum(area[order])
+    return float(side[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+def _surface(wall: Wall, radii: Radii, rim: float) -> TracedSurface:
+    """Surface through radii, with lids."""
+    s, z, R = radii.s, radii.z, radii.R
+    a = smooth_spline(s, R.mean(axis=1), radii.wavelength, (0.0, s[-1]))
+    given = curve_of(radii.height, a)
+    below, above = (lid(given, height, rim, first=k == 0) for k, height in enumerate(wall.lids))
+    curve = joined([*below, given, *above])
+    first = sum(len(piece.coefficients) for piece in below)
+    start, end = float(curve.breaks[first]), float(curve.breaks[-1])
+    q = continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end))
+    n = R.shape[1] // 4
+    ratio = CubicSpline(z, (R[:, n] + R[:, 3 * n]) / (R[:, 0] + R[:, 2 * n]))
+    exponent = 2.0 if radii.round else np.nan
+    return TracedSurface(
+        curve,
+        (start, start + float(s[-1])),
+        (float(curve.breaks[1]) if len(below) > 1 else 0.0, float(curve.breaks[-2]) if len(above) > 1 else end),
+        lambda h, order=0: ratio(np.clip(h, *wall.ends), order),
+        lambda h, order=0: np.full(np.shape(h), exponent if order == 0 else 0.0),
+        lambda h, order=0: wall.centre(h, order)[:, 0],
+        lambda h, order=0: wall.centre(h, order)[:, 1],
+        radii.symmetric,
+        shape=_shape(q, R.shape[1]),
+        round=radii.round,
+    )
+
+
+def _shape(q: BSpline, around: int) -> SplineSurface:
+    """Sections ``q(s) (around,)`` as splines round and along."""
+    knots = q.t[3:-3]
+    s = np.linspace(knots[0], knots[-1], LINES * (len(knots) - 1) + 1)
+    theta = np.linspace(0.0, 2 * np.pi, around + 1)
+    e = np.stack([np.cos(theta), np.sin(theta), 0 * theta], axis=1)
+    values = q(s)
+    values = np.concatenate([values, values[:, :1]], axis=1).T
+    return spline_surface(theta, s, values[:, :, None] * e[:, None, :], closed=True)
+
+
+def _report(surface: TracedSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
+    """Distances between mesh and surface."""
+    x = np.concatenate([mesh.points, mesh.points[mesh.triangles].mean(axis=1)])
+    s = np.linspace(*surface.wall, 8 * len(surface.curve.breaks))
+    z = surface.curve.derivative(s)[:, 0]
+    x = x[(x[:, 2] >= z[0]) & (x[:, 2] <= z[-1])]
+    d = x[:, :2] - np.stack([surface.shift_x(x[:, 2]), surface.shift_y(x[:, 2])], axis=1)
+    theta, s = np.arctan2(d[:, 1], d[:, 0]), np.interp(x[:, 2], z, s)
+    off = np.abs(np.einsum("ni,ni->n", x - surface.jets(theta, s)[:, 0], surface.normals(theta, s)))
+    k = int(off.argmax())
+    place = float(x[k, 2]), float(theta[k])
+    lids = []
+    for ends, height in zip(((0.0, surface.wall[0]), (surface.wall[1], surface.end)), wall.lids, strict=True):
+        theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, LID, endpoint=False), np.linspace(*ends, LID))
+        off_lid = np.abs(mesh.distance(surface.jets(theta, s)[:, 0])).max()
+        lids.append(np.nan if height is None else float(off_lid))
+    return TraceReport(
+        (float(z[0]), float(z[-1])), float(off[k]), float(np.sqrt((off**2).mean())), place,
+        (lids[0], lids[1]), facet, wavelength,
+    )  # fmt: skip

@@ -1,0 +1,192 @@
+"""The pad: a foam block bonded to a rigid sheet, meshed with hexahedra through scikit-fem.
+
+The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
+``[free displacements | travel of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
+travel, so that the force on the sheet is the residual of that unknown. On an elastic sheet only the nodes that the
+finger holds do; the others are free, and the sheet connects them to the travel.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from skfem import Basis, ElementHex1, ElementHex2, MeshHex
+
+from softjaw.fem.materials import Material
+from softjaw.fem.pad.backing_plate import BackStiffness, Sheet, back_stiffness
+from softjaw.fem.pad.shape import PadShape
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
+
+
+class Pad:
+    """Discrete pad in its own frame: front face at ``z = 0``, back at ``z = -thickness``.
+
+    Parameters
+    ----------
+    shape : PadShape
+    material : Material
+    symmetry : (bool, bool)
+        Whether ``x = 0`` and ``y = 0`` are planes of symmetry; only the positive side is then meshed.
+    contact : str
+        ``"weighted"`` integrates gap and pressure over the contact face with Gauss points, ``"nodal"`` collocates them
+        at its nodes.
+    sheet : Sheet, optional
+        The plate behind the pad; rigid without.
+
+    Attributes
+    ----------
+    dN, volume : (n, points, 3, nodes), (n, points) arrays
+        Reference gradients [1/m] and volumes [m^3] of the quadrature points.
+    nodes : (k, 3) array
+        Node positions [m].
+    element_nodes : (n, nodes) array
+    back : BackStiffness or None
+        Of an elastic sheet.
+    back_dofs : (k + 1,) array
+        Its unknowns: the free displacements of the back, then the travel.
+    dofs : (k, 3) array
+        Unknown of each displacement; -1 is fixed.
+    face_nodes : (m, face nodes) array
+        Nodes of the faces of the front.
+    face_N, face_area : (points, face nodes), (m, points) arrays
+        Shape functions and reference areas [m^2] at the quadrature points of the front.
+    side_weights : (points along a side,) array
+        Weights of that quadrature along one side of a face.
+    """
+
+    def __init__(
+        self,
+        shape: PadShape,
+        material: Material,
+        symmetry: tuple[bool, bool] = (False, False),
+        contact: str = "weighted",
+        sheet: Sheet | None = None,
+    ) -> None:
+        if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
+            raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
+        self.shape, self.material, self.symmetry, self.sheet = shape, material, tuple(symmetry), sheet
+        element, order = BASES[shape.element]
+        lines = [shape.lines(0, symmetry[0]), shape.lines(1, symmetry[1]), shape.lines(2, False)]
+        basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
+        self.nodes = np.ascontiguousarray(basis.doflocs.T)
+        self.element_nodes = np.ascontiguousarray(basis.element_dofs.T.astype(np.int32))
+        gradients = np.stack([np.broadcast_to(b[0].grad, (3, *basis.dx.shape)) for b in basis.basis])
+        self.dN = np.ascontiguousarray(gradients.transpose(2, 3, 1, 0))
+        self.volume = np.ascontiguousarray(basis.dx)
+        self._number_unknowns()
+        self._describe_front(lines, contact)
+
+    def _number_unknowns(self) -> None:
+        """Number free displacements, then the travel, then one pressure per node of the front."""
+        x, y, z = self.nodes.T
+        tol = 1e-9 * max(self.shape.size)
+        back = np.abs(z + self.shape.size[2]) < tol
+        front = np.abs(z) < tol
+        self.front_nodes, self.front_grid = _as_grid(self.nodes, front, tol)
+        back_nodes, _ = _as_grid(self.nodes, back, tol)
+        free = np.ones((len(x), 3), dtype=bool)
+        self.back = self._on_sheet(back_nodes)
+        free[back_nodes] = self.back.free.reshape(-1, 3) if self.back else False
+        for axis, value in enumerate((x, y)):
+            if self.symmetry[axis]:
+                free[np.abs(value) < tol, axis] = False
+        self.travel_dof = int(free.sum())
+        self.dofs = np.full((len(x), 3), -1, dtype=np.int32)
+        self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
+        self.dofs[back & ~free[:, 2], 2] = self.travel_dof
+        self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.travel_dof))
+        self.pressure_index = np.full(len(x), -1, dtype=np.int32)
+        self.pressure_index[self.front_nodes] = np.arange(len(self.front_nodes), dtype=np.int32)
+        self.size = self.travel_dof + 1 + len(self.front_nodes)
+
+    def _on_sheet(self, back_nodes: IntArray) -> BackStiffness | None:
+        """Stiffness of the elastic sheet behind the nodes of the back."""
+        if self.sheet is None:
+            return None
+        grid = self.nodes[back_nodes].reshape(*self.front_grid, 3)
+        lines = (tuple(map(float, line)) for line in (grid[:, 0, 0], grid[0, :, 1]))
+        return back_stiffness(*lines, self.symmetry, self.sheet)
+
+    def _describe_front(self, lines: list[FloatArray], contact: str) -> None:
+        """Faces of the front as a tensor grid, and its quadrature."""
+        per_side = self.shape.per_side
+        step = per_side - 1
+        grid = self.front_nodes.reshape(self.front_grid)
+        nx, ny = len(lines[0]) - 1, len(lines[1]) - 1
+        local = [(i, j) for i in range(per_side) for j in range(per_side)]
+        self.face_nodes = np.stack(
+            [grid[i : i + step * nx : step, j : j + step * ny : step].ravel() for i, j in local], axis=1
+        )
+        area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
+        self.contact = contact
+        self.face_N, self.side_weights = _face_rule(per_side, contact)
+        self.face_area = np.outer(area, np.outer(self.side_weights, self.side_weights))
+        self.node_area = np.bincount(
+            self.pressure_index[self.face_nodes].ravel(),
+            (self.face_area @ self.face_N).ravel(),
+            len(self.front_nodes),
+        )
+
+    @property
+    def share(self) -> float:
+        """Part of the whole pad that is meshed: 1, 1/2 or 1/4."""
+        return 0.5 ** sum(self.symmetry)
+
+    @property
+    def rounding(self) -> float:
+        """Norm of the forces that rounding leaves where a stiff sheet meets the travel [N]."""
+        if self.back is None:
+            return 0.0
+        return float(np.finfo(float).eps * self.shape.size[2] * np.linalg.norm(np.diag(self.back.K)[:-1]))
+
+    @cached_property
+    def modulus_per_thickness(self) -> float:
+        """``E / thickness`` [Pa/m]: scales pressures to lengths and estimates the pad as a bed of springs."""
+        return self.material.young_modulus / self.shape.size[2]
+
+    def displacement(self, x: FloatArray) -> FloatArray:
+        """Nodal displacements ``(k, 3)`` [m] of a vector of unknowns."""
+        u = np.zeros(self.dofs.shape)
+        u[self.dofs >= 0] = x[self.dofs[self.dofs >= 0]]
+        return u
+
+
+def _as_grid(nodes: FloatArray, chosen: NDArray[np.bool_], tol: float) -> tuple[IntArray, tuple[int, int]]:
+    """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
+    column, row = (_lines(nodes[chosen, axis], tol) for axis in (0, 1))
+    order = np.lexsort((row, column))
+    return np.flatnonzero(chosen)[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
+
+
+def _lines(x: FloatArray, tol: float) -> IntArray:
+    """Number ``(n,)`` of the mesh line of every coordinate; nodes inside elements are off it by rounding."""
+    order = np.argsort(x)
+    number = np.empty(len(x), dtype=np.int32)
+    number[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > tol)])
+    return number
+
+
+def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
+    """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
+    if contact == "weighted":
+        points, weights = np.polynomial.legendre.leggauss(per_side)
+        points, weights = 0.5 * (points + 1.0), 0.5 * weights
+    elif contact == "nodal":
+        points = np.linspace(0.0, 1.0, per_side)
+        weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
+    else:
+        raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
+    one = np.stack([lagrange(per_side, s) for s in points])  # (points, nodes) along one side
+    N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
+    return N, weights
+
+
+def lagrange(n: int, s: float) -> FloatArray:
+    """Lagrange polynomials with ``n`` equidistant nodes on ``[0, 1]``."""
+    t = np.linspace(0.0, 1.0, n)
+    return np.array([np.prod([(s - t[j]) / (t[i] - t[j]) for j in range(n) if j != i]) for i in range(n)])

@@ -1,0 +1,187 @@
+"""Shell mesh of a thin-walled body: a grid of angles and of places along the outline, on the axis triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softjaw.fem.objects.outer_surface import OuterSurface
+from softjaw.fem.shell.grid import MeshSize, along, around
+from softjaw.fem.shell.mesh import FloatArray, IntArray, ShellMesh, grid_elements
+
+THICKEST = 1.0 - 1e-6  # of the outline's radius: a wall that reaches its centre of curvature has no inner face
+
+
+@dataclass(frozen=True)
+class BodyMesh(ShellMesh):
+    """Mesh of a body with its parameters.
+
+    Attributes
+    ----------
+    surface : OuterSurface
+    theta, s : (m + 1,), (n + 1,) arrays
+        Grid lines. Element ``i * n + j`` lies between theta lines i, i + 1 and s lines j, j + 1; its corners are
+        ``number[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]``.
+    number : (m + 1, n + 1) array
+        Node on each crossing; the last row of a whole body is the first again, nodes on the axis are one node.
+    symmetry : (bool, bool)
+        Whether x = 0 and y = 0 are planes of symmetry and only one side is meshed.
+    symmetric : (6 k,) array of bool
+        Numbers that these planes fix.
+    """
+
+    surface: OuterSurface
+    theta: FloatArray
+    s: FloatArray
+    number: IntArray
+    symmetry: tuple[bool, bool]
+    symmetric: FloatArray
+
+    @property
+    def closed(self) -> bool:
+        """Whether theta runs once round."""
+        return not any(self.symmetry)
+
+    @property
+    def share(self) -> float:
+        """Part of the body that is meshed: 1, 1/2 or 1/4."""
+        return 0.5 ** sum(self.symmetry)
+
+    def ring(self, s: float) -> IntArray:
+        """Nodes of the grid line nearest to the place s on the outline."""
+        return np.unique(self.number[:, np.abs(self.s - s).argmin()])
+
+    @property
+    def foot(self) -> IntArray:
+        """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
+        return self.ring(self.surface.flat[0])
+
+    def outer_grid(self) -> FloatArray:
+        """Exact outer face at the crossings of the lines, ``(m + 1, n + 1, 3)`` [m]."""
+        theta, s = np.meshgrid(self.theta, self.s, indexing="ij")
+        return self.surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)
+
+    def locate(self, theta: ArrayLike, s: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Nodes ``(n, 4)``, shape functions ``N (n, 4)`` and their derivatives by theta and s ``(n, 2, 4)`` at points.
+
+        A value interpolated with ``N`` is bilinear in theta and s. Points outside the mesh get the nearest element.
+        """
+        theta, s = np.atleast_1d(theta).astype(float), np.atleast_1d(s).astype(float)
+        if self.closed:
+            theta = self.theta[0] + np.mod(theta - self.theta[0], 2 * np.pi)
+        i = np.clip(np.searchsorted(self.theta, theta, side="right") - 1, 0, len(self.theta) - 2)
+        j = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        h, k = self.theta[i + 1] - self.theta[i], self.s[j + 1] - self.s[j]
+        u, v = (theta - self.theta[i]) / h, (s - self.s[j]) / k
+        N = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+        dN = np.stack([
+            np.stack([v - 1, 1 - v, v, -v], axis=1) / h[:, None], np.stack([u - 1, -u, u, 1 - u], axis=1) / k[:, None]
+        ], axis=1)  # fmt: skip
+        nodes = np.stack(
+            [self.number[i, j], self.number[i + 1, j], self.number[i + 1, j + 1], self.number[i, j + 1]], 1
+        )
+        return nodes, N, dN
+
+
+def body_mesh(
+    surface: OuterSurface,
+    thickness: float | Sequence[tuple[float, float]],
+    size: MeshSize,
+    symmetry: tuple[bool, bool] = (False, False),
+    *,
+    open_top: bool = True,
+    open_bottom: bool = False,
+    base_thickness: float | None = None,
+    hole: float = 0.0,
+) -> BodyMesh:
+    """Mesh of the wall inside a surface; its outer face lies on the surface.
+
+    Parameters
+    ----------
+    surface : OuterSurface
+    thickness : float or (k, 2) list
+        Wall thickness [m], or pairs (z, thickness) between which it is interpolated.
+    size : MeshSize
+    symmetry : (bool, bool)
+        Planes of symmetry x = 0 and y = 0: the half y >= 0 or x >= 0, or the quarter, is meshed.
+    open_top, open_bottom : bool
+        Whether the mesh ends at the last or begins at the first given section instead of on the axis.
+    base_thickness : float, optional
+        Thickness of the flat bottom [m]; the rim above it changes over to the wall's.
+    hole : float
+        Radius of a hole left open in the middle of a flat bottom [m]; without one the elements there are triangles.
+
+    Raises
+    ------
+    ValueError
+        For a symmetry that the surface does not have, or a wall that is not positive or too thick for its curvature.
+    """
+    for plane, wanted, found in zip("xy", symmetry, surface.symmetric, strict=True):
+        if wanted and not found:
+            raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
+    s = along(surface, size, open_bottom, open_top, hole, _steps(surface, thickness))
+    theta = around(surface, size, symmetry)
+    number, first = _numbers(surface, theta, s, whole=not any(symmetry))
+    t, p = theta[first[0]], s[first[1]]
+    D = 0.5 * _wall(surface, thickness, base_thickness, p)[:, None] * surface.normals(t, p)
+    X = surface.jets(t, p)[:, 0] - D
+    planes = _planes(symmetry, theta, number, len(X))
+    return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, tuple(symmetry), planes)
+
+
+def _steps(surface: OuterSurface, thickness: float | Sequence[tuple[float, float]]) -> list[float]:
+    """Places on the wall where a given thickness changes its slope: the mesh needs a line there."""
+    if np.ndim(thickness) == 0:
+        return []
+    z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
+    return [surface.station(height) for height, _ in thickness if z.min() < height < z.max()]
+
+
+def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
+    """Node on each crossing, and the (theta, s) line numbers ``(2, k)`` of every node's first crossing."""
+    m, n = len(theta), len(s)
+    key = np.arange(m * n).reshape(m, n)
+    if whole:
+        key[-1] = key[0]
+    for end, j in ((0.0, 0), (surface.end, n - 1)):
+        if s[j] == end:
+            key[:, j] = key[0, j]
+    first, number = np.unique(key, return_inverse=True)
+    return number.reshape(m, n).astype(np.int32), np.stack([first // n, first % n])
+
+
+def _wall(
+    surface: OuterSurface, thickness: float | Sequence[tuple[float, float]], base: float | None, s: FloatArray
+) -> FloatArray:
+    """Thickness ``(n,)`` at the places s."""
+    table = np.atleast_2d(thickness) if np.ndim(thickness) else np.array([[0.0, float(thickness)]])
+    z = surface.curve.derivative(s)[:, 0]
+    t = np.interp(z, table[:, 0], table[:, 1])
+    if base is not None:
+        if surface.flat[0] == 0.0:
+            raise ValueError("base_thickness needs a body with a flat bottom; give pairs (z, thickness) instead")
+        part = np.clip((surface.wall[0] - s) / max(surface.wall[0] - surface.flat[0], 1e-12), 0.0, 1.0)
+        t = part * base + (1.0 - part) * t
+    if not (np.isfinite(t) & (t > 0)).all():
+        raise ValueError(f"the wall thickness must be positive everywhere, found {t.min():g} m")
+    bend = surface.curve.curvature(s)
+    if (bend * t > THICKEST).any():
+        k = int(np.argmax(bend * t))
+        raise ValueError(
+            f"the wall is {t[k]:g} m thick at z = {z[k]:g} m, where the outline's radius is only "
+            f"{1 / bend[k]:g} m; round it more or make the wall thinner"
+        )
+    return t
+
+
+def _planes(symmetry: tuple[bool, bool], theta: FloatArray, number: IntArray, nodes: int) -> FloatArray:
+    """Numbers ``(6 nodes,)`` that the planes of symmetry fix."""
+    fixed = np.zeros((nodes, 6), dtype=bool)
+    for axis in (0, 1):
+        if symmetry[axis]:
+            on = np.abs(np.cos(theta) if axis == 0 else np.sin(theta)) < 1e-9
+            fixed[np.unique(number[on]), axis] = fixed[np.unique(number[on]), 3 + axis] = True
+    return fixed.ravel()

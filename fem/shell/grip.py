@@ -1,0 +1,248 @@
+"""Press two fingers on a thin-walled object along a ladder of normal forces, each started from the one before.
+
+As in ``fem.contact.press``, with a wall that gives way. Where a wall snaps in, force control jumps or fails; then the
+fingers are walked on by their travel, in short steps, and the first state with the wanted force is taken: what a
+gripper that closes with a growing force meets first.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softjaw.fem.contact.load_stepping import Settings, Stepping, Work, falls
+from softjaw.fem.contact.press import Pressed, pressed, since
+from softjaw.fem.contact.problem import Gap
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.pad.spring_bed import SpringBed
+from softjaw.fem.petsc import NonlinearSolver, Seconds
+from softjaw.fem.shell.collapse import Opening
+from softjaw.fem.shell.grip_problem import GripProblem
+
+LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
+JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
+BALANCE = 1e-6  # of the normal force
+MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
+FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
+DENTED = 0.95  # and after nodal gaps have found none either
+GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
+ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
+
+
+@dataclass(frozen=True)
+class WallState:
+    """The wall at one force.
+
+    Parameters
+    ----------
+    q : (6 k,) array
+        State, see ``fem.shell.model`` [m].
+    load : (k, 3) array
+        Contact forces on the shell's nodes [N].
+    reaction : (3,) array
+        Force of supports and springs on the whole object [N].
+    snapped : bool
+        Whether the wall has snapped in on the way here: the force fell while the fingers closed, or it hardly grew.
+    opening : float
+        Of the wall's inner faces towards each other, see ``fem.shell.collapse``: 1 undeformed, 0 where they would meet.
+    """
+
+    q: FloatArray
+    load: FloatArray
+    reaction: FloatArray
+    snapped: bool
+    opening: float
+
+
+@dataclass(frozen=True)
+class Gripped:
+    """Both fingers, or the one that symmetry leaves, and the wall in equilibrium at one normal force."""
+
+    force: float
+    fingers: tuple[Pressed, ...]
+    wall: WallState
+
+
+@dataclass
+class Grip:
+    """Pads on a thin-walled object.
+
+    Parameters
+    ----------
+    problem : GripProblem
+    gaps : sequence of callables
+        Of the undeformed object in the frame of each pad, as in ``Press``; they tell where contact begins.
+    mirrors : (bool, bool)
+        Whether ``x = 0`` and ``y = 0`` are planes of symmetry that the mesh of the wall ends at.
+    options : dict
+        PETSc options with the prefix ``contact_``.
+    fallback : callable, optional
+        Makes the same problem with nodal gaps, for forces at which this one has no solution; its unknowns must be
+        numbered alike.
+    """
+
+    problem: GripProblem
+    gaps: Sequence[Gap]
+    mirrors: tuple[bool, bool] = (False, False)
+    options: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=Settings)
+    fallback: Callable[[], GripProblem] | None = None
+
+    def __post_init__(self) -> None:
+        """Set up the solver."""
+        self._set_up()
+
+    def _set_up(self) -> None:
+        fingers = self.problem.fingers
+        self.opening = Opening(self.problem.model.shell.mesh)
+        self._beds = [SpringBed(f.pad, gap) for f, gap in zip(fingers, self.gaps, strict=True)]
+        self.solver = NonlinearSolver(self.problem, self.options)
+        self._stepping = Stepping(
+            self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
+            self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
+            ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
+            None if "contact_snes_max_it" in self.options else MOST_ITERATIONS, self._watch,
+        )  # fmt: skip
+
+    def _guess(self, travel: float) -> FloatArray:
+        """The wall undeformed, the pads as beds of springs."""
+        x = np.zeros(self.problem.size)
+        for f, bed in zip(self.problem.fingers, self._beds, strict=True):
+            x[f.own] = bed.guess(travel)
+        return x
+
+    def ladder(self, forces: Sequence[float]) -> Iterator[Gripped]:
+        """Equilibrium states at ascending normal forces per finger [N].
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            At the first force without an acceptable state.
+        """
+        x, reached, compliance, snapped = None, 0.0, np.inf, False
+        for force in forces:
+            work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
+            try:
+                x, slope, fell = self._level(x, reached, force, compliance, work)
+            except ConvergenceError as error:
+                self._refuse_folded(error, DENTED if self.fallback is None else FOLDED)
+                if self.fallback is None:
+                    raise
+                self._fall_back()
+                try:
+                    x, slope, fell = self._level(x, reached, force, compliance, work)
+                except ConvergenceError as again:
+                    self._refuse_folded(again, DENTED)
+                    raise
+            reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
+            yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
+
+    def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
+        """Say that a wall collapsed where that is why no further state was found, or that it may have."""
+        left, force = self.opening.last
+        if left < limit:
+            closer = f"its opposite sides have come {1 - left:.0%} of their distance closer"
+            if left < FOLDED:
+                text = f"the wall collapsed: beyond {force:.3g} N, where {closer}, no equilibrium was found"
+            else:
+                text = (
+                    f"no equilibrium was found beyond {force:.3g} N, where {closer}: either the wall gives way there, "
+                    "or Newton's method did not find which nodes touch; try a finer mesh or shorter pads"
+                )
+            raise CheckError(f"{text} ({error})") from error
+
+    def _fall_back(self) -> None:
+        """Go on with nodal gaps."""
+        seconds, last = self.solver.seconds, self.opening.last
+        self.solver.destroy()
+        self.problem, self.fallback = self.fallback(), None
+        self._set_up()
+        self.solver.seconds, self.opening.last = seconds, last
+
+    def _level(
+        self, x: FloatArray | None, reached: float, force: float, compliance: float, work: Work
+    ) -> tuple[FloatArray, float, bool]:
+        """State at ``force``, the mean compliance [m/N] on the way, and whether a limit was passed."""
+        if x is None:
+            travel = float(np.mean([bed.travel(force) for bed in self._beds]))
+            x, reached = self._stepping.first(travel, force, work)
+            compliance = self.problem.travel(x) / reached  # foam gets stiffer, so this is more than what comes
+        ahead, fell = self._climb(x, reached, force, compliance, work)
+        if not force > reached:
+            return ahead, np.inf, fell
+        slope = (self.problem.travel(ahead) - self.problem.travel(x)) / (force - reached)
+        return ahead, slope, fell or GIVES_WAY * slope > self.problem.travel(x) / reached
+
+    def _climb(
+        self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
+    ) -> tuple[FloatArray, bool]:
+        """State at ``force``, and whether a limit was passed on the way from the one at ``reached`` [N]."""
+        expected = max(JUMP, 2.0 * compliance * (force - reached))
+        try:
+            ahead = self._stepping.climb(x, reached, force, work, walk=False)
+            if self.problem.travel(ahead) - self.problem.travel(x) <= expected:
+                return ahead, False
+        except ConvergenceError:
+            pass
+        forces: list[float] = []
+        ahead = self._stepping.walk(x, force, work, LONGEST_STEP, forces)
+        return ahead, falls([reached, *forces])
+
+    def _watch(self, x: FloatArray, force: float) -> None:
+        self.opening.watch(self.problem.wall_state(x), force)
+
+    def _gives_way(self, x: FloatArray, force: float) -> bool:
+        """Whether the force grows much more slowly with the travel here than it has done so far.
+
+        Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
+        when they snap in, and no force falls there.
+        """
+        fingers = self.problem.fingers
+        load = np.zeros(self.problem.size)
+        load[[f.travel for f in fingers]] = [f.pad.share for f in fingers]
+        return bool(self.problem.travel(self.solver.answer(load)) * force > self.problem.travel(x) / GIVES_WAY)
+
+    def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
+        """State of all parts, checked."""
+        problem, residual = self.problem, np.abs(self.problem.residual(x))
+        fingers = []
+        for k, f in enumerate(problem.fingers):
+            left_over = residual[f.offset : f.travel + 1].max() / f.pad.share
+            part = seconds if k == 0 else Seconds()
+            fingers.append(pressed(
+                f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
+                work if k == 0 else Work(), part,
+            ))  # fmt: skip
+        load, q = problem.wall_load(x), problem.wall_state(x)
+        worst = residual[: problem.model.size].max(initial=0.0)
+        if not worst <= max(BALANCE, self.settings.residual) * force:
+            raise CheckError(
+                f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
+                f"by {worst:.3g} N"
+            )
+        self._check_balance(fingers, load, force)
+        return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped, self.opening(q)))
+
+    def _check_balance(self, fingers: Sequence[Pressed], load: FloatArray, force: float) -> None:
+        """Refuse a state in which the wall does not bear what the pads press with."""
+        pads = sum(f.pose.rotation @ p.points.force for f, p in zip(self.problem.fingers, fingers, strict=True))
+        off = np.abs(pads - load.sum(axis=0)).max()
+        if not off <= BALANCE * force:
+            raise CheckError(
+                f"the state at {force:.4g} N converged but is wrong: pads and wall are out of balance by {off:.3g} N"
+            )
+
+    def _reaction(self, load: FloatArray) -> FloatArray:
+        """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""
+        mirrored = np.array([*self.mirrors, False])
+        return np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self.solver.destroy()

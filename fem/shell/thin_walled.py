@@ -1,0 +1,204 @@
+"""Thin-walled object: from its wall and two poses of the fingers to the coupled problem, as small as symmetry allows.
+
+Everything is done in the *grasp frame*: the object's, turned about its axis until finger 1 stands at angle 0. There the
+planes x = 0 (between the fingers) and y = 0 (through both) are the candidates for symmetry. A pad is meshed on its
+positive side only; finger 2 of a half model has its other half on that side of the plane, so it is turned by half a
+turn about its approach (``flipped``), and its results are turned back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from softjaw.fem.objects.outer_surface import OuterSurface
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.stacked import wall_surface
+from softjaw.fem.objects.turned import Turned
+from softjaw.fem.shell.body import BodyMesh, body_mesh
+from softjaw.fem.shell.facing import Wall
+from softjaw.fem.shell.grid import MeshSize
+from softjaw.fem.shell.linear import LinearShell
+from softjaw.fem.shell.support import Supported, supported
+from softjaw.fem.shell.wall_material import WallMaterial
+from softjaw.fem.shell.wall_model import LinearWall, NonlinearWall
+
+ALIKE = 1e-9  # how exactly poses must be images of each other, in units of their size
+HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class WallMesh:
+    """Sizes of the wall's elements [m]: round and along the object where pads touch, and the largest elsewhere."""
+
+    around: float = 0.0015
+    along: float = 0.0025
+    coarse: float = 0.006
+
+    def halved(self) -> WallMesh:
+        """Half as many elements in every direction."""
+        return WallMesh(2 * self.around, 2 * self.along, 2 * self.coarse)
+
+
+@dataclass(frozen=True, eq=False)
+class ThinWalled:
+    """Object that gives way.
+
+    Parameters
+    ----------
+    surface : OuterSurface
+    round : bool
+        Whether every angle is a symmetry.
+    thickness : float or (k, 2) tuple
+        Of the wall [m], or pairs (z, thickness).
+    material : WallMaterial
+    support : str
+        ``clamped``, ``standing`` or ``free``.
+    open_top : bool
+    base_thickness : float, optional
+        [m]
+    springs : float
+        Weak springs that stand for what friction holds, all together and per direction [N/m].
+    """
+
+    surface: OuterSurface
+    round: bool
+    thickness: float | tuple[tuple[float, float], ...]
+    material: WallMaterial
+    support: str = "free"
+    open_top: bool = True
+    base_thickness: float | None = None
+    springs: float = 1e3
+
+    def thickness_at(self, z: float) -> float:
+        """Wall thickness at a height [m]."""
+        if np.ndim(self.thickness) == 0:
+            return float(self.thickness)
+        table = np.array(self.thickness)
+        return float(np.interp(z, table[:, 0], table[:, 1]))
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """Both fingers at first touch in the grasp frame, and the symmetry of the whole.
+
+    Attributes
+    ----------
+    angle : float
+        Of the grasp frame about the object's axis [rad].
+    poses : tuple of Pose
+        One pose where the plane between the fingers is one of symmetry.
+    flipped : tuple of bool
+        Whether a pose was turned by half a turn about its approach.
+    mirrors : (bool, bool)
+        Planes of symmetry x = 0, y = 0.
+    """
+
+    angle: float
+    poses: tuple[Pose, ...]
+    flipped: tuple[bool, ...]
+    mirrors: tuple[bool, bool]
+
+    @property
+    def pad_symmetry(self) -> tuple[bool, bool]:
+        """Planes of symmetry of the pads: ``y = 0`` of the grasp frame is the pads' own."""
+        return False, self.mirrors[1]
+
+
+def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool] = (True, True)) -> Grasp:
+    """Grasp frame of two poses at first touch and the planes of symmetry that object and poses share.
+
+    ``allowed`` leaves out planes that the meshes cannot use.
+    """
+    approach = poses[0].rotation[:, 2]
+    angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
+    turned = Turned(body.surface, angle, body.round)
+    one, two = (_turned(pose, angle) for pose in poses)
+    size = max(np.abs(one.origin).max(), np.abs(two.origin).max())
+
+    def alike(p: Pose, q: Pose) -> bool:
+        same = np.abs(p.rotation - q.rotation).max() <= ALIKE
+        return same and np.abs(p.origin - q.origin).max() <= ALIKE * size
+
+    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, ALIKE * size) for pose in (one, two))
+    between = allowed[0] and turned.symmetric[0] and alike(_image(one), two)
+    flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in (one, two))
+    kept = tuple(_half_turned(p) if flip else p for p, flip in zip((one, two), flipped, strict=True))
+    n = 1 if between else 2
+    return Grasp(angle, kept[:n], flipped[:n], (between, across))
+
+
+def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh, *, linear: bool = False):
+    """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
+    low, high, half = _footprint(held, pad_size)
+    size = MeshSize((0.0, np.pi), (low, high), half, mesh.around, mesh.along, mesh.coarse)
+    one = _supported(body, held, _within(body, size))
+    found = one.shell.mesh
+    wall = Wall(_surface(found), found.theta, found.s, found.number, 0.5 * found.thickness)
+    return (LinearWall if linear else NonlinearWall)(one.shell, one.fixed), [wall] * len(held.poses)
+
+
+@lru_cache(maxsize=4)
+def object_factors(
+    body: ThinWalled, angle: float, mirrors: tuple[bool, bool], mesh: WallMesh, half: float
+) -> LinearShell:
+    """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
+    z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
+    size = MeshSize((0.0, np.pi), (z.min(), z.max()), half, mesh.around, mesh.along, mesh.coarse)
+    one = _supported(body, Grasp(angle, (), (), mirrors), _within(body, size))
+    return LinearShell(one.shell, one.fixed)
+
+
+def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
+    surface = Turned(body.surface, held.angle, body.round)
+    thickness = body.thickness if np.ndim(body.thickness) == 0 else [list(pair) for pair in body.thickness]
+    mesh = body_mesh(surface, thickness, size, held.mirrors, open_top=body.open_top, base_thickness=body.base_thickness)
+    return supported(mesh, body.material, body.support, body.springs)
+
+
+def _surface(mesh: BodyMesh):
+    """Splines through the meshed part of the wall and the rims of its flat ends."""
+    low, high = mesh.surface.flat
+    return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
+
+
+def _within(body: ThinWalled, size: MeshSize) -> MeshSize:
+    """The same with the gripped heights cut to those of the wall."""
+    z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
+    low, high = np.clip(size.heights, z.min(), z.max())
+    return replace(size, heights=(float(low), float(high)))
+
+
+def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:
+    """Heights that the pads reach over, and half the width they cover round the object [m], with a margin."""
+    margin = 0.1 * max(pad_size[:2])
+    corners = np.array([[i * pad_size[0], j * pad_size[1], 0.0] for i in (-0.5, 0.5) for j in (-0.5, 0.5)])
+    points = np.concatenate([pose.to_object(corners) for pose in held.poses])
+    ends = points[:, 2].min() - margin, points[:, 2].max() + margin, np.abs(points[:, 1]).max() + margin
+    low, high, half = (float(np.round(v, 9)) for v in ends)  # alike for candidates that differ by rounding alone
+    return low, high, half
+
+
+def _turned(pose: Pose, angle: float) -> Pose:
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Pose(turn @ pose.rotation, turn @ pose.origin)
+
+
+def _half_turned(pose: Pose) -> Pose:
+    """The pad turned by half a turn about its approach."""
+    return Pose(pose.rotation @ HALF_TURN, pose.origin)
+
+
+def _image(pose: Pose) -> Pose:
+    """Mirror image in x = 0 of a pad that is its own image in its plane y = 0."""
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    return Pose(mirror @ pose.rotation @ np.diag([1.0, -1.0, 1.0]), mirror @ pose.origin)
+
+
+def _is_own_image(pose: Pose, tolerance: float) -> bool:
+    """Whether y = 0 of the grasp frame is the pad's own plane y = 0."""
+    return abs(abs(pose.rotation[1, 1]) - 1.0) <= ALIKE and abs(pose.origin[1]) <= tolerance

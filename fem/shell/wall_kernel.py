@@ -1,0 +1,175 @@
+"""Compiled loop over the points of a pad that press on a deformable wall.
+
+At a point with the pressure ``p = sum N_i lam_i`` the pad's node ``b`` gets ``-p dA N_b n`` and the wall's node ``a``
+gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Points that face no wall are left out
+of both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``facing``. Pad quantities are
+in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
+
+A node of the wall has unknowns ``first``, the displacement of the middle, and ``second``, the change of the director:
+both move the outer face, and so the same force works on both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from softjaw.fem.shell.facing import FAR
+
+
+@njit(cache=True)
+def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, facing, pad_force, wall_force):
+    """Weighted gaps and nodal forces of one pad.
+
+    Parameters
+    ----------
+    N, area, lam : (points, k), (faces, points), (faces, k) arrays
+        Shape functions of a face, reference areas [m^2] and nodal pressures [Pa].
+    gap, normal : (faces * points,), (faces * points, 3) arrays
+    wall_nodes, wall_N : (faces * points, 4) arrays
+    R : (3, 3) array
+    weighted, facing, pad_force : (faces, k), (faces, k), (faces, 3, k) arrays, out
+        Weighted gaps [m^3], areas ``int N_i dA`` of the part that faces the wall [m^2], forces [N].
+    wall_force : (wall nodes, 3) array, added to
+        [N].
+    """
+    points, k = N.shape
+    n = np.empty(3)
+    for f in range(area.shape[0]):
+        weighted[f] = facing[f] = 0.0
+        pad_force[f] = 0.0
+        for q in range(points):
+            m = f * points + q
+            if gap[m] == FAR:
+                continue
+            p = 0.0
+            for i in range(k):
+                weighted[f, i] += area[f, q] * N[q, i] * gap[m]
+                facing[f, i] += area[f, q] * N[q, i]
+                p += N[q, i] * lam[f, i]
+            if p == 0.0:
+                continue
+            load = p * area[f, q]
+            for c in range(3):
+                n[c] = normal[m, 0] * R[0, c] + normal[m, 1] * R[1, c] + normal[m, 2] * R[2, c]
+                for b in range(k):
+                    pad_force[f, c, b] -= load * N[q, b] * n[c]
+                for a in range(4):
+                    wall_force[wall_nodes[m, a], c] += load * wall_N[m, a] * normal[m, c]
+
+
+@njit(cache=True)
+def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wall_N, H, G, A, R, pad_dofs, pressures,
+                    first, second, start, column, values):  # fmt: skip
+    """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.
+
+    Parameters
+    ----------
+    active : (faces, k) array of bool
+        Whether a node's complementarity row is its gap.
+    kappa : float
+        Scale of pressures: unknown ``l = lam / kappa``, rows ``kappa int N_i g dA`` [Pa/m].
+    e, H, G, A : arrays
+        As in ``fem.shell.facing.Facing``.
+    pad_dofs, pressures : (faces, 3, k), (faces, k) arrays
+        Unknowns in the whole problem, -1 where fixed.
+    first, second : (wall nodes, 3) arrays
+    start, column, values : arrays
+        Compressed rows, columns ascending.
+    """
+    points, k = N.shape
+    t = 3 * k  # local order of unknowns: pad (component, node), wall first (node, component), wall second, pressures
+    M = np.zeros((t + 12 + k, t + 24 + k))
+    row_dof, column_dof = np.empty(t + 24 + k, np.int64), np.empty(t + 24 + k, np.int64)
+    D = np.empty((3, t + 24))  # change of the point relative to the wall, as far as it turns and slides what it faces
+    dn, dA = np.empty((3, t + 24)), np.empty((4, 3, t + 24))
+    complete = True
+    for f in range(area.shape[0]):
+        engaged = False
+        for i in range(k):
+            engaged = engaged or active[f, i] or lam[f, i] != 0.0
+        if not engaged:
+            continue
+        for q in range(points):
+            m = f * points + q
+            if gap[m] == FAR:
+                continue
+            p = 0.0
+            for i in range(k):
+                p += N[q, i] * lam[f, i]
+            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
+            w = area[f, q]
+            for j in range(t + 24):
+                for c in range(3):
+                    turned = R[0, c] * dn[0, j] + R[1, c] * dn[1, j] + R[2, c] * dn[2, j]
+                    for b in range(k):
+                        M[c * k + b, j] = -p * w * N[q, b] * turned
+                for a in range(4):
+                    for c in range(3):
+                        M[t + 3 * a + c, j] = p * w * dA[a, c, j]
+                slope = e[m, 0] * D[0, j] + e[m, 1] * D[1, j] + e[m, 2] * D[2, j]
+                for i in range(k):
+                    M[t + 12 + i, j] = kappa * w * N[q, i] * slope if active[f, i] else 0.0
+            for i in range(k):
+                for c in range(3):
+                    n_c = normal[m, 0] * R[0, c] + normal[m, 1] * R[1, c] + normal[m, 2] * R[2, c]
+                    for b in range(k):
+                        M[c * k + b, t + 24 + i] = -kappa * w * N[q, i] * N[q, b] * n_c
+                for a in range(4):
+                    for c in range(3):
+                        M[t + 3 * a + c, t + 24 + i] = kappa * w * N[q, i] * wall_N[m, a] * normal[m, c]
+            for i in range(k):
+                row_dof[t + 24 + i] = pressures[f, i]
+                for c in range(3):
+                    row_dof[c * k + i] = pad_dofs[f, c, i]
+            for a in range(4):
+                for c in range(3):
+                    row_dof[t + 3 * a + c] = first[wall_nodes[m, a], c]
+                    row_dof[t + 12 + 3 * a + c] = second[wall_nodes[m, a], c]
+            column_dof[:] = row_dof
+            for r in range(t + 24 + k):
+                if row_dof[r] < 0:
+                    continue
+                # what moves the outer face carries the same force
+                local = r if r < t + 12 else r - 12
+                gap_row = r >= t + 24
+                if gap_row and not active[f, r - t - 24]:
+                    continue
+                low, high = start[row_dof[r]], start[row_dof[r] + 1]
+                for j in range(t + 24 + (0 if gap_row else k)):
+                    if column_dof[j] < 0:
+                        continue
+                    place = low + np.searchsorted(column[low:high], column_dof[j])
+                    if place == high or column[place] != column_dof[j]:
+                        complete = False
+                    else:
+                        values[place] += M[local, j]
+    return complete
+
+
+@njit(cache=True)
+def _changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
+    """Changes with every local unknown: relative position ``D``, normal ``dn`` and nodal shares ``dA = d(N_a n)``."""
+    k = N.size
+    t = 3 * k
+    for c in range(3):
+        for b in range(k):
+            for d in range(3):
+                D[d, c * k + b] = R[d, c] * N[b]
+    for a in range(4):
+        for c in range(3):
+            for d in range(3):
+                D[d, t + 3 * a + c] = -wall_N[a] if c == d else 0.0
+                D[d, t + 12 + 3 * a + c] = D[d, t + 3 * a + c] - gap * wall_N[a] * G[d, c]
+    for j in range(t + 24):
+        for d in range(3):
+            dn[d, j] = H[d, 0] * D[0, j] + H[d, 1] * D[1, j] + H[d, 2] * D[2, j]
+            for a in range(4):
+                dA[a, d, j] = A[a, d, 0] * D[0, j] + A[a, d, 1] * D[1, j] + A[a, d, 2] * D[2, j]
+    for b in range(4):
+        for c in range(3):
+            j = t + 12 + 3 * b + c
+            for d in range(3):
+                dn[d, j] += wall_N[b] * G[d, c]
+                for a in range(4):
+                    dA[a, d, j] += wall_N[a] * wall_N[b] * G[d, c]

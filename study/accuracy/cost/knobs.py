@@ -1,0 +1,220 @@
+"""The knobs that trade accuracy for time, each an ordered list of settings, the cheapest first.
+
+A level is a set of values of scene keys. What a scene cannot use is left out with the reason that the scene's own
+checks give, so an effect that is added to ``[effects]`` becomes a knob without a word here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, get_args
+
+from softjaw.study.case.build import has_wall
+from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.scene import Scene
+from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.sections import Effects, WallSize
+
+HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
+HEX27 = (0.3, 0.5, 0.7, 1.0)
+WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
+TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
+STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
+OWN = ("friction", "limit_surface")  # effects with knobs of their own in study.accuracy.cost.judging
+EACH_ALONE = -1
+WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
+# Time over that of the level which is taken for granted, about; more than the unknowns tell.
+DEARER = {
+    "gripper.element": {"hex27": 1.25}, "effects.pad": {"linear": 0.2}, "effects.sheet": {"elastic": 1.3},
+    "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Level:
+    """One setting of a knob.
+
+    Parameters
+    ----------
+    name : str
+    values : tuple of pairs
+        Scene keys with dots, and their values.
+    size : float
+        What the error is a power of (an element's size, ...); NaN where no order is expected.
+    between : int
+        Forces solved between those that are wanted; `EACH_ALONE` solves each from scratch.
+    work : float
+        Expected time over that of the scene as it is, by `weight`: measured times change from run to run.
+    """
+
+    name: str
+    values: tuple[tuple[str, Any], ...] = ()
+    size: float = math.nan
+    between: int = 0
+    work: float = 1.0
+
+
+@dataclass(frozen=True)
+class Knob:
+    """Levels of one knob, the cheapest first.
+
+    ``formal`` is the highest order that an extrapolation may use; knobs of one ``family`` lead to the same limit.
+    ``own`` is the place of the scene's own setting, -1 where that is no level.
+    """
+
+    name: str
+    long_name: str
+    levels: tuple[Level, ...]
+    own: int
+    formal: float = math.nan
+    family: str = ""
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A level that is not measured, and why."""
+
+    knob: str
+    level: str
+    reason: str
+
+
+def contact_knobs(scene: Scene) -> tuple[list[Knob], list[Skipped]]:
+    """Knobs of a scene's contact solve; every level is a scene that its checks accept."""
+    made = [*_pad_meshes(scene), *_object_mesh(scene), _tolerance(scene), _steps(), _collocation(scene)]
+    made += list(_effects(scene))
+    knobs, skipped = [], []
+    for knob in made:
+        own = scene.digest
+        good: list[Level] = []
+        for level in knob.levels:
+            reason = refusal(scene, level)
+            if reason:
+                skipped.append(Skipped(knob.name, level.name, reason))
+            else:
+                good.append(replace(level, work=weight(with_level(scene, level)) / weight(scene)))
+        place = next((i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == own), -1)
+        if len(good) > 1:
+            knobs.append(Knob(knob.name, knob.long_name, tuple(good), place, knob.formal, knob.family))
+    return knobs, skipped
+
+
+def with_level(scene: Scene, *levels: Level) -> Scene:
+    """The scene, without its sweep, with the values of some levels."""
+    return scene.with_values({key: value for level in levels for key, value in level.values})
+
+
+def refusal(scene: Scene, level: Level) -> str:
+    """Why a scene cannot have a level; empty if it can."""
+    try:
+        with_level(scene, level)
+    except SceneError as error:
+        return "; ".join(f"{p.key}: found {p.found}, expected {p.expected}" for p in error.problems)
+    return ""
+
+
+def weight(scene: Scene) -> float:
+    """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
+    from softjaw.study.run.wall_cost import wall_size
+
+    times = 1.0
+    for key, levels in DEARER.items():
+        section, _, name = key.partition(".")
+        times *= levels.get(getattr(getattr(scene, section), name), 1.0)
+    if has_wall(scene.object) and scene.effects.object != "rigid" and (wall := wall_size(scene)):
+        return times * float(wall.pad + wall.shell) ** WEIGHT_POWER
+    per_side = {"hex8": 1, "hex27": 2}[scene.gripper.element]
+    return times * float(math.prod(per_side * n + 1 for n in scene.gripper.elements)) ** WEIGHT_POWER
+
+
+def _even(value: float) -> int:
+    return max(2, 2 * math.floor(value / 2 + 0.5))
+
+
+def elements(count: Sequence[int], factor: float) -> tuple[int, int, int]:
+    """So many times the elements along every side, even along length and width.
+
+    >>> elements((20, 10, 6), 0.5), elements((20, 10, 6), 1.0)
+    ((10, 6, 3), (20, 10, 6))
+    """
+    if factor == 1.0:
+        return tuple(count)
+    return (_even(factor * count[0]), _even(factor * count[1]), max(2, math.floor(factor * count[2] + 0.5)))
+
+
+def _pad_meshes(scene: Scene) -> Iterable[Knob]:
+    """Both kinds of elements; a triquadratic mesh has the nodes of a trilinear one of twice as many along a side."""
+    own, kind = scene.gripper.elements, scene.gripper.element
+    trilinear = own if kind == "hex8" else elements(own, 2.0)
+    yield _pad_mesh("pad mesh, hex8", "trilinear elements of the pad", "hex8", trilinear, HEX8, 2.0)
+    yield _pad_mesh("pad mesh, hex27", "triquadratic elements of the pad", "hex27",
+                    own if kind == "hex27" else trilinear, HEX27, 3.0)  # fmt: skip
+
+
+def _pad_mesh(
+    name: str, long_name: str, kind: str, own: Sequence[int], factors: Sequence[float], formal: float
+) -> Knob:
+    counts = sorted({elements(own, f) for f in factors}, key=math.prod)
+    levels = tuple(
+        Level(" x ".join(map(str, n)), (("gripper.elements", list(n)), ("gripper.element", kind)),
+              math.prod(n) ** (-1 / 3))
+        for n in counts
+    )  # fmt: skip
+    return Knob(name, long_name, levels, -1, formal, "pad mesh")
+
+
+def _object_mesh(scene: Scene) -> Iterable[Knob]:
+    """The wall's mesh, or the grid on which a mesh's distance is sampled; other objects are exact."""
+    if has_wall(scene.object) and scene.effects.object != "rigid":
+        least, most = WallSize.__metadata__[0].metadata[0].ge, WallSize.__metadata__[0].metadata[1].le
+        keys = ("wall_around_mm", "wall_along_mm", "wall_coarse_mm")
+        sizes = [[min(max(round(f * getattr(scene.accuracy, k), 3), least), most) for k in keys] for f in WALL]
+        levels = [
+            Level(", ".join(f"{s:g}" for s in size) + " mm",
+                  tuple((f"accuracy.{k}", s) for k, s in zip(keys, size, strict=True)), f)
+            for f, size in zip(WALL, sizes, strict=True)
+        ]  # fmt: skip
+        yield Knob("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), -1, 2.0)
+    elif scene.object.shape == "mesh":
+        own = scene.object.grid_step_mm
+        start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
+        steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
+        levels = [Level("auto" if s == "auto" else f"{s:.3g} mm", (("object.grid_step_mm", s),),
+                        start if s == "auto" else s) for s in steps]  # fmt: skip
+        yield Knob("object grid", "step of the grid on which the object's distance is sampled", tuple(levels), -1, 2.0)
+
+
+def _tolerance(scene: Scene) -> Knob:
+    own = scene.accuracy.residual_tolerance
+    key = "accuracy.residual_tolerance"
+    levels = [Level(f"{t:g}", ((key, t),)) for t in sorted({*TOLERANCES, own}, reverse=True)]
+    return Knob("solver tolerance", "residual over load at which a contact solve ends", tuple(levels), -1)
+
+
+def _steps() -> Knob:
+    levels = (
+        Level("one after the other"), Level("each from scratch", between=EACH_ALONE), Level("1 between", between=1),
+        Level("3 between", between=3),
+    )  # fmt: skip
+    return Knob("load steps", "forces solved on the way to each force", levels, -1)
+
+
+def _collocation(scene: Scene) -> Knob:
+    levels = tuple(Level(rule, (("accuracy.contact", rule),)) for rule in ("nodal", "weighted"))
+    return Knob("gap collocation", "gaps that vanish at nodes, or on average round them", levels, -1, family="pad mesh")
+
+
+def _effects(scene: Scene) -> Iterable[Knob]:
+    """One knob for every effect with levels to choose from, in the order of `study.result.quantities.EFFECTS`."""
+    for name, field in Effects.model_fields.items():
+        levels = [level for level in get_args(field.annotation) if level != "auto"]
+        if name in OWN or len(levels) < 2 or (name == "object" and not has_wall(scene.object)):
+            continue
+        order = [text.split()[0] for text in EFFECTS.get(name, ())]
+        ranked = sorted(levels, key=lambda v: order.index(v.split("_")[0]) if v.split("_")[0] in order else len(order))
+        if name == "object":  # chosen for every candidate, at most the finest
+            ranked.insert(-1, "auto")
+        steps = [Level(v.replace("_", " "), ((f"effects.{name}", v),)) for v in ranked]
+        yield Knob(f"effect: {name.replace('_', ' ')}", "level of the effect", tuple(steps), -1)

@@ -1,0 +1,192 @@
+"""A cost study: what is measured in which order, within a limit of time, going on where an earlier one stopped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.study.accuracy.cost.errors import KnobErrors, tables
+from softjaw.study.accuracy.cost.file import CostStudy, save
+from softjaw.study.accuracy.cost.knobs import EACH_ALONE, Knob, Level, Skipped, contact_knobs, weight, with_level
+from softjaw.study.accuracy.cost.levels import expected_seconds, judging_knobs
+from softjaw.study.accuracy.cost.measure import calibration_seconds, measure, warm_up
+from softjaw.study.result import provenance
+from softjaw.study.run.progress import duration
+from softjaw.study.scene import Scene
+
+if TYPE_CHECKING:
+    from softjaw.study.accuracy.cost.probes import Probe
+
+FIRST_GUESS = 2e-8  # seconds of one force over `weight`, before anything is measured
+
+
+@dataclass(frozen=True)
+class Task:
+    """A setting to be measured on every probe; a knob of the contact has a ``level``, others have not."""
+
+    knob: str
+    name: str
+    setting: str
+    level: Level | None
+    weight: float
+
+
+def plain(scene: Scene) -> Scene:
+    """The scene without its sweep and its target: what the settings are compared with."""
+    return scene.with_values({"accuracy.e_n": None, "accuracy.cost_file": None})
+
+
+def setting_of(scene: Scene, level: Level) -> str:
+    """What tells a level's setting from others: the values by which it differs from the scene."""
+    changed = {key: value for key, value in level.values if not same(value, value_of(scene, key))}
+    between = {"between": level.between} if level.between else {}
+    return json.dumps(changed | between, sort_keys=True)
+
+
+def value_of(scene: Scene, key: str) -> Any:
+    """Value of a dotted key of a scene."""
+    section, _, name = key.partition(".")
+    return getattr(getattr(scene, section), name)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values of a key are the same; lists and tuples are alike."""
+    plain_values = [tuple(v) if isinstance(v, list | tuple) else v for v in (one, other)]
+    return plain_values[0] == plain_values[1]
+
+
+BASE = "{}"  # the setting of the scene as it is
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The knobs of a scene and how their settings are called."""
+
+    scene: Scene
+    knobs: tuple[Knob, ...]
+    skipped: tuple[Skipped, ...]
+    judging: dict[str, list[str]]
+
+    @cached_property
+    def settings(self) -> dict[tuple[str, str], str]:
+        """Settings by knob and level."""
+        return {(k.name, v.name): setting_of(self.scene, v) for k in self.knobs for v in k.levels}
+
+    @cached_property
+    def tasks(self) -> list[Task]:
+        """Everything to be measured, each setting once, the scene's own first."""
+        found: dict[str, Task] = {}
+        base = Level("as in the scene")
+        for knob, level in [("", base), *((k.name, v) for k in self.knobs for v in k.levels)]:
+            setting = setting_of(self.scene, level)
+            load = weight(with_level(self.scene, level)) * {0: 1, EACH_ALONE: 1.5}.get(level.between, level.between)
+            found.setdefault(setting, Task(knob, level.name, setting, level, load))
+        for name, levels in self.judging.items():
+            found |= {f"{name}: {v}": Task(name, v, f"{name}: {v}", None, np.nan) for v in levels}
+        return list(found.values())
+
+    def errors(self, study: CostStudy) -> list[KnobErrors]:
+        """What a study says of every knob."""
+        return tables(study, self.knobs, self.settings, self.judging)
+
+
+def costs(scene: Scene, with_judging: bool = True) -> Costs:
+    """The knobs of a scene."""
+    own = plain(scene)
+    knobs, skipped = contact_knobs(own)
+    return Costs(own, tuple(knobs), tuple(skipped), judging_knobs(own) if with_judging else {})
+
+
+def new_study(scene: Scene, found: Sequence[Probe], title: str, scene_file: str) -> CostStudy:
+    """An empty study of a scene on this machine."""
+    own = plain(scene)
+    machine = f"{provenance.cpu()}, {provenance.program()}"
+    return CostStudy(
+        own.effective_toml(), own.digest, title, scene_file, BASE, [p.label for p in found], np.nan, machine
+    )
+
+
+class Measuring:
+    """Measures what is missing in a study, the cheapest first, and saves after each."""
+
+    def __init__(self, study: CostStudy, found: Sequence[Probe], what: Costs, path: Path | None,
+                 say: Callable[[str], None]) -> None:  # fmt: skip
+        self.study, self.probes, self.costs, self.path, self.say = study, found, what, path, say
+        self._contacts: list[Any] = []
+
+    def run(self, seconds: float) -> None:
+        """Measure until everything is there or would take the study beyond so many CPU seconds."""
+        todo = [task for task in self.costs.tasks if not self.study.has(task.setting)]
+        self.study.skipped = list(self.costs.skipped)
+        if todo:
+            warm_up(self.probes[0])
+        if np.isnan(self.study.calibration):
+            self.study.calibration = calibration_seconds()
+        while todo:
+            base = [task for task in todo if task.setting == self.study.base]
+            task = base[0] if base else min(todo, key=self.expected)
+            if not base and self.study.spent + self.expected(task) > seconds:
+                break
+            todo.remove(task)
+            self._measure(task)
+        self.study.skipped += [Skipped(t.knob, t.name, self._too_long(t)) for t in todo]
+        self._save()
+
+    def expected(self, task: Task) -> float:
+        """CPU time that a task will take, by the measured level of its knob that is nearest to it [s]."""
+        cases = sum(len(p.forces) for p in self.probes)
+        if task.level is None:
+            return expected_seconds(task.knob, task.name) * cases
+        known = [t for t in self.costs.tasks if t.level is not None and self.study.has(t.setting)]
+        alike = [t for t in known if t.knob == task.knob] or [t for t in known if t.setting == self.study.base]
+        if not alike:
+            return FIRST_GUESS * task.weight * cases
+        near = min(alike, key=lambda t: abs(np.log(t.weight / task.weight)))
+        measured = np.mean([m.seconds for m in self.study.of(near.setting)])
+        return float(measured * task.weight / near.weight * cases)
+
+    def _too_long(self, task: Task) -> str:
+        return f"would take about {duration(self.expected(task))}; raise --time-limit"
+
+    def _measure(self, task: Task) -> None:
+        for i, probe in enumerate(self.probes):
+            if (task.setting, probe.label) in self.study.measured:
+                continue
+            if task.level is not None:
+                found = replace(measure(task.setting, probe, task.level), what=task.name)
+            else:
+                contacts = self._solved()
+                if len(contacts) < len(self.probes):
+                    return
+                from softjaw.study.accuracy.cost.judging import judge
+
+                found = judge(contacts[i], task.knob, task.name)
+            self.study.add(found)
+            self._save()
+        own = self.study.of(task.setting)
+        failed = sum(bool(m.message) for m in own)
+        told = f", {failed} of {len(own)} candidates failed" if failed else ""
+        knob = f"{task.knob}: " if task.knob else ""
+        self.say(f"{knob}{task.name}: {np.mean([m.seconds for m in own]):.3g} s per case{told}")
+
+    def _solved(self) -> list[Any]:
+        """Contacts of all probes at the scene's own settings, solved once; of none where one fails."""
+        from softjaw.study.accuracy.cost.judging import solved
+
+        if not self._contacts:
+            try:
+                self._contacts = [solved(p) for p in self.probes]
+            except (ConvergenceError, CheckError) as error:
+                self.say(f"friction, limit surfaces and scores are not measured: {error}")
+        return self._contacts
+
+    def _save(self) -> None:
+        if self.path is not None:
+            save(self.path, self.study)

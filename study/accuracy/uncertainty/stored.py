@@ -1,0 +1,162 @@
+"""Bands in a result file: what they are, and how they follow from the cases and the probes once all are solved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.accuracy.uncertainty import carrying
+from softjaw.study.case.sweep import axes
+from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.scene import Scene
+from softjaw.study.show.tables.ranking import LOST
+
+if TYPE_CHECKING:
+    from softjaw.study.result.store import ResultWriter
+
+FloatArray = NDArray[np.float64]
+NAMES = {"e_n": "m", "quality": ""}
+SIGNED = ("mu", "modulus")
+WORDS = {
+    "mesh": "the mesh (the difference to one with half as many elements per direction; the error is usually smaller)",
+    "mu": "mu", "modulus": "the shear modulus", "wall": "the thickness of the wall", "pose": "the gripper's pose",
+}  # fmt: skip
+RULES = {
+    "mesh": "Carried from the probes: twice the root mean square over probes and forces of change x contact area, over"
+            " the contact area of the case.",
+    "map": "The map of the error.",
+    "mu": "In closed form: e_n does not depend on mu; half the difference between the qualities with mu + and - its"
+          " half-width, which goes with mu^5 where the contacts face each other and is scored again elsewhere.",
+    "modulus": "In closed form: the state depends on force over modulus only, so it is minus the slope of ln(value)"
+               " over ln(force) times the half-width.",
+    "pose": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
+            " larger); at least the map's own slope along the stations times the shift, where the pads lie along it.",
+    "probes": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
+              " larger).",
+}  # fmt: skip
+
+
+def band(name: str) -> str:
+    """Name of the dataset with the half-widths of a quantity."""
+    return f"{name}_band"
+
+
+def part(name: str, of: str, signed: bool) -> str:
+    """Name of the dataset with one part of them, relative: with a sign where it is known at every case."""
+    return f"{name}_change_{of}" if signed else f"{name}_band_{of}"
+
+
+def derived(scene: Scene) -> list[Derived]:
+    """Bands and their parts, where the scene asks for them."""
+    own = scene.uncertainty
+    if not own.parts:
+        return []
+    known, over = _by_formula(scene), tuple(axis.name for axis in axes(scene))
+    made = []
+    for name, units in NAMES.items():
+        text = (
+            f"Half-width around {name} (curved) within which about 95 of 100 cases lie: root of the sum of squares of"
+            f" the parts {', '.join(own.parts)}, times the value."
+        )
+        made.append(Derived(band(name), units, f"half-width of the band of {name}", text, over))
+        for of in own.parts:
+            signed = of in SIGNED and of in known
+            rule = RULES[_rule(of, known)]
+            text = f"Relative change of {name} (curved) by {WORDS[of]}"
+            text += ", positive where it grows with it. " if signed else ", without sign. "
+            made.append(Derived(part(name, of, signed), "", f"part of {of} in the band of {name}", text + rule, over))
+    return made
+
+
+def _by_formula(scene: Scene) -> tuple[str, ...]:
+    from softjaw.study.accuracy.uncertainty.variations import by_formula
+
+    return by_formula(scene)
+
+
+def _rule(of: str, known: tuple[str, ...]) -> str:
+    if of == "mesh":
+        return "map" if of in known else "mesh"
+    return of if of in known or of == "pose" else "probes"
+
+
+def finalise(writer: ResultWriter, scene: Scene) -> None:
+    """Fill the bands, by one rank, after all cases."""
+    own = scene.uncertainty
+    if not own.parts:
+        return
+    known = _by_formula(scene)
+    for name in NAMES:
+        values = _done(writer, f"{name}/curved")
+        total = np.zeros(values.shape)
+        for of in own.parts:
+            share = _share(writer, scene, name, values, of, known)
+            share = np.where(np.isfinite(values), share, np.nan)
+            writer.write_derived(part(name, of, of in SIGNED and of in known), share)
+            total += share**2
+        writer.write_derived(band(name), np.sqrt(total) * np.abs(values))
+
+
+def _done(writer: ResultWriter, path: str) -> FloatArray:
+    """A map, NaN where a case is not solved."""
+    return np.where(writer.codes().reshape(writer.layout.shape) == DONE, writer.read(path), np.nan)
+
+
+def _share(
+    writer: ResultWriter, scene: Scene, name: str, values: FloatArray, of: str, known: tuple[str, ...]
+) -> FloatArray:
+    """One part of a band, relative, of every case."""
+    own = scene.uncertainty
+    if of not in known:
+        return _from_probes(writer, scene, name, values, of)
+    if of == "mesh":
+        return _done(writer, f"{name}_error/{name}_error")
+    if of == "modulus":
+        force = np.asarray(scene.load.normal_force)
+        return carrying.change_by_modulus(force, values, own.shear_modulus_percent / 100)
+    if name == "e_n":
+        return np.zeros(values.shape)
+    from softjaw.study.accuracy.uncertainty.rescoring import change_by_mu
+
+    return change_by_mu(writer.result(), scene, values)
+
+
+def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArray, of: str) -> FloatArray:
+    """What the further solves of the probes say of every case."""
+    from softjaw.study.accuracy.uncertainty.variations import variations
+
+    layout, solves = writer.layout, variations(scene)
+    mine = [i for i, v in enumerate(solves) if v.part == of]
+    flat = values.reshape(-1, values.shape[-1])
+    at = list(layout.probes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        changes = (
+            writer.read(f"probes/{name}").reshape(len(at), flat.shape[-1], -1)[..., mine] / flat[at][..., None] - 1
+        )
+    change = carrying.largest_side(changes, [solves[i].pair for i in mine])
+    sound = _sound(writer, at, change)
+    if of == "mesh":
+        area = _done(writer, "contact_area/contact_area").reshape(flat.shape)
+        share = carrying.carried(sound, area[at], area)
+    else:
+        share = carrying.carried_by_force(sound, flat.shape)
+    if of == "pose":
+        share = np.fmax(share, _slope(scene, values).reshape(flat.shape))
+    return carrying.at_least_own(share, change, layout.probes, flat).reshape(values.shape)
+
+
+def _slope(scene: Scene, values: FloatArray) -> FloatArray:
+    """Change by the shift that neighbouring stations show; 0 where there are none in the direction of the shift."""
+    where = scene.candidates
+    if where.poses or where.roll or len(where.station_values) < 2:
+        return np.zeros(values.shape)
+    return carrying.change_along(np.array(where.station_values), values, scene.uncertainty.pose)
+
+
+def _sound(writer: ResultWriter, at: list[int], change: FloatArray) -> FloatArray:
+    """Changes of the probes but of those that fail in the hand, unless all do."""
+    flags: Any = np.nan_to_num(writer.read("flags/flags").reshape(-1, change.shape[-1])[at]).astype(int)
+    sound = np.where(flags & LOST, np.nan, change)
+    return sound if np.isfinite(sound).any() else change

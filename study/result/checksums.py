@@ -1,0 +1,164 @@
+"""Checksums (CRC-32) of a result file: what each covers, how it is made, and what does not match.
+
+HDF5 has checksums of its own (fletcher32), but ranks cannot write to such datasets independently of each other ("Can't
+perform independent write with filters in pipeline"). So the rows carry these, and readers compare them before they
+believe a value. One covers one *part* of a row (its maps, its fingers, its patch, ...): who wants little reads little.
+A state has one of its own: a case whose state was lost is not taken for one that was never solved.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.result.datasets import CLOSING, MISSING, STATE, SUMS, Column
+from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.layout import DONE, FAILED, ROOT, Layout
+
+BLOCK = 2**24  # bytes of rows that are put side by side at a time
+OF_STATE = {state: zlib.crc32(bytes([state])) for state in (MISSING, DONE, FAILED)}
+ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
+
+
+def of_array(values: Any) -> int:
+    """Checksum of the bytes of an array."""
+    return zlib.crc32(np.ascontiguousarray(values).tobytes())
+
+
+def of_parts(layout: Layout, row: int, values: Sequence[np.ndarray]) -> dict[str, int]:
+    """Checksum of every part of a row; ``values`` as from ``study.result.record.record``."""
+    places = layout.places(row)
+
+    def data(i: int) -> bytes:
+        return b"" if places[i] is None else np.asarray(values[i], layout.columns[i].dtype).tobytes()
+
+    return {part: zlib.crc32(b"".join(map(data, columns))) for part, columns in layout.parts.items()}
+
+
+def sums_of(file: GuardedFile, layout: Layout, part: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the ``rows`` that have a part, and the checksums of the values that stand there."""
+    columns = [layout.columns[i] for i in layout.parts[part]]
+    if columns[0].among:
+        rows = rows[_lines(layout, columns[0], rows) >= 0]
+    if not rows.size:
+        return rows, np.empty(0, np.uint32)
+    views = [(_bytes(file, layout, c), c) for c in columns]
+    step = max(BLOCK // max(sum(view.shape[1] for view, _ in views), 1), 1)
+    found: list[int] = []
+    for some in (rows[start : start + step] for start in range(0, len(rows), step)):
+        block = np.concatenate([view[_lines(layout, c, some)] for view, c in views], axis=1)
+        found += [zlib.crc32(line) for line in block]
+    return rows, np.array(found, np.uint32)
+
+
+def broken_rows(file: GuardedFile, layout: Layout, part: str, rows: np.ndarray) -> np.ndarray:
+    """Those of the ``rows`` whose values of a part do not match their checksum."""
+    rows, found = sums_of(file, layout, part, rows)
+    return rows[found != _sums(file, layout, part)[rows]]
+
+
+def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_way: bool) -> np.ndarray:
+    """Rows whose state is not the one that was stored.
+
+    Where a run is ``under_way``, or was killed, a row may be stored and not yet marked; nowhere else.
+    """
+    stored = _sums(file, layout, STATE)
+    wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
+    if under_way and wrong.any():
+        begun = file.values(file.checked(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"))).ravel() > 0
+        wrong &= ~(begun & (codes == MISSING) & np.isin(stored, [OF_STATE[DONE], OF_STATE[FAILED]]))
+    return np.flatnonzero(wrong)
+
+
+def of_session(session: np.void) -> int:
+    """Checksum of a row of the provenance, without the checksum that it holds."""
+    return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names if name != "crc"))
+
+
+def of_header(file: GuardedFile, layout: Layout) -> int:
+    """Checksum of what is written once, when the file is made: axes, options, scene, definitions, labels."""
+    axes = [f"axes/{name}" for name in layout.names]
+    study = file.attributes(ROOT)
+    told = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
+    for name in ("scene", *axes):
+        found = file.attributes(f"{ROOT}/{name}")
+        told.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+    crc = zlib.crc32(repr(told).encode())
+    arrays = ["scene", "definitions", "candidates/label", *axes]
+    arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)
+    for name in (*arrays, *["probes/candidate"] * bool(layout.probes)):
+        crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
+    return crc
+
+
+def closing_sum(file: GuardedFile, layout: Layout, name: str) -> int:
+    """The stored checksum of something that is filled after all rows, by its name in ``layout.closing``."""
+    found = file.checked(f"{SUMS}/{CLOSING}", (len(layout.closing),), np.dtype("<u4"))
+    return int(file.values(found)[layout.closing.index(name)])
+
+
+def rows_of(file: GuardedFile, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
+    """Every row that is done or failed: number, state, and values, or None where they do not match their checksums.
+
+    A state that does not match its own checksum is the one that the checksum is of.
+    """
+    found = {d.path: file.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
+    views = [_mapped(file, found[c.path], c.dtype) for c in layout.columns]
+    codes = file.values(found[f"{ROOT}/status/code"]).ravel()
+    sums = {part: _sums(file, layout, part) for part in layout.parts} if layout.version > 3 else {}
+    whole = None if sums else file.values(found[f"{ROOT}/status/crc"]).ravel()
+    if sums:
+        state = _sums(file, layout, STATE)
+        codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
+    for row in np.flatnonzero(codes != MISSING):
+        pairs = zip(views, layout.places(row), strict=True)
+        values = [None if place is None else view[place] for view, place in pairs]
+        if whole is not None:
+            good = _of_whole(layout, values) == whole[row]
+        else:
+            own = of_parts(layout, row, values)
+            good = all(own[part] == stored[row] for part, stored in sums.items())
+        yield int(row), int(codes[row]), values if good else None
+
+
+def _of_whole(layout: Layout, values: Sequence[Any]) -> int:
+    """Checksum of a row in a file of version 3: all of it but its timings."""
+    pairs = zip(layout.columns, values, strict=True)
+    counted = (np.asarray(v, c.dtype) for c, v in pairs if v is not None and not c.key.startswith("work/"))
+    return zlib.crc32(b"".join(v.tobytes() for v in counted))
+
+
+def _sums(file: GuardedFile, layout: Layout, part: str) -> np.ndarray:
+    return file.values(file.checked(f"{SUMS}/{part}", layout.shape, np.dtype("<u4"))).ravel()
+
+
+def _bytes(file: GuardedFile, layout: Layout, column: Column) -> np.ndarray:
+    """A column's dataset as bytes, one line for every row that has a value in it."""
+    found = layout.dataset(column.path)
+    values = np.ascontiguousarray(file.values(file.checked(found.path, found.shape, found.dtype)))
+    size = int(np.prod(column.shape, dtype=int)) * column.dtype.itemsize
+    return values.reshape(-1).view(np.uint8).reshape(-1, size) if size else np.empty((layout.rows, 0), np.uint8)
+
+
+def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
+    """Lines of `_bytes` in which rows stand; -1 where they have none."""
+    if not column.among:
+        return rows
+    index = np.unravel_index(rows, layout.shape)
+    chosen = layout.chosen[column.among]
+    slots = np.full(int(np.prod(layout.shape[-3:-1])), -1)
+    slots[list(chosen)] = np.arange(len(chosen))
+    slot = slots[index[-3] * layout.shape[-2] + index[-2]]
+    lead = (*layout.shape[:-3], len(chosen), layout.shape[-1])
+    lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)
+    return np.where(slot < 0, -1, lines)
+
+
+def _mapped(file: GuardedFile, dataset: Any, dtype: np.dtype) -> np.ndarray:
+    """A dataset's values, which are read when they are asked for, unless it was repacked."""
+    if dataset.chunks or not dataset.size:
+        return file.values(dataset).astype(dtype)
+    return np.memmap(file.path, dtype, "r", dataset.id.get_offset(), dataset.shape)

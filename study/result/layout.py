@@ -1,0 +1,260 @@
+"""What stands where in a result file, as plain data: groups, datasets, attributes and the columns of a row.
+
+The same description creates a file, checks a file that is resumed and bounds what is read from a file of unknown
+origin. A *row* is one case: its flat index over all axes, the last axis (normal force) running fastest.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.result.datasets import CLOSING, MESSAGE, MESSAGE_3, Column, Dataset, columns_of, datasets_of
+from softjaw.study.result.datasets import MISSING as MISSING
+from softjaw.study.result.datasets import ROOT as ROOT
+from softjaw.study.result.finger_quantities import PATCH
+from softjaw.study.result.grid import grid_datasets
+from softjaw.study.result.quantities import definitions, quantities
+from softjaw.study.result.quantity import FINGERS, MODELS, NEEDS, Quantity
+from softjaw.study.result.wall_quantities import ALONG, AROUND
+
+PROGRAM, VERSION = "softjaw", 4
+READABLE = (3, 4)  # 3 has one checksum for a whole row, and none of its state, its timings and what is not in rows
+DONE, FAILED = 1, 2
+LABEL, SESSIONS, REPORT = 80, 256, 8192
+SESSION_3 = np.dtype(
+    [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
+     ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
+     ("command", "S400"), ("petsc_options", "S400")]
+)  # fmt: skip
+SESSION = np.dtype([*((name, SESSION_3[name]) for name in SESSION_3.names or ()), ("crc", "<u4")])
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
+
+    ``surface`` is the object as `study.result.grid.Surface`, None where the file shows none.
+    """
+
+    digest: str
+    scene: str
+    title: str = ""
+    scene_file: str = ""
+    overrides: tuple[str, ...] = ()
+    petsc_options: str = ""
+    labels: tuple[str, ...] = ()
+    surface: Any = None
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A dataset that is filled once, after all rows: over some of the axes, with an optional trailing shape."""
+
+    name: str
+    units: str
+    long_name: str
+    definition: str
+    axes: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
+
+    ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
+    for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
+    candidates ``probes``. ``surface`` counts the points and triangles of the
+    object, ``front`` the faces along and across a pad, as `study.result.grid` shows them; zeros where it does not.
+    """
+
+    axes: tuple[Any, ...]
+    faces: int
+    meshes: int = 1
+    patches: bool = True
+    derived: tuple[Derived, ...] = ()
+    cor_grid: int = 0
+    planar: str = "flat"
+    has: tuple[str, ...] = ()
+    samples: int = 0
+    sampled: tuple[int, ...] = ()
+    surface: tuple[int, int] = (0, 0)
+    front: tuple[int, int] = (0, 0)
+    probes: tuple[int, ...] = ()
+    variations: tuple[str, ...] = ()
+    version: int = VERSION
+
+    @property
+    def message(self) -> int:
+        """Bytes of a message."""
+        return MESSAGE if self.version > 3 else MESSAGE_3
+
+    @property
+    def session(self) -> np.dtype:
+        """Type of a row of the provenance."""
+        return SESSION if self.version > 3 else SESSION_3
+
+    @cached_property
+    def parts(self) -> dict[str, tuple[int, ...]]:
+        """Parts of a row that have a checksum, and the positions of their columns."""
+        names = dict.fromkeys(column.part for column in self.columns)
+        return {name: tuple(i for i, c in enumerate(self.columns) if c.part == name) for name in names}
+
+    @property
+    def closing(self) -> tuple[str, ...]:
+        """What is filled after all rows and has a checksum, by its dataset's name below ``/study``."""
+        return (*(f"derived/{d.name}" for d in self.derived), "report")
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Length of every axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All per-case quantities of this file but the patch."""
+        has = (*self.has, *[NEEDS[0]] * (self.meshes > 1))
+        return quantities(has, self.cor_grid, self.samples if self.sampled else 0, self.variations)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Friction models in the order they are shown: curved, the planar one that the scene prefers, the other."""
+        return tuple(dict.fromkeys((MODELS[0], self.planar, *MODELS)))
+
+    @property
+    def rows(self) -> int:
+        """Number of cases."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the axes in the file; NeXus allows no dot in a name, the keys of a sweep have one."""
+        return tuple(axis.name.replace(".", "_") for axis in self.axes)
+
+    @cached_property
+    def shown(self) -> tuple[int, ...]:
+        """Positions of the one or two axes that viewers show first: stations and angles, or else what has values."""
+        order = sorted(range(len(self.shape)), key=lambda i: (self.names[i] != "station", self.names[i] != "angle", i))
+        return tuple([i for i in order if self.shape[i] > 1][:2]) or (len(self.shape) - 1,)
+
+    @property
+    def seen(self) -> tuple[int, ...]:
+        """Order of the axes in ``/study/map``: many viewers show the last two and let the others be chosen."""
+        others = [i for i in reversed(range(len(self.shape))) if i not in self.shown]
+        return (*others, *reversed(self.shown))
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
+        parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": 15, "session": SESSIONS}
+        parts |= {"component_2": 3, **({"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {})}
+        if self.cor_grid:
+            parts["cor"] = self.cor_grid**2
+        if NEEDS[3] in self.has:
+            parts["wall_place"] = AROUND * ALONG
+        if self.sampled:
+            parts |= {"sampled": len(self.sampled), "sample": self.samples}
+        if self.probes:
+            parts |= {"probe": len(self.probes), "variation": len(self.variations)}
+        if self.version > 3:
+            parts[CLOSING] = len(self.closing)
+        return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """All columns of a row, in the order of the checksums."""
+        return tuple(columns_of(self))
+
+    @cached_property
+    def datasets(self) -> tuple[Dataset, ...]:
+        """All datasets of the study but axes, texts and sessions."""
+        return tuple(datasets_of(self))
+
+    def dataset(self, path: str) -> Dataset:
+        """The dataset at a path of `datasets`."""
+        return self._by_path[path]
+
+    @cached_property
+    def _by_path(self) -> dict[str, Dataset]:
+        return {d.path: d for d in self.datasets}
+
+    @cached_property
+    def grid(self) -> tuple[Dataset, ...]:
+        """All datasets of the grid that ParaView opens."""
+        return tuple(grid_datasets(self))
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the file, rounded up generously for what HDF5 adds."""
+        datasets = (*self.datasets, *self.grid)
+        count = len(datasets) + len(self.axes) + 16
+        return sum(d.nbytes for d in datasets) + SESSIONS * self.session.itemsize + REPORT + 4096 * count + 2**16
+
+    @property
+    def chosen(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of the candidates that some quantities are stored for alone."""
+        return {"sampled": self.sampled, "probe": self.probes}
+
+    @cached_property
+    def _slots(self) -> dict[str, dict[int, int]]:
+        return {name: {number: slot for slot, number in enumerate(own)} for name, own in self.chosen.items()}
+
+    def places(self, row: int) -> list[tuple[int, ...] | None]:
+        """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
+        index = tuple(int(i) for i in np.unravel_index(row, self.shape))
+        number = index[-3] * self.shape[-2] + index[-2]
+        slots = {name: own.get(number) for name, own in self._slots.items()}
+        among = {name: None if slot is None else (*index[:-3], slot, index[-1]) for name, slot in slots.items()}
+        return [(row,) if c.flat else among[c.among] if c.among else index for c in self.columns]
+
+    def definitions(self) -> str:
+        """The definitions of all quantities of this layout, derived ones included."""
+        derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in self.derived]
+        return definitions((*self.quantities, *PATCH)) + "".join(derived)
+
+    def options(self) -> str:
+        """The part of the layout that the axes do not tell, as JSON."""
+        derived = [asdict(d) for d in self.derived]
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface", "front",
+                 "probes", "variations")  # fmt: skip
+        return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
+
+
+def layout_from_options(axes: Sequence[Any], text: str, version: int = VERSION) -> Layout:
+    """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
+    try:
+        options = json.loads(text)
+        derived = tuple(
+            Derived(**{**d, "axes": tuple(d["axes"]), "shape": tuple(map(int, d["shape"]))}) for d in options["derived"]
+        )
+        faces, meshes = int(options["faces"]), int(options["meshes"])
+        if not 0 <= faces < 10**7:
+            raise ValueError(f"{faces} faces")
+        cor_grid, planar = int(options["cor_grid"]), options["planar"]
+        if not 0 <= cor_grid <= 1000 or planar not in MODELS[1:]:
+            raise ValueError(f"cor_grid {cor_grid}, planar {planar!r}")
+        has, sampled, samples = tuple(options["has"]), tuple(map(int, options["sampled"])), int(options["samples"])
+        if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
+            raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
+        patches = bool(options["patches"])
+        surface, front = (_pair(options.get(name, (0, 0))) for name in ("surface", "front"))
+        probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
+        if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
+            raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
+                      front, probes, variations, version)  # fmt: skip
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"its layout attribute is damaged ({error})") from error
+
+
+def _pair(given: Sequence[int]) -> tuple[int, int]:
+    first, second = map(int, given)
+    if not 0 <= min(first, second) <= max(first, second) < 10**8:
+        raise ValueError(f"a grid of {first}, {second}")
+    return first, second

@@ -1,0 +1,275 @@
+"""Read access to a result file: maps, fingers, checks, patches, texts. Needs neither MPI nor PETSc."""
+
+from __future__ import annotations
+
+import time
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.result import checksums
+from softjaw.study.result.guarded import text_of
+from softjaw.study.result.layout import FAILED, LABEL, MISSING, PROGRAM, READABLE, ROOT, SESSIONS, layout_from_options
+from softjaw.study.run.lock import holder
+
+BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
+
+
+class StoredAxis(NamedTuple):
+    """One axis of the maps, as read from a file."""
+
+    name: str
+    values: np.ndarray
+    units: str
+    long_name: str
+
+
+class Result:
+    """A result file, opened by ``study.result.store.open_result``; every dataset is checked before it is read.
+
+    ``axes`` lists the axes of all maps: sweeps first, then station, angle and normal force; ``layout`` is the
+    layout that follows from them. Rows are flat indices over the axes. What does not match its checksum is refused,
+    unless the result is read ``unchecked``, as a repair has to.
+    """
+
+    def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
+        self.path, self.file = path, file
+        root, study = file.attributes(), file.attributes(ROOT)
+        if root.get("program") != PROGRAM:
+            raise ValueError("it does not name its program")
+        self.version = root.get("layout_version", "")
+        if self.version not in map(str, READABLE):
+            known = " and ".join(map(str, READABLE))
+            raise ValueError(f"its layout has version {self.version or 'none'}, this program reads {known}")
+        self.axes = tuple(self._axis(text_of(name)) for name in study["axes"])
+        self.layout = layout_from_options(self.axes, study["options"], int(self.version))
+        if len(self.axes) < 3 or min(self.layout.shape) < 1:
+            raise ValueError("its axes are not those of a study")
+        self.title = str(study.get("title", ""))
+        self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
+        self._known = {d.path: d for d in self.layout.datasets}
+        self._part = {column.path: column.part for column in self.layout.columns}
+        self._trusted: set[str] = set(self.layout.parts) if unchecked else set()
+        self._unchecked = unchecked
+        self._summed = self.layout.version > 3 and not unchecked
+        if self._summed and not self.header_good:
+            raise self._damaged("axes, scene or definitions do not match their checksum")
+
+    def __enter__(self) -> Result:
+        """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
+        self._quiet = np.errstate(all="ignore")
+        self._quiet.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        """Close the file."""
+        self._quiet.__exit__(*error)
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+
+    def read(self, path: str) -> np.ndarray:
+        """A dataset of the layout below ``/study``, for example ``checks/tension`` or ``e_n/flat``."""
+        dataset = self._checked(path)
+        self._compare(self._part.get(f"{ROOT}/{path}", ""))
+        return self._believable(path, self.file.values(dataset))
+
+    def map(self, name: str, model: str | None = None) -> np.ndarray:
+        """One map over all axes; ``model`` where there is one value for each friction model."""
+        return self.read(f"{name}/{model or name}")
+
+    def fingers(self, name: str) -> np.ndarray:
+        """A quantity of each finger: axes, finger, then models or components."""
+        return self.read(f"fingers/{name}")
+
+    def checks(self, name: str) -> np.ndarray:
+        """A check of each finger's contact solution: axes, finger."""
+        return self.read(f"checks/{name}")
+
+    def work(self, name: str) -> np.ndarray:
+        """Iterations (axes, finger) or seconds (axes)."""
+        return self.read(f"work/{name}")
+
+    def effects(self, name: str) -> dict[str, np.ndarray]:
+        """Level, indicator and reason of an effect, each over all axes."""
+        return {part: self.read(f"effects/{name}_{part}") for part in ("level", "indicator", "reason")}
+
+    def patch(self, row: int) -> dict[str, np.ndarray]:
+        """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
+        names = [path.rpartition("/")[2] for path in self._known if path.startswith(f"{ROOT}/patch/")]
+        found = {name: self.file.values(self._checked(f"patch/{name}"), row) for name in names}
+        if not self._summed:
+            self._compare("patch")
+        elif self.status.flat[row] != MISSING:
+            index = np.unravel_index(row, self.layout.shape)
+            stored = self.file.values(self._checked("checksums/patch"), index)
+            if checksums.of_array(b"".join(values.tobytes() for values in found.values())) != stored:
+                raise self._damaged(f"the patch of case {row} does not match its checksum")
+        return found
+
+    def derived(self, name: str) -> np.ndarray:
+        """A dataset that was filled after all rows."""
+        return self._believable(f"derived/{name}", self._closing(f"derived/{name}"))
+
+    def row(self, *index: int) -> int:
+        """Flat row of a case from its index along each axis."""
+        return int(np.ravel_multi_index(index, self.layout.shape))
+
+    @cached_property
+    def status(self) -> np.ndarray:
+        """State of every case when it was read first: 0 missing, 1 done, 2 failed."""
+        codes = self.codes
+        if codes.max() > FAILED:
+            raise self._damaged(f"a case has the state {codes.max()}, which does not exist")
+        if self._summed:
+            under_way = self.killed or bool(holder(self.path))
+            wrong = checksums.broken_states(self.file, self.layout, codes.ravel(), under_way)
+            self._refuse(self._still(wrong, codes), "the state")
+        return codes
+
+    @property
+    def codes(self) -> np.ndarray:
+        """State of every case as the file has it now, whether it is right or wrong."""
+        return self.file.values(self._checked("status/code"))
+
+    @property
+    def messages(self) -> np.ndarray:
+        """Message of every case that is not missing, as text."""
+        return np.where(self.status == MISSING, "", _texts(self.read("status/message")))
+
+    @property
+    def scene(self) -> str:
+        """The effective scene as TOML text."""
+        return self._string("scene")
+
+    @property
+    def scene_attributes(self) -> dict[str, Any]:
+        """Digest, file name, overrides and PETSc options of the scene."""
+        return self.file.attributes(f"{ROOT}/scene")
+
+    @property
+    def definitions(self) -> str:
+        """What every quantity means."""
+        return self._string("definitions")
+
+    @property
+    def report(self) -> str:
+        """Best grasps, failures and how to read the file, as plain text; says so where the study is not finished."""
+        return text_of(self._closing("report").item().strip(b"\0 "))
+
+    @property
+    def labels(self) -> np.ndarray:
+        """Names of the candidates, ``(stations, angles)``."""
+        found = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL}"))
+        return _texts(self.file.values(found))
+
+    @property
+    def sessions(self) -> list[dict[str, Any]]:
+        """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
+        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), self.layout.session))
+        if self._summed and any(row["crc"] != checksums.of_session(row) for row in rows if row["crc"] or row["start"]):
+            raise self._damaged("a session does not match its checksum")
+        fields = [(name, *kind) for name, kind in self.layout.session.fields.items() if name != "crc"]
+        return [
+            {name: text_of(row[name]) if kind.kind == "S" else int(row[name]) for name, kind, *_ in fields}
+            for row in rows
+            if row["start"]
+        ]
+
+    @property
+    def killed(self) -> bool:
+        """Whether the last session has no end: it is running, or was killed."""
+        sessions = self.sessions
+        return bool(sessions and not sessions[-1]["stop"])
+
+    @property
+    def header_good(self) -> bool:
+        """Whether what is written when a file is made matches its checksum: axes, scene, definitions, labels."""
+        told = self.file.attributes(ROOT).get("checksum")
+        return self.layout.version == 3 or str(checksums.of_header(self.file, self.layout)) == told
+
+    def closing_good(self, name: str) -> bool:
+        """Whether something that is filled after all rows, named in ``layout.closing``, matches its checksum."""
+        dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
+        stored = checksums.closing_sum(self.file, self.layout, name) if self.layout.version > 3 else None
+        return stored in (None, checksums.of_array(self.file.values(dataset)))
+
+    def _compare(self, part: str) -> None:
+        """Refuse the file if a part of its rows does not match its checksums; once for each part."""
+        if self._unchecked or not part or part in self._trusted:
+            return
+        if self._summed:
+            rows = np.flatnonzero(self.status != MISSING)
+            wrong = checksums.broken_rows(self.file, self.layout, part, rows)
+            self._trusted.add(part)
+        else:
+            self._trusted.update(self.layout.parts)
+            wrong = np.array([r for r, _, v in checksums.rows_of(self.file, self.layout) if v is None], dtype=int)
+        self._refuse(self._still(wrong, self.status), f"'{part}'")
+
+    def _still(self, wrong: np.ndarray, codes: np.ndarray) -> np.ndarray:
+        """Those of some rows that a run has not begun anew since their states were read; of the others, now missing."""
+        begun = wrong[self.codes.flat[wrong] != codes.flat[wrong]] if wrong.size else wrong
+        codes.flat[begun] = MISSING
+        return np.setdiff1d(wrong, begun)
+
+    def _refuse(self, rows: np.ndarray, what: str) -> None:
+        if rows.size:
+            some = f"{', '.join(map(str, rows[:5]))}{', ...' if rows.size > 5 else ''}"
+            cases = f"case {some}" if rows.size == 1 else f"{rows.size} cases ({some})"
+            raise self._damaged(f"{what} of {cases} does not match its checksum")
+
+    def _believable(self, path: str, found: np.ndarray) -> np.ndarray:
+        if found.dtype.kind == "f" and (np.isfinite(found) & (np.abs(found) > BEYOND)).any():
+            raise self._damaged(f"{path} has values beyond {BEYOND:g}")
+        return found
+
+    def _closing(self, name: str) -> np.ndarray:
+        """What is filled after all rows, by its name in ``layout.closing``."""
+        for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
+            dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
+            found = np.asarray(self.file.values(dataset))
+            if not self._summed or checksums.of_array(found) == checksums.closing_sum(self.file, self.layout, name):
+                return found
+            time.sleep(patience)
+        raise self._damaged(f"{name} does not match its checksum")
+
+    def _damaged(self, what: str) -> StudyError:
+        cure = "'softjaw repair' says what is good, or restore it from a copy"
+        return StudyError(OTHER_FILE, f"{self.path}: damaged ({what}); {cure}")
+
+    def _checked(self, path: str) -> Any:
+        expected = self._known.get(f"{ROOT}/{path}")
+        if expected is None:
+            raise KeyError(f"{path} is no dataset of this file; it has {', '.join(sorted(self._known))}")
+        return self.file.checked(expected.path, expected.shape, expected.dtype)
+
+    def _axis(self, name: str) -> StoredAxis:
+        path = f"{ROOT}/axes/{name}"
+        found, attributes = self.file.plain(path), self.file.attributes(path)
+        if found.ndim != 1 or found.dtype != np.dtype("<f8"):
+            raise ValueError(f"axis '{name}' is no list of numbers")
+        units = str(attributes.get("units", ""))
+        values = self.file.values(found)
+        if not (np.abs(values) < BEYOND).all():
+            raise ValueError(f"axis '{name}' has values that are no numbers")
+        return StoredAxis(name, values, units, str(attributes.get("long_name", name)).removesuffix(f" [{units}]"))
+
+    def _text(self, name: str) -> Any:
+        found = self.file.plain(f"{ROOT}/{name}")
+        if found.shape != () or found.dtype.kind != "S":
+            raise self._damaged(f"{ROOT}/{name} is no text")
+        return found
+
+    def _string(self, name: str) -> str:
+        return text_of(self.file.values(self._text(name)).strip(b"\0 "))
+
+
+def _texts(found: np.ndarray) -> np.ndarray:
+    """Texts of an array of fixed-length strings."""
+    return np.array([text_of(text) for text in found.ravel().tolist()], dtype=str).reshape(found.shape)

@@ -1,0 +1,27 @@
+"""What one case gives back: values to store, or the reason why there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """Values of one case (candidate x force), keyed ``group/name`` as in ``study.result.quantities``.
+
+    ``patch`` holds the faces of both fingers, keyed by dataset name, each ``(2, faces, ...)``; ``message`` is empty or
+    says what the reader should know about a result that is valid.
+    """
+
+    values: dict[str, Any]
+    patch: dict[str, Any] | None = None
+    message: str = ""
+    effects: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CaseFailure:
+    """A case without a result; ``message`` is one sentence with the cause and the remedy."""
+
+    message: str

@@ -1,0 +1,154 @@
+"""Filling a result file, on all ranks at once: nothing but independent writes to space that is there already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.result import checksums
+from softjaw.study.result.datasets import CLOSING, FIRST_SEEN, STATE, SUMS
+from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, Layout
+from softjaw.study.result.quantity import MODELS
+from softjaw.study.result.reading import Result
+from softjaw.study.result.record import blank, text_bytes
+from softjaw.study.result.skeleton import LIBVER, report_bytes
+
+
+class ResultWriter:
+    """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not.
+
+    With ``comm = None`` this process has it alone and needs no MPI.
+    """
+
+    def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
+        if comm is not None and not h5py.get_config().mpi:
+            raise StudyError(CANNOT_WRITE, "this h5py was built without MPI; 'softjaw doctor' says how to cure that")
+        self.path, self.layout = path, layout
+        shared = {} if comm is None else {"driver": "mpio", "comm": comm}
+        self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
+        self._columns = [self._file[c.path] for c in layout.columns]
+        keys = [c.key for c in layout.columns]
+        self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST_SEEN}
+        self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
+        self._sums = {part: self._file[f"{SUMS}/{part}"] for part in (*layout.parts, STATE, CLOSING)}
+        self._sessions = self._file[f"{ROOT}/provenance/sessions"]
+        self.session = 0
+
+    def codes(self) -> np.ndarray:
+        """State of every row, ``(rows,)``."""
+        return self._code[()].ravel()
+
+    def attempts(self) -> np.ndarray:
+        """How often every row was begun without an end, ``(rows,)``."""
+        return self._attempts[()].ravel()
+
+    def count_attempt(self, row: int, change: int = 1) -> None:
+        """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
+        index = self._index(row)
+        self._attempts[index] = min(max(int(self._attempts[index]) + change, 0), 255)
+
+    def forget(self, row: int) -> None:
+        """Make a failed or torn row a missing one that was never tried."""
+        self._code[self._index(row)] = MISSING
+        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
+        self._attempts[self._index(row)] = 0
+
+    def tidy(self, row: int) -> None:
+        """Make a missing row that a killed process had stored, but not marked, like any other missing one."""
+        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
+
+    def write(self, row: int, values: Sequence[np.ndarray]) -> None:
+        """Store a solved case; ``values`` as from ``study.result.record.record``."""
+        self._store(row, values, DONE)
+
+    def fail(self, row: int, message: str) -> None:
+        """Store why a case has no result."""
+        self._store(row, blank(self.layout, message), FAILED)
+
+    def copy(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
+        """Store a row as another file has it."""
+        self._store(row, values, state)
+
+    def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
+        index = self._index(row)
+        if self._code[index] == DONE:
+            raise ValueError(f"row {row} is done already and must not be written again")
+        if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
+            self._attempts[index] = 1
+        places = self.layout.places(row)
+        for column, dataset, value, place in zip(self.layout.columns, self._columns, values, places, strict=True):
+            if place is None:
+                continue
+            if column.dtype.kind == "S":
+                dataset[index] = value.astype(dataset.dtype)  # with its encoding
+            elif value.size:
+                _write_block(dataset, place, value)
+        for position, dataset in self._maps.items():
+            dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
+        sums = {**checksums.of_parts(self.layout, row, values), STATE: checksums.OF_STATE[state]}
+        for part, crc in sums.items():
+            _write_block(self._sums[part], index, np.array(crc, "<u4"))
+        self._code[index] = state
+
+    def _index(self, row: int) -> tuple[int, ...]:
+        return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
+
+    def read(self, path: str, index: Any = ()) -> np.ndarray:
+        """Any dataset, named below ``/study`` (``e_n/curved``) or from the root, or what it has at an index."""
+        return self._file[path if path.startswith("/") else f"{ROOT}/{path}"][index]
+
+    def result(self) -> Result:
+        """The same file for reading; not to be closed by itself."""
+        return Result(self.path, GuardedFile(self.path, self._file))
+
+    def fill(self, path: str, start: int, values: np.ndarray) -> None:
+        """Write rows of a dataset that is no part of a case's row, from ``start`` on; by one rank, after all rows."""
+        self._file[path][start : start + len(values)] = values
+
+    def write_report(self, text: str) -> None:
+        """Write the report, cut where it is too long; by one rank, after all rows."""
+        self._file[f"{ROOT}/report"][()] = found = report_bytes(text)
+        self._close("report", found)
+
+    def write_derived(self, name: str, values: Any) -> None:
+        """Fill a derived dataset; by one rank, after all rows."""
+        dataset = self._file[f"{ROOT}/derived/{name}"]
+        dataset[...] = found = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
+        self._close(f"derived/{name}", found)
+
+    def _close(self, name: str, values: np.ndarray) -> None:
+        self._sums[CLOSING][self.layout.closing.index(name)] = checksums.of_array(values)
+
+    def begin_session(self, **fields: Any) -> None:
+        """Add a row to the provenance; by one rank."""
+        used = self._sessions[()]["start"] != b""
+        self.session = min(int(used.sum()), len(used) - 1)
+        self._sessions[self.session] = np.zeros((), self.layout.session)
+        self.update_session(**fields)
+
+    def update_session(self, **fields: Any) -> None:
+        """Change fields of this run's row of the provenance; by one rank."""
+        row = self._sessions[self.session]
+        for name, value in fields.items():
+            kind = row.dtype[name]
+            row[name] = text_bytes(value, kind.itemsize) if kind.kind == "S" else value
+        row["crc"] = checksums.of_session(row)
+        self._sessions[self.session] = row
+
+    def close(self) -> None:
+        """Close on all ranks."""
+        self._file.close()
+
+
+def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarray) -> None:
+    """``dataset[index] = value`` for numbers, without what h5py spends on understanding the index."""
+    count = (1,) * len(index) + value.shape
+    place = dataset.id.get_space()
+    place.select_hyperslab(index + (0,) * value.ndim, count)
+    dataset.id.write(h5py.h5s.create_simple(count), place, np.ascontiguousarray(value).reshape(count))

@@ -1,0 +1,183 @@
+"""A new result file: everything but the values, with all its space; one process makes it before any solve."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.result import checksums, grid
+from softjaw.study.result.datasets import CLOSING, SUMS
+from softjaw.study.result.guarded import GuardedFile, reason
+from softjaw.study.result.layout import LABEL, PROGRAM, REPORT, ROOT, SESSIONS, Dataset, Header, Layout
+from softjaw.study.result.plots import groups
+from softjaw.study.result.provenance import SAMPLING
+from softjaw.study.result.record import text_bytes
+from softjaw.study.result.vtkhdf import head
+from softjaw.study.writing import remove
+
+LIBVER = ("earliest", "v110")
+TEXT = h5py.string_dtype("utf-8")
+TEXTS = {
+    "title": "name of the object or of the scene",
+    "scene": "the scene with all settings, as TOML",
+    "definitions": "what every quantity means",
+    "report": "best grasps, failures with their reasons, how to read the file",
+}
+UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF are written at its end."
+
+
+def create(path: Path, layout: Layout, header: Header) -> None:
+    """Write the skeleton beside ``path`` and rename it into place; raise `StudyError` if there is no room for it."""
+    _reserve(path, layout.nbytes)
+    part = path.with_name(path.name + ".part")
+    try:
+        with h5py.File(part, "w", libver=LIBVER) as file:
+            _write_skeleton(file, layout, header)
+        with h5py.File(part, "r+", libver=LIBVER) as file:
+            _write_checksums(file, GuardedFile(part, file), layout)
+        with part.open("r+b") as handle:
+            os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
+            os.fsync(handle.fileno())
+    except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
+        remove(part)
+        if not isinstance(error, OSError) and "write" not in str(error):
+            raise
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
+    part.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    os.fsync(folder)
+    os.close(folder)
+
+
+def _reserve(path: Path, need: int) -> None:
+    free = shutil.disk_usage(path.parent).free
+    if free < need:
+        sizes = f"needs {need / 1e6:.1f} MB, only {free / 1e6:.1f} MB are free there"
+        raise StudyError(CANNOT_WRITE, f"{path}: {sizes}; choose another place with -o")
+    trial = path.with_name(path.name + ".part")
+    try:
+        with trial.open("wb") as handle:  # quotas and file size limits show up here, not in the free space
+            os.posix_fallocate(handle.fileno(), 0, need)
+    except OSError as error:
+        raise StudyError(CANNOT_WRITE, f"{path}: {need / 1e6:.1f} MB cannot be reserved: {error.strerror}") from error
+    finally:
+        remove(trial)
+
+
+def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
+    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=layout.version)
+    study = file.create_group(ROOT)
+    study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
+    study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the front, before its value is known
+    _write_attribute(study, "axes", list(layout.names))
+    for name, attributes in groups(layout).items():
+        group = study.create_group(name)
+        for key, value in attributes.items():
+            _write_attribute(group, key, value)
+    for name, axis in zip(layout.names, layout.axes, strict=True):
+        scale = study["axes"].create_dataset(name, data=np.asarray(axis.values, "<f8"))
+        long_name = f"{axis.long_name} [{axis.units}]" if axis.units else axis.long_name
+        scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
+        scale.make_scale(name)
+    for name, length in layout.counters.items():
+        count = study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4"))
+        count.attrs.update(units="", long_name=f"number of the {name.removesuffix('_2').replace('_', ' ')}")
+        count.make_scale(name)
+    for dataset in layout.datasets:
+        _create_dataset(file, dataset)
+    _write_texts(study, layout, header)
+    if layout.grid:
+        _write_grid(file, layout, header)
+
+
+def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> None:
+    """Checksums of what stands in the new file already."""
+    if layout.version > 3:
+        file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
+        for i, name in enumerate(layout.closing):
+            file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
+
+
+def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
+    root = file.create_group(grid.PATH)
+    root.attrs["about"] = f"{header.title}. {grid.ABOUT}"
+    head(root, layout.shape[-1])
+    for dataset in layout.grid:
+        file.require_group(dataset.path.rpartition("/")[0])
+        _create_dataset(file, dataset)
+    for path, values in grid.skeleton(layout, header.surface).items():
+        file[path][...] = values
+
+
+def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
+    texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
+    for name, text in texts.items():
+        data = text.encode() or b" "
+        study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
+    study.create_dataset("report", data=report_bytes(UNFINISHED))
+    for name, label in TEXTS.items():
+        study[name].attrs["long_name"] = label
+    study["provenance"].attrs["sampling"] = SAMPLING
+    study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
+    study["scene"].attrs["overrides"] = "\n".join(header.overrides)
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, layout.session))
+    sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
+    _attach_scales(sessions, ["session"])
+    labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))
+    labels[: len(header.labels)] = [text_bytes(label, LABEL) for label in header.labels]
+    named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
+    named.attrs["long_name"] = "name of the candidate in the scene"
+    _attach_scales(named, layout.names[-3:-1])
+    if layout.sampled:
+        study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
+        study["wrenches/candidate"][...] = layout.sampled
+    if layout.probes:
+        study["probes/candidate"][...] = layout.probes
+
+
+def report_bytes(text: str) -> np.ndarray:
+    """Text of fixed length, filled up with blanks: zeros would be shown by tools that print it."""
+    data = text.encode()[:REPORT].decode(errors="ignore").encode()
+    return np.array(data.ljust(REPORT), h5py.string_dtype("utf-8", REPORT))
+
+
+def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_layout(h5py.h5d.CONTIGUOUS)
+    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
+    strings = dataset.dtype.kind == "S"
+    if not strings:  # text is filled with zero bytes anyway
+        plist.set_fill_value(np.array(dataset.fill, dataset.dtype))
+    dtype = h5py.string_dtype("utf-8", dataset.dtype.itemsize) if strings else dataset.dtype
+    space = h5py.h5s.create_simple(dataset.shape)
+    h5py.h5d.create(file.id, dataset.path.encode(), h5py.h5t.py_create(dtype, logical=True), space, plist)
+    made = file[dataset.path]
+    for key, value in dataset.attributes.items():
+        _write_attribute(made, key, value)
+    _attach_scales(made, dataset.scales)
+
+
+def _attach_scales(dataset: h5py.Dataset, names: Sequence[str]) -> None:
+    # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
+    for i, name in enumerate(names):
+        scale = dataset.file[f"{ROOT}/axes/{name}"]
+        if name not in dataset.parent:
+            dataset.parent[name] = scale
+        h5py.h5ds.attach_scale(dataset.id, scale.id, i)
+        h5py.h5ds.set_label(dataset.id, i, name.encode())
+
+
+def _write_attribute(node: Any, key: str, value: Any) -> None:
+    if isinstance(value, list):
+        node.attrs.create(key, np.array(value, object), dtype=TEXT)
+    else:
+        node.attrs[key] = value

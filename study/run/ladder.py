@@ -1,0 +1,195 @@
+"""One unit of work: a ladder of forces is climbed from its foot, and the rows that are missing are stored."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.result.layout import FAILED, MISSING
+from softjaw.study.result.record import record
+from softjaw.study.result.result import CaseFailure, CaseResult
+from softjaw.study.run.lost_ranks import LostRanks
+from softjaw.study.run.memory import is_out_of_memory
+from softjaw.study.run.standing import Standing
+from softjaw.study.run.stopping import AbandonedError, Stopper, TimeLimitError
+
+DEADLY = 2
+KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"
+NOT_TRIED = "not tried, because a lower force of this candidate failed: {text}"
+TOO_SLOW = "not solved within {limit:g} s; raise run.time_limit_s and run again with --retry-failed"
+HUNG = "did not come back to Python within {patience:g} s, so its rank was given up; 'run --retry-failed' tries again"
+NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fewer ranks or a coarser mesh"
+
+
+def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
+    """Decide by one process what is missing: torn rows again, failed ones on demand, deadly ones no more.
+
+    Returns
+    -------
+    (rows,) array
+        State of every case as the run begins.
+    """
+    codes, attempts = writer.codes(), writer.attempts()
+    again = [*torn, *(np.flatnonzero(codes == FAILED) if retry_failed else ())]
+    for row in again:
+        writer.forget(int(row))
+        codes[row], attempts[row] = MISSING, 0
+    for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):
+        writer.tidy(int(row))
+    for unit in units:
+        for rows in unit.rows:
+            deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]
+            for k in range(deadly[0], len(rows)) if deadly else ():
+                if codes[rows[k]] == MISSING:
+                    what = "this case" if k == deadly[0] else "a lower force of this candidate"
+                    writer.fail(rows[k], KILLED.format(n=attempts[rows[deadly[0]]], what=what))
+                    codes[rows[k]] = FAILED
+    return codes
+
+
+class Climber:
+    """Climbs ladders on one rank and stores each case as soon as it is solved."""
+
+    def __init__(
+        self,
+        writer: Any,
+        solve_unit: Callable,
+        image: Callable | None,
+        claims: Any,
+        lost: LostRanks,
+        standing: Standing,
+    ) -> None:
+        self._writer, self._solve_unit, self._image, self._claims = writer, solve_unit, image, claims
+        self._lost, self._standing = lost, standing
+        self._begun: list[int] = []
+
+    def on_stop(self) -> None:
+        """Called by a signal: begin nothing new, and do not count the case in flight as one that killed us."""
+        self._claims.stop()
+        self._uncount()
+
+    def climb(self, unit: Any, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
+        """Solve a unit from its beginning and store the rows that ``codes`` calls missing, never a done one.
+
+        Raises
+        ------
+        StudyError
+            The file cannot be written any more.
+        """
+        pending = _pending(unit, codes)
+        ladder = self._ladder(unit)
+        clock = time.perf_counter()
+        while pending and not self._claims.stopped:
+            self._standing.check()
+            self._count(pending)
+            self._lost.begin(unit.index)
+            try:
+                with stopper.case():
+                    k, result = next(ladder)
+            except AbandonedError:
+                break
+            except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
+                self._fail(pending, _sentence(error, stopper.limit))
+                break
+            finally:
+                self._lost.end()
+            now = time.perf_counter()
+            self._store(unit, pending.pop(k, []), result, now - clock)
+            clock = now
+            look()
+        self._uncount()
+        _close(ladder)
+
+    def _ladder(self, unit: Any) -> Iterator[tuple[int, Any]]:
+        yield from self._solve_unit(unit)
+
+    def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
+        rows = {row for _, row in served}
+        self._begun = [row for row in self._begun if row not in rows]
+        for c, row in served:
+            if isinstance(result, CaseFailure):
+                with self._standing.writing():
+                    self._writer.fail(row, result.message)
+                continue
+            mine = self._image(result, unit, c) if self._image else result
+            values = record(self._writer.layout, _with_work(mine, c, seconds))
+            with self._standing.writing():
+                self._writer.write(row, values)
+
+    def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
+        self._begun = []
+        with self._standing.writing():
+            fail_from(self._writer, pending, message)
+        pending.clear()
+
+    def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
+        rows = [row for _, row in pending[min(pending)]]
+        if rows != self._begun:
+            self._uncount()
+            with self._standing.writing():
+                for row in rows:
+                    self._writer.count_attempt(row)
+            self._begun = rows
+
+    def _uncount(self) -> None:
+        rows, self._begun = self._begun, []
+        with self._standing.writing():
+            for row in rows:
+                self._writer.count_attempt(row, -1)
+
+
+def give_up(writer: Any, unit: Any, patience: float) -> None:
+    """Mark what is missing of a unit as failed, because the rank that solves it hangs; by any other rank."""
+    fail_from(writer, _pending(unit, writer.codes()), HUNG.format(patience=patience))
+
+
+def fail_from(writer: Any, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
+    """Store why the lowest of the pending forces failed, and that the forces above it were not tried."""
+    lowest = min(pending, default=0)
+    for k, served in pending.items():
+        for _, row in served:
+            writer.fail(row, message if k == lowest else NOT_TRIED.format(text=message))
+
+
+def _pending(unit: Any, codes: np.ndarray) -> dict[int, list[tuple[int, int]]]:
+    """Missing rows of a unit: for each force, the candidates and their rows."""
+    pending: dict[int, list[tuple[int, int]]] = {}
+    for c, rows in enumerate(unit.rows):
+        for k, row in enumerate(rows):
+            if codes[row] == MISSING:
+                pending.setdefault(k, []).append((c, row))
+    return dict(sorted(pending.items()))
+
+
+def _with_work(result: CaseResult, c: int, seconds: float) -> CaseResult:
+    # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
+    if c:
+        return replace(result, values={k: v for k, v in result.values.items() if not k.startswith("work/")})
+    return replace(result, values={"work/seconds_total": seconds, **result.values})
+
+
+def _sentence(error: BaseException, limit: float) -> str:
+    if isinstance(error, TimeLimitError):
+        return TOO_SLOW.format(limit=limit)
+    if isinstance(error, StopIteration):
+        return "the ladder of forces ended before this one; this is a bug"
+    if is_out_of_memory(error):
+        return NO_MEMORY.format(text=str(error) or "no more could be had")
+    text = f"{type(error).__name__}: {error}"
+    if type(error).__module__ == "builtins" and error.__traceback__:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        text += f" ({Path(frame.filename).name}:{frame.lineno})"
+    return text
+
+
+def _close(ladder: Any) -> None:
+    try:
+        ladder.close()
+    except Exception as error:  # the rows are stored; what the solver says while it is being closed changes nothing
+        print(f"warning: closing a ladder: {error}", flush=True)

@@ -1,0 +1,104 @@
+"""One run at a time: a lock that lives as long as any rank, also one that outlived its mpirun."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import time
+from pathlib import Path
+
+from softjaw.study.exits import CANNOT_WRITE, IN_USE, StudyError
+
+NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
+BUSY = {errno.EWOULDBLOCK, errno.EACCES}
+
+
+class Lock:
+    """``NAME.hdf.lock``: taken alone by rank 0, which proves that no rank of another run lives, then shared by all.
+
+    A lock cannot be turned from exclusive to shared in one step. Rank 0 therefore writes its name into the file
+    while it is alone; whoever finds another name there afterwards was overtaken in between and withdraws.
+    """
+
+    def __init__(self, result: Path, owner: str) -> None:
+        self.path, self.result, self.owner = result.with_name(result.name + ".lock"), result, owner
+        self.warning = ""
+        self._fd = -1
+
+    def take_first(self) -> None:
+        """On rank 0: raise `StudyError` if a rank of another run is alive."""
+        for attempt in range(6):  # 'status' takes the lock for an instant to see whether a run is alive
+            self._fd = self._opened()
+            if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB) and self._still_named():
+                break
+            holder = os.read(self._fd, 200).decode(errors="replace").strip()
+            self.release()
+            if attempt == 5:
+                who = holder or "name unknown"
+                raise StudyError(IN_USE, f"{self.result}: in use by another run ({who}); wait for it")
+            time.sleep(0.1)
+        os.ftruncate(self._fd, 0)
+        os.pwrite(self._fd, self.owner.encode(), 0)
+        self._flock(fcntl.LOCK_SH)
+
+    def _opened(self) -> int:
+        try:
+            return os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            remedy = "choose another place with -o"
+            text = f"{self.result}: cannot be written: {error.strerror} for {self.path.name} beside it; {remedy}"
+            raise StudyError(CANNOT_WRITE, text) from error
+
+    def join(self) -> None:
+        """On the other ranks, after `take_first`: hold the lock as well, until this process dies."""
+        self._fd = os.open(self.path, os.O_RDONLY)
+        self._flock(fcntl.LOCK_SH)
+
+    def confirm(self) -> None:
+        """On rank 0, when all ranks hold the lock: raise `StudyError` if another run was quicker."""
+        holder = os.pread(self._fd, 200, 0).decode(errors="replace").strip()
+        if holder != self.owner:
+            raise StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
+
+    def remove(self) -> None:
+        """On rank 0, at the end of the run, while all ranks still hold the lock: take the file away."""
+        self.path.unlink(missing_ok=True)
+
+    def release(self) -> None:
+        """Let go; a process that dies does so as well."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
+
+    def _still_named(self) -> bool:
+        try:
+            return os.fstat(self._fd).st_ino == self.path.stat().st_ino
+        except FileNotFoundError:
+            return False
+
+    def _flock(self, operation: int) -> bool:
+        try:
+            fcntl.flock(self._fd, operation)
+        except OSError as error:
+            if error.errno in BUSY:
+                return False
+            if error.errno not in NO_LOCKS:
+                raise
+            self.warning = f"{self.path.parent} has no file locks: make sure that only one run writes {self.result}"
+        return True
+
+
+def holder(result: Path) -> str:
+    """Who is running on ``result`` now, or an empty text."""
+    try:
+        fd = os.open(result.with_name(result.name + ".lock"), os.O_RDONLY)
+    except OSError:
+        return ""
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return ""
+    except OSError as error:
+        return os.pread(fd, 200, 0).decode(errors="replace").strip() if error.errno in BUSY else ""
+    finally:
+        os.close(fd)

@@ -1,0 +1,115 @@
+"""How much memory a rank may take: a case that asks for more fails by itself, before the system kills the run.
+
+A run that has too little to start with says so: some libraries ask for ever for memory that they do not get.
+"""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from softjaw.study.exits import USAGE, StudyError
+
+ITSELF = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
+SIGNS = ("Cannot allocate memory", "failed to map segment")  # of a file or library that finds no memory
+LEAST = 1e9  # bytes for the cases of a rank: with less than that, nothing could be solved at all
+KEPT = 0.9  # share of the free memory that is handed out; the rest is for the file's pages and for other programs
+CGROUPS = Path("/sys/fs/cgroup")
+
+
+@contextmanager
+def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
+    """Bound the address space of this process by what it has now plus its share of what is free.
+
+    Parameters
+    ----------
+    setting : float, "auto" or "none"
+        Memory of a rank in GB, or its share of what is free now, or no bound.
+    ranks : int
+        Processes that share the memory of this machine.
+
+    Notes
+    -----
+    ``RLIMIT_AS`` bounds addresses, of which libraries reserve more than they use; so what stands there before the
+    first case does not count.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if setting != "none":
+        share = max(KEPT * available() / ranks, LEAST) if setting == "auto" else 1e9 * float(setting)
+        wanted = _own_addresses() + int(min(share, 2.0**60))
+        resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def require_room() -> None:
+    """Refuse a limit of addresses that leaves no room for the program itself.
+
+    Raises
+    ------
+    StudyError
+        With the limit, what is needed, and what to do.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < ITSELF:
+        raise StudyError(USAGE, no_room(f"softjaw with its libraries takes {ITSELF / 1e9:g} GB for small cases"))
+
+
+def no_room(reason: str) -> str:
+    """A sentence for memory that was missing outside of a case."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    found = "unlimited" if limit == resource.RLIM_INFINITY else f"limited to {limit / 1e9:.2f} GB"
+    return (
+        f"out of memory: addresses of a process are {found} (ulimit -v); {reason}; raise the limit to 2 GB or more, or "
+        "ask the batch system for more memory"
+    )
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory was missing, whatever its type."""
+    return isinstance(error, MemoryError) or any(sign in str(error) for sign in SIGNS)
+
+
+def available() -> float:
+    """Memory that can be had on this machine, or inside the control group that a batch system has put us into [B]."""
+    free = [1024.0 * int(line.split()[1]) for line in _lines(Path("/proc/meminfo")) if line.startswith("MemAvailable")]
+    return max(min([*free, *_groups_free()], default=float("inf")), 0.0)
+
+
+def _groups_free() -> Iterator[float]:
+    """What the control groups of this process leave, in both versions; pages of files can be dropped."""
+    for line in _lines(Path("/proc/self/cgroup")):
+        _, controllers, path = line.split(":", 2)
+        if controllers in ("", "memory"):
+            root = CGROUPS / controllers
+            names = (
+                ("memory.limit_in_bytes", "memory.usage_in_bytes") if controllers else ("memory.max", "memory.current")
+            )
+            group = root / path.strip().lstrip("/")
+            for folder in (group, *(f for f in group.parents if f.is_relative_to(root))):
+                numbers = [_lines(folder / name)[:1] for name in names]
+                if all(n and n[0].strip().isdigit() for n in numbers):
+                    yield float(numbers[0][0]) - float(numbers[1][0]) + _file_pages(folder)
+
+
+def _file_pages(group: Path) -> float:
+    words = [line.split() for line in _lines(group / "memory.stat")]
+    found = {name: float(value) for name, value in words}
+    return sum(found.get(f"total_{name}", found.get(name, 0.0)) for name in ("inactive_file", "active_file"))
+
+
+def _own_addresses() -> int:
+    """Size of this process's address space [B]."""
+    pages = _lines(Path("/proc/self/statm"))
+    return int(pages[0].split()[0]) * resource.getpagesize() if pages else 0
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text().splitlines()
+    except OSError:
+        return []

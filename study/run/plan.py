@@ -1,0 +1,227 @@
+"""What a run will do, before anything is spent: layout, units of work, disk, memory and time."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.case.build import has_wall
+from softjaw.study.result.layout import Header, Layout
+from softjaw.study.result.wall_quantities import ALONG, AROUND
+from softjaw.study.run.progress import duration
+from softjaw.study.run.wall_cost import wall_size
+from softjaw.study.show.tables.overview import aligned
+
+LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
+FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done: the file's layout and header, and the units of work (``rows``, ``cost``)."""
+
+    layout: Layout
+    header: Header
+    units: tuple[Any, ...]
+
+    @property
+    def costs(self) -> list[float]:
+        """Cost of every unit, in any unit of time."""
+        return [float(unit.cost) for unit in self.units]
+
+    @property
+    def served(self) -> int:
+        """Number of candidates, those that share a unit by symmetry counted one by one."""
+        return sum(len(unit.rows) for unit in self.units)
+
+
+def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
+    """The plan of a scene; builds its objects, so a mesh is read here."""
+    from softjaw.study.accuracy.uncertainty.probes import changes, probe_candidates, with_probes
+    from softjaw.study.case import sweep
+    from softjaw.study.case.build import check_object, pad_shape
+    from softjaw.study.result.derived import derived
+    from softjaw.study.result.grid_surface import surface_of
+
+    check_object(scene)
+    patches = scene.output.patches != "none"
+    front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
+    axes = tuple(sweep.axes(scene))
+    surface = surface_of(scene, axes)
+    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    probes = probe_candidates(scene, units)
+    header = Header(
+        digest=scene.digest,
+        scene=scene.effective_toml(),
+        title=getattr(scene.object, "name", None) or Path(scene_file).stem,
+        scene_file=scene_file,
+        overrides=tuple(overrides),
+        petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
+        labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
+        surface=surface,
+    )
+    layout = Layout(
+        axes,
+        math.prod(front),
+        scene.accuracy.meshes,
+        patches,
+        tuple(derived(scene)),
+        scene.friction.cor_grid,
+        scene.friction.model,
+        has(scene),
+        scene.limit_surface.samples,
+        scene.sampled,
+        surface.counts,
+        front,
+        probes,
+        changes(scene) if probes else (),
+    )
+    return Plan(layout, header, with_probes(scene, units, probes))
+
+
+def has(scene: Any) -> tuple[str, ...]:
+    """Which of `study.result.quantity.NEEDS` besides two meshes a scene asks for."""
+    asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    asked["graspit"] = scene.score.graspit
+    asked["wall"] = has_wall(scene.object)
+    asked["two scores"] = scene.accuracy.meshes > 1
+    return tuple(name for name, wanted in asked.items() if wanted)
+
+
+def by_cost(costs: Sequence[float]) -> list[int]:
+    """Positions with the most expensive first; equal costs keep their order.
+
+    >>> by_cost([1.0, 5.0, 5.0, 2.0])
+    [1, 2, 3, 0]
+    """
+    return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+
+
+def makespan(costs: Sequence[float], ranks: int) -> float:
+    """Time until the last unit ends when ranks take the most expensive remaining unit whenever they are free.
+
+    >>> makespan([3.0, 3.0, 2.0, 2.0, 2.0], 2)
+    7.0
+    """
+    busy = np.zeros(max(ranks, 1))
+    for i in by_cost(costs):
+        busy[busy.argmin()] += costs[i]
+    return float(busy.max())
+
+
+def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
+    """Largest number of ranks that are busy for at least this share of the time.
+
+    >>> sensible_ranks([1.0] * 10)
+    10
+    """
+    total = sum(costs)
+    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= efficiency * n * makespan(costs, n)]
+    return max(good, default=1)
+
+
+def memory(scene: Any) -> float:
+    """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
+    nx, ny, nz = (n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in scene.gripper.elements)
+    pad = 8.0 * FILL * (3.0 * nx * ny * nz) ** (4.0 / 3.0)
+    wall = wall_size(scene) if shells(scene) else None
+    return LIBRARIES + pad + (wall.memory if wall else 0.0)
+
+
+def shells(scene: Any) -> bool:
+    """Whether the object's wall may be simulated as a shell."""
+    return has_wall(scene.object) and scene.effects.object != "rigid"
+
+
+def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
+    """Expected time of every unit from the measured times of some cases, ``(rows,)`` with NaN for the others [s].
+
+    Measured units keep their time, the others are judged by their cost; empty where nothing was measured.
+    """
+    known = [_measured(unit, seconds) for unit in plan.units]
+    pairs = [(t, cost) for t, cost in zip(known, plan.costs, strict=True) if t is not None]
+    if not pairs or not sum(cost for _, cost in pairs):
+        return []
+    rate = sum(t for t, _ in pairs) / sum(cost for _, cost in pairs)
+    return [rate * cost if t is None else t for t, cost in zip(known, plan.costs, strict=True)]
+
+
+def _measured(unit: Any, seconds: np.ndarray) -> float | None:
+    times = seconds[list(unit.rows[0])]
+    return None if np.isnan(times).any() else float(times.sum())
+
+
+def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
+    """Cases, units, disk, memory and time on so many ranks."""
+    layout = plan.layout
+    each = memory(scene)
+    forces = layout.shape[-1]
+    shared = plan.served - len(plan.units)
+    symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
+    shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
+    parts = {"deformed walls": shapes, "the view for ParaView": sum(d.nbytes for d in layout.grid) / 1e6}
+    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
+    space += "".join(f", {size:.1f} MB of it {what}" for what, size in parts.items() if size)
+    free = _free(path)
+    rows = {
+        "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
+        "units": f"{len(plan.units)} ladders of {forces} forces{symmetric}",
+        "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
+        "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
+        "time": _time(plan, scene, path, ranks),
+        "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
+    }
+    return "\n".join(aligned(rows))
+
+
+def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
+    seconds = _seconds(plan.layout, path)
+    expected = unit_seconds(plan, seconds) if seconds is not None else []
+    if not expected:
+        known = f"known better when a few ladders are in {path}: start the run, then plan again"
+        return (
+            f"{_wall_time(plan, scene, ranks)}; {known}"
+            if shells(scene)
+            else f"not {known.replace(' better when', ' before')}"
+        )
+    whole = duration(makespan(expected, ranks))
+    return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
+
+
+def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
+    """Rule of thumb for walls, between the cheapest and the costliest level of all candidates."""
+    wall = wall_size(scene)
+    if wall is None:
+        return "not known yet for this wall"
+    level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
+    times = sorted(level.get(scene.effects.object, wall.seconds))
+    ladders = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
+    whole = [duration(each * makespan(ladders, ranks)) for each in (times[0], times[-1])]
+    names = (
+        "all candidates rigid, or all on the costliest shell"
+        if len(times) > 1
+        else scene.effects.object.replace("_", " ")
+    )
+    return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
+
+
+def _seconds(layout: Layout, path: Path) -> Any:
+    if not path.is_file():
+        return None
+    from softjaw.study.result.store import open_result
+
+    with open_result(path) as result:
+        return result.work("seconds_total").ravel() if result.layout.shape == layout.shape else None
+
+
+def _free(path: Path) -> int:
+    for folder in path.absolute().parents:
+        if folder.is_dir():
+            return shutil.disk_usage(folder).free
+    return -1

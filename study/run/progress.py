@@ -1,0 +1,134 @@
+"""How far a run has come: one line that is rewritten on a terminal, timed lines in a log."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any, TextIO
+
+import numpy as np
+
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+
+
+def duration(seconds: float) -> str:
+    """A time in the two units that matter.
+
+    >>> duration(6660.0), duration(75.0), duration(0.2)
+    ('1 h 51 min', '1 min 15 s', '0.2 s')
+    """
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
+
+
+FEWEST, MOST_WAITED, SHORTEST = 5, 50, 3.0  # cases and seconds from the first case on, before a rest is foretold
+
+
+class Progress:
+    """Prints how many cases are done and how long the rest will take, judged by the cost of the cases.
+
+    The clock for that starts when the first cases are done: until then a cold start has compiled, not solved.
+
+    Parameters
+    ----------
+    weights : (rows,) array
+        Expected cost of each case, in any unit.
+    codes : (rows,) array
+        State of each case at the start.
+    stream : text stream
+        Where to write.
+    live : bool
+        Rewrite one line (a terminal) instead of adding lines. Under mpirun every output looks like a terminal, so the
+        caller has to know.
+    clock : callable
+        Seconds that only grow.
+    """
+
+    def __init__(
+        self,
+        weights: np.ndarray,
+        codes: np.ndarray,
+        stream: TextIO,
+        *,
+        live: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._weights, self._todo = weights, codes == MISSING
+        self._stream, self._live, self._clock = stream, live, clock
+        self._looked = self._printed = clock()
+        self._share = 0.0
+        self._first: tuple[float, int, float] | None = None  # when the first cases were done, how many, their weight
+
+    def due(self) -> bool:
+        """Whether it is time to look at the states again; cheap, to be asked often."""
+        if self._clock() - self._looked < (0.2 if self._live else 1.0):
+            return False
+        self._looked = self._clock()
+        return True
+
+    def update(self, codes: np.ndarray) -> None:
+        """Print a line if the last one is ten seconds or five percent old, on a terminal always."""
+        share = float(np.mean(codes != MISSING))
+        if not self._live and self._clock() - self._printed < 10 and share - self._share < 0.05:
+            return
+        self._share, self._printed = share, self._clock()
+        text = self.line(codes)
+        stamp = time.strftime("%H:%M:%S")
+        self._stream.write(f"\r\x1b[K{text}" if self._live else f"[{stamp}] {text}\n")
+        self._stream.flush()
+
+    def line(self, codes: np.ndarray) -> str:
+        """Counts, and as soon as they mean something seconds for each case and the expected rest."""
+        solved = self._todo & (codes != MISSING)
+        done, failed = int(np.sum(codes == DONE)), int(np.sum(codes == FAILED))
+        text = f"{done}/{codes.size} done" + (f", {failed} failed" if failed else "")
+        now, count, gone = self._clock(), int(solved.sum()), float(self._weights[solved].sum())
+        if self._first is None and count:
+            self._first = now, count, gone
+        since, cases, weight = (b - a for a, b in zip(self._first or (now, 0, 0.0), (now, count, gone), strict=True))
+        enough = min(max(FEWEST, 0.03 * int(self._todo.sum())), MOST_WAITED)
+        if cases >= enough and since >= SHORTEST and weight > 0:
+            left = since * float(self._weights[self._todo & ~solved].sum()) / weight
+            text += f", {since / cases:.3g} s/case, {duration(left)} left"
+        return text
+
+    def clear(self) -> None:
+        """Leave the terminal with an empty line."""
+        if self._live:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
+
+
+class Unbreakable:
+    """A stream that a study outlives: when its reader goes away, what is written to it is lost, and nothing else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything but writing is the stream's own."""
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write, or forget."""
+        return self._try(lambda: self._stream.write(text)) or 0
+
+    def flush(self) -> None:
+        """Flush, or forget."""
+        self._try(self._stream.flush)
+
+    def _try(self, act: Callable[[], Any]) -> Any:
+        try:
+            return act()
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            return None

@@ -1,0 +1,155 @@
+"""One session of a run: all ranks solve what is missing, wait for each other, and write how it ended."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from softjaw.study.exits import DONE, SOME_FAILED, STOPPED, StudyError
+from softjaw.study.result import provenance
+from softjaw.study.result.layout import FAILED, MISSING
+from softjaw.study.result.store import ResultWriter, open_result
+from softjaw.study.run.ladder import Climber, give_up
+from softjaw.study.run.lost_ranks import LostRanks
+from softjaw.study.run.memory import limited_memory
+from softjaw.study.run.plan import Plan, by_cost
+from softjaw.study.run.progress import Progress
+from softjaw.study.run.schedule import Claims
+from softjaw.study.run.standing import Standing
+from softjaw.study.run.stopping import GRACE, Stopper
+
+
+class Session:
+    """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
+
+    ``plan``, ``work``: as for `study.run.run.run_study`.
+    """
+
+    def __init__(self, plan: Plan, work: Any, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
+        self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
+        self._standing = Standing(writer.path)
+        todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
+        self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
+        hosts = len(set(comm.allgather(MPI.Get_processor_name())))
+        if comm.rank == 0:
+            writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
+        writer.session = comm.bcast(writer.session)
+        self._progress = _progress(plan, codes, comm.size) if comm.rank == 0 else None
+
+    def solve(self) -> int:
+        """Solve, wait for all ranks, close the file; the exit code.
+
+        Raises
+        ------
+        StudyError
+            The file cannot be written any more; with several ranks all of them are ended at once instead.
+        """
+        claims = Claims(self._comm, len(self._todo))
+        lost = LostRanks(claims.node, self._work.time_limit)
+        try:
+            arrived, name = self._climb(claims, lost)
+        except StudyError as error:
+            _end_all(self._comm, claims, error)
+            with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
+                self._writer.close()
+            raise
+        if not arrived:  # the rank that hangs can neither close the file nor be waited for
+            self._finish(self._writer, name)
+            print_summary(self._work, self._writer.path)
+            self._comm.Abort(self._code())
+        name = max(self._comm.allgather(name))
+        lost.free()
+        claims.free()
+        code = self._code()
+        self._writer.close()
+        if self._progress:
+            self._progress.clear()
+            self._finish_alone(name)
+        return code
+
+    def _climb(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
+        """Solve this rank's share and wait for the others; whether all of them came, and the signal that came."""
+        climber = Climber(self._writer, self._work.solve_unit, self._work.image, claims, lost, self._standing)
+        unseen = claims.node.size == 1 and self._work.time_limit < math.inf
+        stopper = Stopper(climber.on_stop, self._work.time_limit, lost.patience if unseen else None)
+        with stopper, limited_memory(self._work.memory, claims.node.size):
+            for position in claims:
+                climber.climb(self._todo[position], self._codes, stopper, self._look)
+            request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
+            while not request.Test():
+                self._look()
+                if self._only_lost_are_left(lost, stopper):
+                    return False, stopper.name
+                time.sleep(0.02)
+        return True, stopper.name
+
+    def _only_lost_are_left(self, lost: LostRanks, stopper: Stopper) -> bool:
+        """Mark the cases of ranks that hang as failed; whether there are such ranks, and nothing else to wait for."""
+        units = lost.units()
+        for unit in self._todo if units else ():
+            if unit.index in units:
+                give_up(self._writer, unit, lost.patience)
+        return bool(units) and (stopper.overdue > max(GRACE.values()) or not np.any(self._writer.codes() == MISSING))
+
+    def _look(self) -> None:
+        if self._progress and self._progress.due():
+            self._progress.update(self._writer.codes())
+
+    def _code(self) -> int:
+        codes = self._writer.codes()
+        return STOPPED if np.any(codes == MISSING) else SOME_FAILED if np.any(codes == FAILED) else DONE
+
+    def _finish_alone(self, name: str) -> None:
+        """Finish by a process that has the file for itself, so that nothing it does there has to be done by all."""
+        writer = ResultWriter(self._writer.path, self._writer.layout, MPI.COMM_SELF)
+        writer.session = self._writer.session
+        self._finish(writer, name)
+        writer.close()
+
+    def _finish(self, writer: ResultWriter, name: str) -> None:
+        """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
+        codes = writer.codes()
+        missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
+        if self._work.finalise is not None and not missing:
+            self._work.finalise(writer)
+        writer.update_session(
+            stop=provenance.timestamp(),
+            reason=f"stopped by {name or 'another rank'}" if missing else "complete",
+            versions=provenance.versions(MPI.Get_library_version()),
+            done=codes.size - missing - failed,
+            failed=failed,
+        )
+
+
+def print_summary(work: Any, path: Path) -> None:
+    """Print what the work says at its end."""
+    if work.summary is not None:
+        with open_result(path) as result:
+            print(work.summary(result), flush=True)
+
+
+def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
+    """End all ranks, if there are others, because this one cannot write; the first to notice speaks."""
+    if comm.size > 1:
+        if claims.first_to_speak():
+            for line in error.message.splitlines():
+                print(f"error: {line}", file=sys.stderr, flush=True)
+        comm.Abort(error.code)
+
+
+def _progress(plan: Plan, codes: np.ndarray, ranks: int) -> Progress:
+    weights = np.ones(codes.size)
+    for unit in plan.units:
+        for rows in unit.rows:
+            weights[list(rows)] = unit.cost / max(len(rows) * len(unit.rows), 1) or 1.0
+    # Under mpirun every rank's output claims to be a terminal, also when it goes to a file.
+    launched = ranks > 1 or any(name.startswith(("OMPI_", "PMIX_", "PMI_")) for name in os.environ)
+    return Progress(weights, codes, sys.stdout, live=not launched and sys.stdout.isatty())

@@ -1,0 +1,138 @@
+"""Answer of ``check``: what a scene means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+def scene_text(scene: Any, file: str) -> str:
+    """What would be run, in a few lines."""
+    # here and below: who only reads results must not load all that checks scenes
+    from softjaw.study.case.build import has_wall, warnings
+
+    c, g, o = scene.candidates, scene.gripper, scene.object
+    name = f" '{o.name}'" if getattr(o, "name", None) else ""
+    where = (
+        f"{c.count} explicit poses"
+        if c.poses
+        else f"{c.count}: {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
+    )
+    size = " x ".join(f"{1e3 * s:g}" for s in g.pad_size)
+    mesh = " x ".join(map(str, g.elements))
+    levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
+    rows = {
+        "object": f"{o.shape}{name}{_extent(o)}",
+        "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
+        "wall": wall_text(o),
+        "candidates": where,
+        "forces": _list(scene.load.normal_force_n, "N"),
+        "friction": f"mu = {scene.friction.mu:g}; curved, flat and projected",
+        "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
+        "cases": str(scene.cases),
+        "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
+        "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
+        "target": _target(scene),
+        "bands": _bands(scene),
+        "effects": ", ".join(levels),
+        "compliance": compliance_text(scene) if has_wall(o) else "",
+        "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
+        "each case": limits_text(scene.run),
+        "results": scene.output.file,
+    }
+    told = [f"warning: {text}" for text in warnings(scene)]
+    return "\n".join([f"{file}: no errors", *aligned(rows), *told])
+
+
+def limits_text(run: Any) -> str:
+    """What a single case may take before it fails."""
+    limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
+    memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
+    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that, and the others go on"
+
+
+def _target(scene: Any) -> str:
+    """What will be chosen for a target of accuracy; empty without one."""
+    if scene.accuracy.e_n is None:
+        return ""
+    from softjaw.study.accuracy.cost.target import expected
+
+    return expected(scene)
+
+
+def _bands(scene: Any) -> str:
+    """What the bands are made of, and what they take; empty where none are asked for."""
+    own = scene.uncertainty
+    if not own.parts:
+        return ""
+    from softjaw.study.accuracy.uncertainty.probes import changes
+
+    more = len(changes(scene))
+    count = own.probes if isinstance(own.probes, int) else len(own.probes)
+    cost = f"{count} candidates are solved {more} more time{'s' * (more > 1)}" if more else "no further solves"
+    return f"of e_n and quality, from {', '.join(own.parts)}; {cost}"
+
+
+def wall_text(shape: Any) -> str:
+    """Thickness, material and support of an object's wall; empty for a rigid object."""
+    from softjaw.study.case.build import has_wall
+
+    if not has_wall(shape):
+        return ""
+    from softjaw.fem.shell.wall_material import wall_material
+
+    name = None if shape.wall_material == "custom" else shape.wall_material
+    found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+    given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
+    thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
+    strength = (
+        f", yields at {found.yield_strength / 1e6:g} MPa" if found.yield_strength else ", yield strength not known"
+    )
+    words = [
+        f"{thickness} mm {shape.wall_material} ({found.young_modulus / 1e9:g} GPa{strength})",
+        shape.support,
+        "open top" if shape.open_top else "closed top",
+        f"dents up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "no limit for dents",
+    ]
+    return ", ".join(words)
+
+
+RULE = (  # as study.case.wall chooses
+    "by the dent that a linear wall would get at the largest force: rigid below 2 % of the pads' travel, linear shell"
+    " up to 0.6 of the wall's thickness, nonlinear shell beyond"
+)
+
+
+def compliance_text(scene: Any) -> str:
+    """How an object's wall will be simulated."""
+    level = scene.effects.object
+    if level == "auto":
+        return f"chosen for each candidate: {RULE}"
+    told = "no dent and no stress will be known" if level == "rigid" else "as the scene says"
+    return f"{level.replace('_', ' ')} for every candidate, {told}"
+
+
+def _extent(shape: Any) -> str:
+    """Where the object begins and ends along its axis, and for a mesh what that is counted from."""
+    from softjaw.study.case.build import axis_span
+
+    span = axis_span(shape)
+    if span is None:
+        return ", without end along its axis"
+    text = f", {span[0]:g} to {span[1]:g} mm along its axis"
+    if shape.shape != "mesh":
+        return text
+    return f"{text} (the file's {shape.axis}, counted from the mesh's lowest point; x and y from the middle)"
+
+
+def _list(values: Sequence[Any], unit: str = "") -> str:
+    texts = [f"{v:g}" if isinstance(v, float) else str(v) for v in values]
+    if len(texts) > 6:
+        texts = [*texts[:2], "...", texts[-1], f"({len(values)} values)"]
+        return f"{', '.join(texts[:-1])} {unit} {texts[-1]}".replace("  ", " ")
+    return f"{', '.join(texts)} {unit}".rstrip()
+
+
+def aligned(rows: dict[str, str]) -> list[str]:
+    """One line for each row that says something."""
+    return [f"  {name:<10}  {text}" for name, text in rows.items() if text]

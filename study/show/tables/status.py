@@ -1,0 +1,135 @@
+"""What a result file holds so far: done, failed with reasons, missing, and how each session ended."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.run.lock import holder
+from softjaw.study.run.progress import duration
+from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
+from softjaw.study.show.tables.show import as_text, best, has_poses, place
+
+MOST_REASONS, MOST_PLACES = 12, 3
+PARTS = ("assembly", "factorisation", "friction", "rest")
+STATES = {MISSING: "missing", DONE: "done", FAILED: "failed"}
+
+
+def status_text(result: Any, width: int = PAPER) -> str:
+    """Answer of ``softjaw status``; the file may be growing meanwhile."""
+    runner = holder(result.path)
+    missing = int(np.sum(result.status == MISSING))
+    state = f"running now: {runner}" if runner else "the same 'softjaw run' goes on from here" if missing else ""
+    told = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
+    return "\n".join([*told, *sessions(result, bool(runner), width)])
+
+
+def status_json(result: Any) -> str:
+    """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
+    status = result.status
+    total = {name: int(np.sum(status == code)) for code, name in STATES.items()}
+    told = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
+    told |= {"cases": int(status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    told |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
+    return json.dumps(told, indent=2)
+
+
+def status_csv(result: Any) -> str:
+    """One line for each case, in the order of the file: state, message and place, SI units in the header."""
+    head = ["row", "state", "message", *(with_unit(axis.name, axis.units) for axis in result.axes)]
+    status, messages = result.status.ravel(), result.messages.ravel()
+    rows = ([row, STATES[int(status[row])], str(messages[row]), *_place(result, row)] for row in range(status.size))
+    return csv_text([head, *rows])
+
+
+def _cases(result: Any, state: int) -> list[dict[str, Any]]:
+    """Cases in one state that have a message."""
+    messages = result.messages.ravel()
+    names = [axis.name for axis in result.axes]
+    found = []
+    for row in map(int, np.flatnonzero((result.status.ravel() == state) & (messages != ""))):
+        label = str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]]) if has_poses(result) else None
+        where = dict(zip(names, _place(result, row), strict=True)) | ({"label": label} if label else {})
+        found.append({"row": row, **where, "message": str(messages[row])})
+    return found
+
+
+def _place(result: Any, row: int) -> list[float]:
+    index = np.unravel_index(row, result.layout.shape)
+    return [float(axis.values[i]) for axis, i in zip(result.axes, index, strict=True)]
+
+
+def summary(result: Any) -> str:
+    """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
+    width = terminal_width()
+    table = [as_text(best(result, whole_lines=True), width)] if np.any(result.status == DONE) else []
+    missing = int(np.sum(result.status == MISSING))
+    more = f"; {missing} cases are missing, the same command goes on" if missing else ""
+    return "\n".join(
+        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}{more}"]
+    )
+
+
+def counts(result: Any) -> str:
+    """How many cases are in which state."""
+    status = result.status
+    done, failed = int(np.sum(status == DONE)), int(np.sum(status == FAILED))
+    title = f" ({result.title})" if result.title else ""
+    missing = status.size - done - failed
+    return f"{result.path}{title}:\n  {done} of {status.size} cases done, {failed} failed, {missing} missing"
+
+
+def reasons(result: Any, width: int = PAPER) -> list[str]:
+    """Messages of failed cases, then notes on solved ones, the most frequent first and with some of their places."""
+    status, messages = result.status.ravel(), result.messages.ravel()
+    lines = []
+    for state, title in ((FAILED, "failed"), (DONE, "note")):
+        where: dict[str, list[int]] = {}
+        for row in np.flatnonzero((status == state) & (messages != "")):
+            # a solved case may have several remarks, a failed one has one reason
+            for text in messages[row].split("; ") if state == DONE else [messages[row]]:
+                where.setdefault(text, []).append(int(row))
+        texts = sorted(where, key=lambda text: -len(where[text]))
+        for text in texts[:MOST_REASONS]:
+            places = [place(result, row) for row in where[text][:MOST_PLACES]]
+            more = len(where[text]) - len(places)
+            lines.append(wrapped(f"{title} {len(where[text])} x {text}", width, "  ", "  "))
+            lines.append(wrapped(f"at {'; '.join(places)}" + f"; and {more} more" * (more > 0), width, "      "))
+        if len(texts) > MOST_REASONS:
+            lines.append(f"  {title}: {len(texts) - MOST_REASONS} more messages; --csv lists every case")
+    return lines
+
+
+def time_split(result: Any) -> list[str]:
+    """Where the seconds of all cases went; nothing where no time was measured."""
+    total = float(np.nansum(result.work("seconds_total")))
+    if not total:
+        return []
+    shares = {part: float(np.nansum(result.work(f"seconds_{part}"))) / total for part in PARTS}
+    words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
+    return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
+
+
+def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
+    """One line for each time the study was started."""
+    found: Sequence[dict[str, Any]] = result.sessions
+    lines = []
+    for i, s in enumerate(found):
+        last = i == len(found) - 1
+        reason = s["reason"] if s["stop"] else "running" if last and running else "ended without a word (killed?)"
+        wall = _between(s["start"], s["stop"])
+        ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
+        lines.append(wrapped(f"session {i + 1}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
+    return lines
+
+
+def _between(start: str, stop: str) -> str:
+    try:
+        return f", {duration((datetime.fromisoformat(stop) - datetime.fromisoformat(start)).total_seconds())}"
+    except ValueError:
+        return ""
