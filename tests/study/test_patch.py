@@ -421,7 +421,7 @@ def test_a_table_is_read_without_mpi_petsc_or_vtk(once):
         "-X",
         "importtime",
         "-m",
-        "study",
+        "softjaw",
         "patch",
         str(EXAMPLE),
         "--distance",
