@@ -18,7 +18,7 @@ from softjaw.study.writing import write_file
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
     """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):

@@ -21,7 +21,7 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
         if word.startswith("-contact_"):
             found.append([word[1:], "true"])
         elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
-            from softjaw.study.scene.file_checks import OTHERS
+            from softjaw.study.scene.checks import OTHERS
 
             takes = "softjaw takes only options of the contact solver, -contact_..."
             raise StudyError(USAGE, f"PETSc option '{word}' after '--': {takes}; {OTHERS}")
@@ -33,7 +33,7 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
 def scene_of(options: Namespace) -> Any:
     """The scene that the command line names, with what it changes."""
     from softjaw.study.scene import load_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.case.build import outer_surface
-from softjaw.study.scene.grasp_warnings import half_extent_mm
+from softjaw.study.scene.grasp_checks import half_extent_mm
 
 # Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
 # factors, what they are made from and what is not given back take 16 kB per unknown of the wall.

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from softjaw.fem.objects.length_units import LENGTHS
 from softjaw.study.catalogue.model import is_catalogue
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
-from softjaw.study.scene.shapes import SHAPES, Mesh
+from softjaw.study.scene.objects import SHAPES, Mesh
 from softjaw.study.scene.units import in_si
 
 ROOT = Path(__file__).parents[2]
@@ -81,7 +81,7 @@ WRONG_LINES = [
      "same length"),
     ("[friction]\nmu = -0.1", 12, "friction.mu", "-0.1", ">= 0", "default is 0.8"),
     ("[effects]\nobject = 'soft'", 12, "effects.object", '"soft"', '"auto", "rigid"', "choose one of"),
-    ("[effects]\nfingers = 'one'", 12, "effects.fingers", '"one"', '"two"', "does not simulate it"),
+    ("[effects]\nfingers = 'one'", 12, "effects.fingers", '"one"', '"two"', 'one of "auto", "two"'),
     ("[effects]\npad = 'linear'\nfriction_pressure_coupling = 'tangential'", 13, "effects.friction_pressure_coupling",
      'pad = "linear"', "finite strains", "hyperelastic"),
     ("[effects]\nlimit_surface = 'cubic'", 12, "effects.limit_surface", '"cubic"', '"three_motions"', "choose one of"),

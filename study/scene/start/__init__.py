@@ -131,7 +131,7 @@ def _about_mesh(options: argparse.Namespace, scene: Path) -> dict[str, str]:
 def _size(options: argparse.Namespace) -> tuple[tuple[float, float], float]:
     """Extents across and along the axis [mm] of a mesh that a study can take."""
     from softjaw.study.case.build import build_object
-    from softjaw.study.scene.shapes import Mesh
+    from softjaw.study.scene.objects import Mesh
 
     shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)
     try:
