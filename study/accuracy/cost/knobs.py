@@ -117,7 +117,7 @@ def refusal(scene: Scene, level: Level) -> str:
 
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
-    from softjaw.study.run.wall_cost import wall_size
+    from softjaw.study.run.plan import wall_size
 
     times = 1.0
     for key, levels in DEARER.items():

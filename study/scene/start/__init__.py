@@ -8,8 +8,8 @@ import os
 import re
 import shlex
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from softjaw.study.exits import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.writing import write_file
@@ -44,8 +44,8 @@ def kinds() -> str:
     return "\n".join(f"  {name:<9} {text}" for name, text in KINDS.items())
 
 
-def init(options: argparse.Namespace) -> str:
-    """Write both files, and tell what to do next.
+def init(options: argparse.Namespace, measure: Callable[[argparse.Namespace], Sequence[float]]) -> str:
+    """Write both files, and tell what to do next; ``measure`` gives the extents of the mesh [mm], the axis last.
 
     Raises
     ------
@@ -62,9 +62,9 @@ def init(options: argparse.Namespace) -> str:
             CANNOT_WRITE, f"{' and '.join(there)}: there already; choose another name with -o, or add --force"
         )
     words = {"NAME": base.name, "SOFTJAW": _program()}
-    mesh = _about_mesh(options, scene) if options.kind == "mesh" else {}
-    words |= mesh
-    _write({scene: _filled(f"{options.kind}.toml", words), batch: _filled("run.sbatch", words)})
+    mesh = _about_mesh(options, scene, measure) if options.kind == "mesh" else {}
+    for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
+        write_file(path, _filled(template, words | mesh), folders=True)
     unit = f"--unit {options.unit} --axis {options.axis}"
     measured = [f"object:  {mesh['SIZE']} mm, the last along its axis, with {unit}"] if mesh else []
     lines = [
@@ -100,19 +100,14 @@ def _filled(template: str, words: dict[str, str]) -> str:
     return text
 
 
-def _write(texts: dict[Path, str]) -> None:
-    for path, text in texts.items():
-        write_file(path, text, folders=True)
-
-
-def _about_mesh(options: argparse.Namespace, scene: Path) -> dict[str, str]:
+def _about_mesh(options: argparse.Namespace, scene: Path, measure: Callable) -> dict[str, str]:
     """What the scene says of a mesh: its file, and stations and pads that fit its size."""
     if not options.mesh or not options.unit:
         needs = {"--mesh FILE": options.mesh, "--unit": options.unit}
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
-    across, height = _size(options)
+    *across, height = measure(options)
     length = min(PAD_LENGTH, _rounded(0.5 * height))
     width = min(PAD_WIDTH, _rounded(min(across)))
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
@@ -126,20 +121,6 @@ def _about_mesh(options: argparse.Namespace, scene: Path) -> dict[str, str]:
         "LOW": f"{_rounded(0.5 * length):g}",
         "HIGH": f"{height - 0.5 * length:.4g}",
     }
-
-
-def _size(options: argparse.Namespace) -> tuple[tuple[float, float], float]:
-    """Extents across and along the axis [mm] of a mesh that a study can take."""
-    from softjaw.study.case.build import build_object
-    from softjaw.study.scene.objects import Mesh
-
-    shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)
-    try:
-        built: Any = build_object(shape)
-    except (ValueError, OSError) as error:
-        raise StudyError(USAGE, f"--mesh: {error}") from error
-    sides = 1e3 * (built.bounds[1] - built.bounds[0])
-    return (float(sides[0]), float(sides[1])), float(sides[2])
 
 
 def _rounded(length: float) -> float:
