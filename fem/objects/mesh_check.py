@@ -58,8 +58,7 @@ def sound_mesh(
         raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     _check_numbers(points, triangles)
     points, triangles, notes = _merged(points, triangles)
-    if not _every_edge_twice(triangles):  # corners that rounding moved apart are only looked for where there is need
-        points, triangles, notes = _merged(_snapped(points), triangles, notes)
+    points, triangles, notes = _merged(_snapped(points), triangles, notes)
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
     neighbours = _closed(triangles)
@@ -103,11 +102,6 @@ def _check_size(extent: float, unit: str) -> None:
     advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
     raise MeshError(f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
                     f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
-
-
-def _every_edge_twice(triangles: IntArray) -> bool:
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _snapped(points: FloatArray) -> FloatArray:
@@ -235,4 +229,7 @@ def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> fl
     A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
     lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
-    return float(np.arctan2(dot(a, np.cross(b, c)), lower).sum() / (2 * np.pi))
+    # a triangle on which x lies up to rounding is seen under half a turn or its negative: it counts as neither
+    side, noise = dot(a, np.cross(b, c)), ROUNDED * np.abs(points).max() * (A * B + B * C + C * A)
+    on = (np.abs(side) <= noise) & (lower <= SURE * A * B * C + noise)
+    return float(np.where(on, 0.0, np.arctan2(side, lower)).sum() / (2 * np.pi))
