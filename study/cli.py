@@ -20,7 +20,6 @@ from softjaw.study.environment import keep_compiled_loops, pin_threads
 from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError
 from softjaw.study.patch.command import add_options as add_patch_options
 from softjaw.study.run.memory import is_out_of_memory, no_room
-from softjaw.study.scene.start import add_options as add_init_options
 from softjaw.study.show.figures.command import add_options as add_figure_options
 from softjaw.study.show.tables.watch import add_options as add_watch_options
 from softjaw.study.show.view.command import add_choice
@@ -28,6 +27,12 @@ from softjaw.study.show.view.command import add_options as add_view_options
 from softjaw.study.speaking import complain, first_rank
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
+KINDS = {
+    "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
+    "cup": "a thin-walled cup: dents, and the window of forces that hold it without spilling",
+    "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
+    "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
+}
 SHELLS = ("bash", "zsh", "fish")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words
     "prepare": (
@@ -194,7 +199,7 @@ def program() -> Program:
             epilog=f"example:\n  {ranks}softjaw {example}",
         )  # fmt: skip
         made[name].set_defaults(command=getattr(commands, name))
-    for name, add_options in (("init", add_init_options), ("cost", add_cost_options), ("watch", add_watch_options),
+    for name, add_options in (("init", _add_init_options), ("cost", add_cost_options), ("watch", add_watch_options),
                               ("view", add_view_options), ("figure", add_figure_options), ("patch", add_patch_options),
                               ("repair", _add_repair_options), ("scale", _add_scale_options)):  # fmt: skip
         add_options(made[name])
@@ -202,6 +207,22 @@ def program() -> Program:
     _add_result_options(made)
     made["completion"].add_argument("shell", choices=SHELLS, help="the shell that is to learn softjaw's words")
     return parser
+
+
+def _add_init_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    kinds = "kinds:\n" + "\n".join(f"  {name:<9} {text}" for name, text in KINDS.items())
+    add("kind", choices=tuple(KINDS), help="what to start from")
+    add("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the kind, or the "
+        "name of the mesh)")  # fmt: skip
+    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj or .ply")
+    add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
+    add("--axis", choices=("x", "y", "z"), default="z", help="axis of the mesh along which grasps are spread "
+        "(default z)")  # fmt: skip
+    add("--force", action="store_true", help="replace files that are there")
+    add("--list", action="version", version=kinds, help="list the kinds and leave")
+    more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"
+    parser.epilog = f"{parser.epilog}\n  {more}\n\n{kinds}"
 
 
 def _add_scene_options(made: dict[str, Any]) -> None:
