@@ -28,7 +28,7 @@ from softjaw.study.case.limit_surface import Bound, bound
 from softjaw.study.case.solving import Solver, solver
 from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
-from softjaw.study.scene.score_sections import LimitSurface
+from softjaw.study.scene.sections import LimitSurface
 from softjaw.study.show import pictures
 
 TARGET = 0.02  # relative error of e_n that a skip may have

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import traceback
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace, _SubParsersAction
 from pathlib import Path
 from typing import Any
 
 from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.preparation import prepare, scene_of, target, with_target_met, work
 from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
-from softjaw.study.run.running import prepare, scene_of, target, with_target_met, work
 from softjaw.study.speaking import complain, say
 from softjaw.study.writing import write_file
+
+FILES = ("SCENE", "FILE", "HTML", "PNG", "PICTURE", "VTKHDF")  # metavars of words that are files
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
     """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):
@@ -43,8 +46,21 @@ def init(options: Namespace) -> int:
     """Write a scene and a batch script to start from."""
     from softjaw.study.scene.start import init
 
-    print(init(options))
+    print(init(options, _mesh_size))
     return DONE
+
+
+def _mesh_size(options: Namespace) -> list[float]:
+    """Extents across and along the axis [mm] of a mesh that a study can take."""
+    from softjaw.study.case.build import build_object
+    from softjaw.study.scene.objects import Mesh
+
+    shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)
+    try:
+        bounds: Any = build_object(shape).bounds
+    except (ValueError, OSError) as error:
+        raise StudyError(USAGE, f"--mesh: {error}") from error
+    return [1e3 * float(high - low) for low, high in zip(*bounds, strict=True)]
 
 
 def _catalogue(options: Namespace) -> bool:
@@ -202,11 +218,17 @@ def figure(options: Namespace) -> int:
 
 
 def completion(options: Namespace) -> int:
-    """Print a script that lets a shell complete the words of this program."""
-    from softjaw.study.cli import program
-    from softjaw.study.completion import script
+    """Print a script that lets a shell complete the words of this program, files among them."""
+    import shtab
 
-    print(script(program(), options.shell))
+    from softjaw.study.cli import program
+
+    parser: ArgumentParser = program()
+    commands = next(a for a in parser._actions if isinstance(a, _SubParsersAction)).choices.values()
+    for action in (action for made in commands for action in made._actions):
+        if action.metavar in FILES:
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(parser, options.shell))
     return DONE
 
 
@@ -221,8 +243,6 @@ def cost(options: Namespace) -> int:
 
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
-    import json
-
     from softjaw.study.scene import Scene
 
     print(json.dumps(Scene.model_json_schema(), indent=2))
@@ -263,7 +283,7 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from softjaw.study.run.run import on_rank0, run_study
+    from softjaw.study.run.session import on_rank0, run_study
 
     if on_rank0(comm, _catalogue, options):
         from softjaw.study.catalogue.run import run_catalogue

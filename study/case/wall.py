@@ -20,7 +20,7 @@ from softjaw.study.case.margin import MARGIN, surely_below
 from softjaw.study.flags import Flag
 from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
-from softjaw.study.scene.shape import Walled
+from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
 RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.result.quantities lists them

@@ -12,9 +12,9 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.result.quantities import quantities
 from softjaw.study.result.quantity import NEEDS
-from softjaw.study.scene.errors import SceneError, first_of
-from softjaw.study.scene.loading import NAMES
-from softjaw.study.scene.shape import Section
+from softjaw.study.scene.model import NAMES
+from softjaw.study.scene.objects import Section
+from softjaw.study.scene.problems import SceneError, first_of
 from softjaw.study.scene.text import parse_toml, read_text
 
 MOST_REPETITIONS, LONGEST = 3, 300  # in a regular expression

@@ -15,7 +15,7 @@ from softjaw.study.catalogue.scenes import case_scene
 from softjaw.study.catalogue.table import table_text
 from softjaw.study.catalogue.verdict import judge
 from softjaw.study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
-from softjaw.study.scene.errors import first_of
+from softjaw.study.scene.problems import first_of
 from softjaw.study.writing import make_folders
 
 
@@ -30,8 +30,8 @@ def run_catalogue(options: Namespace, comm: Any) -> int:
 
     A case is solved by one rank, so none waits for another. Whatever a case dies of is its outcome.
     """
-    from softjaw.study.run.run import on_rank0
     from softjaw.study.run.schedule import Claims
+    from softjaw.study.run.session import on_rank0
 
     path, folder = Path(options.scene), folder_of(options)
     catalogue = on_rank0(comm, load_catalogue, path)
@@ -65,8 +65,8 @@ def _solve(catalogue: Catalogue, case: Case, path: Path, folder: Path, options: 
     """Solve one case alone on this rank: its exit code, and why it was refused."""
     from mpi4py import MPI
 
-    from softjaw.study.run.run import run_study
-    from softjaw.study.run.running import petsc_overrides, prepare, work
+    from softjaw.study.preparation import petsc_overrides, prepare, work
+    from softjaw.study.run.session import run_study
 
     overrides = [*options.overrides, *petsc_overrides(options.petsc)]
     own = Namespace(scene=str(path), overrides=overrides, petsc=[])

@@ -9,8 +9,8 @@ from typing import Any
 from softjaw.study.catalogue.model import Case, Catalogue
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.scene import Scene, parse_scene
-from softjaw.study.scene.errors import SceneError
-from softjaw.study.scene.loading import ALTERNATIVES
+from softjaw.study.scene.load import ALTERNATIVES
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.text import parse_toml, read_text, toml_text
 
 WHOLE = {"object": ("shape",), "candidates": sum(ALTERNATIVES, ())}  # keys that make a section replace its base's

@@ -126,7 +126,7 @@ def turning(source: Source) -> tuple[float, bool]:
     this version cannot read has a whole turn as its period.
     """
     from softjaw.study.scene import parse_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         scene = parse_scene(source.scene, check_files=False)

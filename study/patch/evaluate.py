@@ -23,7 +23,7 @@ from softjaw.study.case.limit_surface import STANDS_IN, fitted, judging_twists
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.result.quantity import MODELS
-from softjaw.study.scene.errors import Problem
+from softjaw.study.scene.problems import Problem
 
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")  # as a scene names them
 FITTED_ON = 500  # Fibonacci motions; a fit is judged on others

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softjaw.friction.orientation import slivers
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.study.exits import USAGE, StudyError
-from softjaw.study.scene.errors import Problem
+from softjaw.study.scene.problems import Problem
 
 MOST_PROBLEMS = 10  # told of one file
 

@@ -16,7 +16,7 @@ from softjaw.study.patch.columns import UNITS, split_header
 from softjaw.study.patch.faces import Faces, corner_geometry
 from softjaw.study.patch.reading import Reading, check_count
 from softjaw.study.result.trial import trouble
-from softjaw.study.scene.errors import Problem, closest
+from softjaw.study.scene.problems import Problem, closest
 
 READERS = {".vtu": vtkXMLUnstructuredGridReader, ".vtp": vtkXMLPolyDataReader}
 TRIANGLE, QUAD, POLYGON, PIXEL = 5, 9, 7, 8

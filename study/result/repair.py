@@ -18,7 +18,7 @@ from softjaw.study.exits import CANNOT_WRITE, IN_USE, OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT
 from softjaw.study.result.store import ResultWriter, create, open_result, rows_of
 from softjaw.study.run.lock import holder
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.writing import remove
 
 SIGNATURE, END = b"\x89HDF\r\n\x1a\n", struct.Struct("<40xQ")  # version 0, which this program writes: size at byte 40

@@ -10,7 +10,7 @@ import numpy as np
 
 from softjaw.fem.objects.mesh_check import MeshError
 from softjaw.study.exits import StudyError
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
 
 

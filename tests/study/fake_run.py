@@ -107,7 +107,7 @@ def main():
     from mpi4py import MPI
 
     from softjaw.study.exits import StudyError
-    from softjaw.study.run.run import Work, run_study
+    from softjaw.study.run.session import Work, run_study
     from softjaw.study.show.tables.status import summary
     from softjaw.study.speaking import complain
 

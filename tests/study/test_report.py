@@ -23,7 +23,7 @@ from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
 from softjaw.study.result.result import CaseResult
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.scene.shapes import EllipticCylinder, Sphere
+from softjaw.study.scene.objects import EllipticCylinder, Sphere
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, shape_outline, slice_polygon

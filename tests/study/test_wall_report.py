@@ -18,8 +18,7 @@ from softjaw.study.flags import Flag
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.run.plan import make_plan, memory, plan_text
-from softjaw.study.run.wall_cost import wall_size
+from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data

@@ -14,7 +14,7 @@ from typing import Any, get_args
 from softjaw.study.case.build import has_wall
 from softjaw.study.result.quantities import EFFECTS
 from softjaw.study.scene import Scene
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.sections import Effects, WallSize
 
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
@@ -117,7 +117,7 @@ def refusal(scene: Scene, level: Level) -> str:
 
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
-    from softjaw.study.run.wall_cost import wall_size
+    from softjaw.study.run.plan import wall_size
 
     times = 1.0
     for key, levels in DEARER.items():

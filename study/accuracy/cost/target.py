@@ -14,7 +14,7 @@ from softjaw.study.accuracy.cost.measure import measure_once, warm_up
 from softjaw.study.accuracy.cost.study import costs, new_study
 from softjaw.study.exits import OTHER_FILE, StudyError
 from softjaw.study.scene import Scene
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 
 CHOSEN = ("gripper.elements", "gripper.element")  # with the sections effects and accuracy: what a choice may change
 
@@ -92,7 +92,7 @@ def stored_scene(path: Path, study: CostStudy) -> Scene:
 
 def refuse_other(path: Path, scene: Scene, measured: Scene) -> None:
     """Refuse a study of another object, pad or friction; meshes, candidates and forces may differ."""
-    from softjaw.study.scene.difference import changes
+    from softjaw.study.scene.text import changes
 
     free = (
         "accuracy.",

@@ -10,7 +10,7 @@ import numpy as np
 from softjaw.study.accuracy.cost.choose import NO_LOSS, Choice, Combination, best_of, combinations
 from softjaw.study.accuracy.cost.errors import KnobErrors
 from softjaw.study.accuracy.cost.file import CostStudy
-from softjaw.study.scene.difference import value_text
+from softjaw.study.scene.text import value_text
 
 GOALS = (0.05, 0.02, 0.01, 0.005, 0.002)
 NEEDED = 0.01  # change of e_n from which an effect is needed

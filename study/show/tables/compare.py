@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.result.layout import DONE
-from softjaw.study.scene.difference import changes
+from softjaw.study.scene.text import changes
 from softjaw.study.show.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.scene.difference import value_text
+from softjaw.study.scene.text import value_text
 from softjaw.study.show.tables.columns import DISPLAY, PAPER, aligned, csv_text, two_lines, with_unit, wrapped
 from softjaw.study.show.tables.compare import AxisMatch, Comparison, Difference
 from softjaw.study.show.tables.ranking import falling

@@ -1,4 +1,4 @@
-"""From the words of a command line to what is run: scene, result file, plan, and how its cases are solved."""
+"""From a command line to a run: scene with overrides, target of accuracy, plan, and how the cases are solved."""
 
 from __future__ import annotations
 
@@ -21,10 +21,8 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
         if word.startswith("-contact_"):
             found.append([word[1:], "true"])
         elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
-            from softjaw.study.scene.file_checks import OTHERS
-
-            takes = "softjaw takes only options of the contact solver, -contact_..."
-            raise StudyError(USAGE, f"PETSc option '{word}' after '--': {takes}; {OTHERS}")
+            text = f"PETSc option '{word}' after '--': softjaw takes only options of the contact solver, -contact_..."
+            raise StudyError(USAGE, f"{text}; others go into the environment variable PETSC_OPTIONS")
         else:
             found[-1][1] = word
     return [f"petsc.{name}={value}" for name, value in found]
@@ -33,7 +31,7 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
 def scene_of(options: Namespace) -> Any:
     """The scene that the command line names, with what it changes."""
     from softjaw.study.scene import load_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
@@ -69,7 +67,7 @@ def work(scene: Any, choice: Any = None) -> Any:
     from softjaw.study import pipeline
     from softjaw.study.accuracy.cost import stored
     from softjaw.study.result import derived
-    from softjaw.study.run.run import Work
+    from softjaw.study.run.session import Work
     from softjaw.study.show.tables.status import summary
 
     def finalise(writer: Any) -> None:
