@@ -103,7 +103,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
 
 
 def _size(key: str) -> float:
-    from softjaw.study.scene.units import UNITS, split_unit
+    from softjaw.study.units import UNITS, split_unit
 
     unit = split_unit(key)[1]
     return UNITS[unit].size if unit else 1.0
