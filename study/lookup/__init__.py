@@ -28,8 +28,8 @@ from softjaw.study.lookup.interpolation import (
 )
 from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, read_source, turning
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantity import MODELS
 from softjaw.study.units import UNITS
 
 NUMBER = (float, int)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.patch.answer import DEFINITIONS, UNITS, Answer, as_record
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
 
 FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")

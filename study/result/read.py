@@ -14,10 +14,9 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
+from softjaw.study.quantities import EFFECTS, FINGERS, MODELS, REASONS
 from softjaw.study.result.datasets import Dataset
 from softjaw.study.result.layout import DONE, ROOT
-from softjaw.study.result.quantities import EFFECTS, REASONS
-from softjaw.study.result.quantity import FINGERS, MODELS
 from softjaw.study.result.reading import Result
 from softjaw.study.result.store import open_result
 
@@ -171,7 +170,7 @@ def _solved(result: Result, scales: tuple[str, ...], values: np.ndarray) -> np.n
 
 
 def _of(q: Any) -> dict[str, Any]:
-    return {"units": q.units, "long_name": q.long_name, "definition": q.definition}
+    return {"units": q.unit, "long_name": q.label, "definition": q.definition}
 
 
 def _about(d: Dataset) -> dict[str, Any]:

@@ -134,7 +134,7 @@ def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
         if f"{name}_band" in bands:
             yield f"{name}_band", units, result.derived(f"{name}_band")
         elif error := there.get(f"{name}_error"):
-            yield error.name, error.units, result.map(error.name)
+            yield error.name, error.unit, result.map(error.name)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
