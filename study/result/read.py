@@ -128,7 +128,8 @@ def dataset(result: Result) -> xr.Dataset:
     for d in layout.derived:
         scales = tuple(name.replace(".", "_") for name in d.axes)
         if not d.shape:
-            variables[d.name] = xr.Variable(scales, result.derived(d.name), _of(d))
+            about = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
+            variables[d.name] = xr.Variable(scales, result.derived(d.name), about)
     status = result.status  # last: rows that a run began anew meanwhile are missing now
     for variable in variables.values():
         _blank(variable, status, layout.names)
