@@ -88,7 +88,7 @@ class GuardedFile:
         try:
             yield
         except BROKEN as error:
-            text = f"{self.path}: damaged ({path}: {reason(error)}); restore it from a copy, or try 'softjaw repair'"
+            text = f"{self.path}: damaged ({path}: {reason(error)}); restore it from a copy"
             raise StudyError(OTHER_FILE, text) from error
 
 

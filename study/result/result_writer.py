@@ -71,10 +71,6 @@ class ResultWriter:
         """Store why a case has no result."""
         self._store(row, blank(self.layout, message), FAILED)
 
-    def copy(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
-        """Store a row as another file has it."""
-        self._store(row, values, state)
-
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
         if self._code[index] == DONE:
