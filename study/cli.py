@@ -47,7 +47,6 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor"),
         ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5"),
         ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf"),
-        ("repair", "what of a damaged file is good; make it usable again", "repair results/bottle-rigid.hdf --write"),
         ("scale", "replay the times of a finished file on many ranks",
          "scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"),
     ),
@@ -201,7 +200,7 @@ def program() -> Program:
         made[name].set_defaults(command=getattr(commands, name))
     for name, add_options in (("init", _add_init_options), ("cost", add_cost_options), ("watch", add_watch_options),
                               ("view", add_view_options), ("figure", add_figure_options), ("patch", add_patch_options),
-                              ("repair", _add_repair_options), ("scale", _add_scale_options)):  # fmt: skip
+                              ("scale", _add_scale_options)):  # fmt: skip
         add_options(made[name])
     _add_scene_options(made)
     _add_result_options(made)
@@ -258,13 +257,6 @@ def _add_result_options(made: dict[str, Any]) -> None:
     made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
     add_choice(made["report"])
     made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
-
-
-def _add_repair_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("--write", action="store_true", help="write what is good to a copy, NAME.repaired.hdf")
-    how.add_argument("--in-place", action="store_true", help="the same under the file's name; keeps NAME.hdf.backup")
 
 
 def _add_scale_options(parser: argparse.ArgumentParser) -> None:

@@ -10,8 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from softjaw.study.exits import USAGE, StudyError
-from softjaw.study.result.quantities import quantities
-from softjaw.study.result.quantity import NEEDS
+from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene.model import NAMES
 from softjaw.study.scene.objects import Section
 from softjaw.study.scene.problems import SceneError, first_of

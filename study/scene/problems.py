@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from softjaw.study.scene.units import UNITS, split_unit
 from softjaw.study.show.tables.printable import printable
+from softjaw.study.units import UNITS, split_unit
 
 KeyPath = tuple[str | int, ...]
 MOST_TOLD = 50  # problems in one message
@@ -92,7 +92,7 @@ def unknown_key(path: KeyPath, value: Any, keys: Sequence[str], elsewhere: Mappi
     expected = f"a key of [{key_text(path[:-1])}]"
     if same:
         target = split_unit(same[0])[1]
-        converts = _is_number(value) and unit and target and UNITS[unit].kind == UNITS[target].kind
+        converts = _is_number(value) and unit and target and UNITS[unit].si == UNITS[target].si
         converted = f" = {value * UNITS[unit].size / UNITS[target].size:.10g}" if converts else ""
         remedy = f"the unit is part of the key, so write `{same[0]}{converted}`"
     elif home:
@@ -218,7 +218,7 @@ def _other_unit(value: float, unit: str, schema: Mapping[str, Any]) -> str:
     positive = {"exclusiveMinimum": 0.0, **schema}
     for other in UNITS.values():
         meant = value * other.size / UNITS[unit].size
-        same_kind = other.kind == UNITS[unit].kind in ("length", "pressure") and other != UNITS[unit]
+        same_kind = other.si == UNITS[unit].si in ("m", "Pa") and other != UNITS[unit]
         if same_kind and _fits(meant, positive):
             return f"the unit is {UNITS[unit].text}: if {other.text} was meant, write {meant:.10g}"
     return ""

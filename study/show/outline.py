@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.wall_quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.show.data import Data
 
 Outline = tuple[np.ndarray, np.ndarray, bool]

@@ -14,7 +14,7 @@ from softjaw.fem.objects.length_units import LENGTHS
 from softjaw.study.catalogue.model import is_catalogue
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
 from softjaw.study.scene.objects import SHAPES, Mesh
-from softjaw.study.scene.units import in_si
+from softjaw.study.units import in_si
 
 ROOT = Path(__file__).parents[2]
 JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]

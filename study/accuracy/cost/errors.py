@@ -14,7 +14,7 @@ from softjaw.study.accuracy.cost.knobs import Knob, Level
 from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured
 
 FloatArray = NDArray[np.float64]
-COARSE, NODAL = 4096, 512  # flags, as study.result.quantities says
+COARSE, NODAL = 4096, 512  # flags, as study.quantities says
 ALIKE = 1e-9  # relative difference of values that is none: the same state by another order of sums
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from softjaw.study.case.build import has_wall
-from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.quantities import EFFECTS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.sections import Effects, WallSize
@@ -207,7 +207,7 @@ def _collocation(scene: Scene) -> Knob:
 
 
 def _effects(scene: Scene) -> Iterable[Knob]:
-    """One knob for every effect with levels to choose from, in the order of `study.result.quantities.EFFECTS`."""
+    """One knob for every effect with levels to choose from, in the order of `study.quantities.EFFECTS`."""
     for name, field in Effects.model_fields.items():
         levels = [level for level in get_args(field.annotation) if level != "auto"]
         if name in OWN or len(levels) < 2 or (name == "object" and not has_wall(scene.object)):
