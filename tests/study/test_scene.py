@@ -153,7 +153,7 @@ WRONG_VALUES = [
     ("[0]", "[0]\nstations = 3\nstation_range_mm = [0, 9]", 6, "candidates.stations_mm", "stations and"),
     ("stations_mm = [0]", "stations = 3\nstation_range_mm = [9, 0]", 7, "candidates.station_range_mm", "[9, 0]",
      "[0, 9]"),
-    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [degrees]"),
+    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [deg]"),
     ("[0]", "[0]\nangles_deg = [0, inf]", 7, "candidates.angles_deg[1]", "<= 360", "360"),
     ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2", "> 0 and <= 1000 [N]"),
     ("[1]", "[0]", 9, "load.normal_force_n[0]", "0", "> 0"),
