@@ -15,7 +15,6 @@ from softjaw.study.result.wall_quantities import WALL
 
 EFFECTS = {
     "object": ("rigid", "linear shell", "nonlinear shell"),
-    "pad": ("linear", "hyperelastic"),
     "sheet": ("rigid", "elastic plate"),
     "model_size": ("quarter", "half", "full"),
     "fingers": ("one", "two"),
@@ -27,7 +26,6 @@ EFFECTS = {
 # What the indicator of an effect is, where it has one; effects/<name>_indicator.
 INDICATORS = {
     "object": "dent that a linear wall would get at the largest force, over the wall's thickness",
-    "pad": "largest |principal stretch - 1| of the pads in this state",
     "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",
