@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.errors import MeshError
 from softjaw.study.exits import StudyError
 from softjaw.study.scene.errors import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
@@ -87,6 +87,11 @@ def obj():
     ).encode()
 
 
+def off():
+    rows = [*(" ".join(f"{x:g}" for x in p) for p in POINTS), *(f"3 {a} {b} {c}" for a, b, c in FACES)]
+    return ("OFF\n6 8 0\n" + "\n".join(rows) + "\n").encode()
+
+
 def ply(binary):
     head = f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex 6\n"
     head += "".join(f"property float {axis}\n" for axis in "xyz")
@@ -147,6 +152,7 @@ QUICK = {
     "binary STL": Reader("mesh.stl", stl(True), BINARY, _mesh, (MeshError,)),
     "OBJ": Reader("mesh.obj", obj(), TEXTUAL, _mesh, (MeshError,)),
     "ASCII PLY": Reader("mesh.ply", ply(False), TEXTUAL, _mesh, (MeshError,)),
+    "OFF": Reader("mesh.off", off(), TEXTUAL, _mesh, (MeshError,)),
     "binary PLY": Reader("mesh.ply", ply(True), TEXTUAL, _mesh, (MeshError,)),
 }
 

@@ -10,7 +10,7 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.study.catalogue.model import is_catalogue
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
 from softjaw.study.scene.shapes import SHAPES, Mesh

@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=tuple(KINDS), help="what to start from")
     parser.add_argument("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the "
                         "kind, or the name of the mesh)")  # fmt: skip
-    parser.add_argument("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj or .ply")
+    parser.add_argument("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
     parser.add_argument("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
     parser.add_argument("--axis", choices=("x", "y", "z"), default="z", help="axis of the mesh along which grasps are "
                         "spread (default z)")  # fmt: skip
