@@ -9,7 +9,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, StudyError
 from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
 from softjaw.study.run.running import prepare, scene_of, target, with_target_met, work
 from softjaw.study.speaking import complain, say
@@ -47,23 +47,12 @@ def init(options: Namespace) -> int:
     return DONE
 
 
-def _catalogue(options: Namespace) -> bool:
-    from softjaw.study.catalogue.model import is_catalogue
-
-    return is_catalogue(Path(options.scene))
-
-
 def check(options: Namespace) -> int:
-    """Find every error of a scene or of a catalogue, or say what would be run."""
+    """Find every error of a scene, or say what would be run."""
     from softjaw.study.case.build import check_object
     from softjaw.study.show.tables.columns import hanging, terminal_width
     from softjaw.study.show.tables.overview import scene_text
 
-    if _catalogue(options):
-        from softjaw.study.catalogue.run import check_text
-
-        say(check_text(Path(options.scene), options.overrides))
-        return DONE
     scene = scene_of(options)
     check_object(scene)
     say(hanging(scene_text(scene, options.scene), terminal_width()))
@@ -76,9 +65,6 @@ def plan(options: Namespace) -> int:
     from softjaw.study.run.plan import make_plan, plan_text
     from softjaw.study.show.tables.columns import hanging, terminal_width
 
-    if _catalogue(options):
-        text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
-        raise StudyError(USAGE, f"{options.scene}: {text}")
     scene = scene_of(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
@@ -264,11 +250,6 @@ def run(options: Namespace) -> int:
 
 def _run_on(comm: Any, options: Namespace) -> int:
     from softjaw.study.run.run import on_rank0, run_study
-
-    if on_rank0(comm, _catalogue, options):
-        from softjaw.study.catalogue.run import run_catalogue
-
-        return run_catalogue(options, comm)
 
     def read() -> tuple[Any, Path]:
         scene = scene_of(options)

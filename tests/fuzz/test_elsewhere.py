@@ -19,7 +19,6 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.study.catalogue.model import load_catalogue
 from softjaw.study.cli import main
 from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
 from softjaw.study.patch.reading import Reading, read_patch
@@ -30,7 +29,7 @@ from softjaw.study.show.tables.columns import csv_text
 from softjaw.study.show.tables.printable import UNPRINTABLE
 from softjaw.study.show.view.server import server
 from tests.fuzz.lies import EVIL, LIES
-from tests.fuzz.readers import CATALOGUE, QUICK, SCENE, obj, ply, stl
+from tests.fuzz.readers import QUICK, SCENE, obj, ply, stl
 from tests.study.formula_results import make
 from tests.study.launching import ROOT
 from tests.study.patch_files import cylinder_mesh, vtk
@@ -116,7 +115,7 @@ def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told
     assert f'mesh = "{tmp_path / "body.stl"}"' in load_scene(inner / "scene.toml").effective_toml()
 
 
-# --- scenes and catalogues ---
+# --- scenes ---
 
 
 @pytest.mark.parametrize("file", ["/tmp/x.hdf", "../x.hdf", "a/../../x.hdf", "C:/x.hdf"])
@@ -144,23 +143,6 @@ def test_problems_are_not_told_by_the_thousand(tmp_path):
         parse_scene(BALL + "[[candidates.poses]]\n" * 500)
     assert len(str(refused.value).splitlines()) < 60
     assert len(refused.value.problems) > 500
-
-
-@pytest.mark.parametrize(
-    "pattern", ["(a+)+$", *(pytest.param(p, marks=pytest.mark.long) for p in ("(.|a){90}", ".*.*.*.*x", "a" * 400))]
-)
-def test_a_pattern_that_may_take_for_ever_is_no_reason(tmp_path, told, pattern):
-    path = tmp_path / "cases.toml"
-    path.write_bytes(CATALOGUE.replace(b"mu.*0", pattern.encode()))
-    assert "may take for ever" in told("check", path)[1]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("text", [b"[[case]]\na = [", b"[[case]]\na = " + b"[" * 9999, CATALOGUE + b'base = "x"'])
-def test_a_catalogue_that_is_no_toml_is_refused(tmp_path, told, text):
-    path = tmp_path / "cases.toml"
-    path.write_bytes(text)
-    assert told("check", path)[0] == USAGE
 
 
 # --- patches ---
@@ -335,11 +317,3 @@ def test_names_of_columns_are_told_without_control_characters(tmp_path):
         read_patch(str(path), Reading("mm", "kpa"))
     assert "\\u0000x_mm" in str(told.value)
     assert not UNPRINTABLE.search(str(told.value))
-
-
-def test_a_catalogue_tells_only_the_first_of_many_problems(tmp_path):
-    path = tmp_path / "cases.toml"
-    path.write_text("[[case]]\n" * 400)
-    with pytest.raises(StudyError, match="more problems") as told:
-        load_catalogue(path)
-    assert len(told.value.message.splitlines()) < 60

@@ -11,13 +11,12 @@ import pytest
 from pydantic import ValidationError
 
 from softjaw.fem.objects.mesh_file import LENGTHS
-from softjaw.study.catalogue.model import is_catalogue
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
 from softjaw.study.scene.shapes import SHAPES, Mesh
 from softjaw.study.scene.units import in_si
 
 ROOT = Path(__file__).parents[2]
-JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]
+JOBS = sorted((ROOT / "jobs").glob("*.toml"))
 BALL = """[object]
 shape = "sphere"
 radius_mm = 30
