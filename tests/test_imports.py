@@ -40,8 +40,8 @@ DOORS = {
         "study/result/vtkhdf.py",
         "study/accuracy/cost/file.py",
     },
-    "pyvista": PICTURES,
-    "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
+    "pyvista": PICTURES | {"study/patch/reading.py"},
+    "vtkmodules": PICTURES | {"study/patch/reading.py"},
 }
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]

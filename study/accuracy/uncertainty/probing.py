@@ -10,7 +10,7 @@ import numpy as np
 from softjaw.study.accuracy.uncertainty.variations import Variation, moved_poses, variations
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.grasp import quality
+from softjaw.study.case.evaluate import quality, settings_of
 from softjaw.study.case.solving import solver
 from softjaw.study.exits import StudyError
 from softjaw.study.run.stopping import TimeLimitError
@@ -61,10 +61,10 @@ def _ladder(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
     poses = moved_poses(unit.candidate.poses, variation.shift, variation.turn)
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in poses]
-    solving = solver(scene, fingers, poses)
+    solving, settings = solver(scene, fingers, poses), settings_of(scene, obj)
     try:
         for outcome in solving.ladder(scene.load.normal_force):
             contacts = [c for c, *_ in outcome.contacts]
-            yield min(c.limits["curved"].e_n for c in contacts), quality(scene, obj, contacts)
+            yield min(c.limits["curved"].e_n for c in contacts), quality(contacts, settings)
     finally:
         solving.destroy()

@@ -12,7 +12,7 @@ from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.accuracy.uncertainty import carrying
 from softjaw.study.case.build import build_object
-from softjaw.study.case.grasp import FACING
+from softjaw.study.case.evaluate import FACING, lengths
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -27,9 +27,7 @@ def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
         return change
     read = {name: result.fingers(name) for name in ("frame_origin", "frame_axes", "pose_rotation", "pose_origin")}
     semi_axes = result.read("limit_surface/semi_axes")[..., 0, :]
-    arms = scene.score.object_length or float(np.ptp(build_object(scene.object).bounds, axis=0).max())
-    torques = scene.score.contact_length or scene.gripper.pad_length
-    torques = arms if scene.score.torque_scale == "object" else torques
+    arms, torques = lengths(scene, build_object(scene.object))
     known: dict[bytes, float] = {}  # images of one grasp have the same surfaces
     for place in map(tuple, tilted):
         key = semi_axes[place].tobytes() + quality[place].tobytes()

@@ -10,7 +10,7 @@ import numpy as np
 
 from softjaw.fem.objects.pose import Pose
 from softjaw.study.case.build import has_wall, pad_shape
-from softjaw.study.case.sheet_level import sheet_level
+from softjaw.study.case.effects import sheet_level
 from softjaw.study.scene import Scene
 
 COARSEST_WALL, FEWEST = 50.0, 2  # mm, and elements along a side, as scenes allow
