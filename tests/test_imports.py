@@ -19,7 +19,7 @@ ALLOWED = {
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
-    "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
+    "study": {"pydantic", "matplotlib", "jinja2", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
@@ -38,7 +38,7 @@ DOORS = {
         "study/result/result_writer.py",
         "study/result/guarded.py",
         "study/result/vtkhdf.py",
-        "study/accuracy/cost/file.py",
+        "study/accuracy/cost/study.py",
     },
     "pyvista": PICTURES | {"study/patch/reading.py"},
     "vtkmodules": PICTURES | {"study/patch/reading.py"},

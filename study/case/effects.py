@@ -13,11 +13,11 @@ import numpy as np
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.case.margin import surely_below
 from softjaw.study.result.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
-MARGIN = 1e-6  # of a limit: what is nearer to it is undecided
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid sheet put e_n off by at most 3.5 times the relative
 # compliance of the sheet that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
 STIFF_SHEET = 0.005
@@ -34,15 +34,6 @@ SURFACES = {
     "quartic": "convex quartic",
 }
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
-
-
-def surely_below(value: float, limit: float) -> bool:
-    """Whether a value is below a limit by more than `MARGIN`; no where that is undecided, or the value is NaN.
-
-    >>> surely_below(0.9, 1.0), surely_below(1.0 - 1e-12, 1.0), surely_below(1.1, 1.0)
-    (True, False, False)
-    """
-    return value <= limit * (1.0 - MARGIN)
 
 
 @dataclass(frozen=True)

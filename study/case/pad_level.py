@@ -11,7 +11,8 @@ from softjaw.fem.pad.linear_pad import departure
 from softjaw.fem.pad.spring_bed import SpringBed
 from softjaw.study.case import model
 from softjaw.study.case.build import pad_material
-from softjaw.study.case.effects import sheet_level, surely_below
+from softjaw.study.case.effects import sheet_level
+from softjaw.study.case.margin import surely_below
 from softjaw.study.case.model import Finger
 from softjaw.study.scene import Scene
 

@@ -16,7 +16,7 @@ from softjaw.fem.shell.stress import faces
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
 from softjaw.fem.shell.wall_material import wall_material
 from softjaw.study.case.build import outer_surface
-from softjaw.study.case.effects import MARGIN, surely_below
+from softjaw.study.case.margin import MARGIN, surely_below
 from softjaw.study.flags import Flag
 from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.scene import Scene

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.study.case.effects import MARGIN
+from softjaw.study.case.margin import MARGIN
 from softjaw.study.case.sweep import axes
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene

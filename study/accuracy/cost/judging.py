@@ -15,10 +15,9 @@ from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.contact import EllipsoidBody, PolytopeBody
 from softjaw.scoring.graspit import linearised_contacts
 from softjaw.scoring.polytope import hull_volume
-from softjaw.study.accuracy.cost.levels import HULL, POINTS, SURFACES, WINKLER
+from softjaw.study.accuracy.cost.knobs import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured, cpu_seconds, from_maps, least_seconds
-from softjaw.study.accuracy.cost.probes import Probe
-from softjaw.study.accuracy.cost.winkler import winkler_pad
+from softjaw.study.accuracy.cost.probes import Probe, winkler_pad
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
