@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from softjaw.study.accuracy.cost import stored
-from softjaw.study.accuracy.uncertainty import stored as uncertainty
+from softjaw.study.accuracy.uncertainty import interval
 from softjaw.study.case import sweep, window
 from softjaw.study.result.layout import Derived
 from softjaw.study.scene import Scene
@@ -13,7 +13,7 @@ from softjaw.study.scene import Scene
 if TYPE_CHECKING:
     from softjaw.study.result.store import ResultWriter
 
-KINDS = (sweep, window, uncertainty)
+KINDS = (sweep, window, interval)
 
 
 def derived(scene: Scene) -> list[Derived]:

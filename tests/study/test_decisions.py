@@ -98,7 +98,7 @@ def test_a_difference_above_the_errors_is_still_one():
 @tries
 @given(seeds)
 def test_a_band_of_a_probe_is_that_of_its_images(seed):
-    from softjaw.study.accuracy.uncertainty.carrying import at_least_own
+    from softjaw.study.accuracy.uncertainty.interval import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
     band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
