@@ -18,10 +18,10 @@ from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.effects import effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
+from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, Solver, solver, state_flags
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
-from softjaw.study.result.result import CaseFailure, CaseResult
 from softjaw.study.scene import Scene
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.quantities import EFFECTS
 from softjaw.study.result.quantity import MODELS
-from softjaw.study.result.result import CaseResult
 
 
 def text_bytes(text: str, length: int) -> bytes:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.record import record
-from softjaw.study.result.result import CaseFailure, CaseResult
 from softjaw.study.run.lost_ranks import LostRanks
 from softjaw.study.run.memory import is_out_of_memory
 from softjaw.study.run.standing import Standing

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.result.finger_quantities import PATCH
 from softjaw.study.result.grid import Surface
@@ -21,7 +22,6 @@ from softjaw.study.result.quantities import MAPS, quantities
 from softjaw.study.result.quantity import MODELS, NEEDS
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import blank, record, text_bytes
-from softjaw.study.result.result import CaseResult
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
 from softjaw.study.run.lock import Lock, holder
 from tests.study.fake_run import fake_result

@@ -266,8 +266,8 @@ def test_a_file_without_errors_knows_none():
 
 def solved(given, name):
     """A map ``(units, forces)`` of a scene, NaN where a case fails, and the units."""
+    from softjaw.study.case.result import CaseFailure
     from softjaw.study.pipeline import solve_unit
-    from softjaw.study.result.result import CaseFailure
 
     units = sweep.units(given, lambda point: point.axis_symmetry)
     found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)

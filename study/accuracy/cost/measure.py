@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.accuracy.cost.knobs import EACH_ALONE, Level, with_level
-from softjaw.study.result.result import CaseFailure
+from softjaw.study.case.result import CaseFailure
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.probes import Probe
