@@ -12,7 +12,7 @@ from softjaw.fem.objects.touch import NoContactError
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import candidates
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object here (the others fail as cases), and sentences

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene.model import NAMES
 from softjaw.study.scene.objects import Section

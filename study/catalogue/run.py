@@ -14,7 +14,7 @@ from softjaw.study.catalogue.outcome import Outcome, outcome
 from softjaw.study.catalogue.scenes import case_scene
 from softjaw.study.catalogue.table import table_text
 from softjaw.study.catalogue.verdict import judge
-from softjaw.study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.scene.problems import first_of
 from softjaw.study.writing import make_folders
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from softjaw.study.catalogue.model import Case, Catalogue
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.load import ALTERNATIVES
 from softjaw.study.scene.problems import SceneError

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 
 PICTURES = (".png", ".svg")
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")

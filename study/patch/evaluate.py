@@ -20,7 +20,7 @@ from softjaw.lsfit.ellipsoid import three_motion_ellipsoid
 from softjaw.lsfit.misfit import Misfit, misfit
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.study.case.limit_surface import STANDS_IN, fitted, judging_twists
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene.problems import Problem

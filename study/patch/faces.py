@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.orientation import slivers
 from softjaw.friction.patch import ContactPatch, FloatArray
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene.problems import Problem
 
 MOST_PROBLEMS = 10  # told of one file

@@ -12,7 +12,7 @@ from softjaw.friction.patch import FloatArray
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon_search import EpsilonBound, epsilon
 from softjaw.scoring.grasp import grasp_score
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.patch.evaluate import Judged
 from softjaw.study.quantities import MODELS
 

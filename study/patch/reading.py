@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes

@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError, shortened
 from softjaw.study.patch.columns import CENTRE, CORNERS, NORMAL, UNITS, Column, used_columns
 from softjaw.study.patch.faces import Faces, corner_geometry, refuse
 from softjaw.study.patch.reading import Reading, check_count
 from softjaw.study.scene.problems import Problem, shown
-from softjaw.study.show.tables.printable import shortened
 
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
 OPTION = {"length": "--unit", "area": "--unit", "pressure": "--pressure-unit"}

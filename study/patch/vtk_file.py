@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutput
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.patch.columns import UNITS, split_header
 from softjaw.study.patch.faces import Faces, corner_geometry
 from softjaw.study.patch.reading import Reading, check_count

@@ -14,8 +14,8 @@ from softjaw.study.catalogue.run import check_text
 from softjaw.study.catalogue.scenes import case_scene, merged
 from softjaw.study.catalogue.table import table_text
 from softjaw.study.catalogue.verdict import FINITE, judge
-from softjaw.study.exits import StudyError
 from softjaw.study.flags import Flag
+from softjaw.study.messages import StudyError
 from tests.study.launching import ROOT
 
 HARD = ROOT / "jobs" / "hard-cases.toml"

@@ -18,7 +18,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study.case.contact import ANTIPODAL as CASE_ANTIPODAL
 from softjaw.study.case.contact import angles
 from softjaw.study.cli import main
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.patch.evaluate import SURFACES, judge, principal_direction
 from softjaw.study.patch.faces import corner_geometry
 from softjaw.study.patch.grasp import ANTIPODAL, _angle, _check_facing

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
-from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
 from softjaw.study.result.grid import Surface
 from softjaw.study.result.layout import Derived, Header, Layout, layout_from_options

@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.study.accuracy.cost.knobs import Skipped
 from softjaw.study.accuracy.cost.measure import QUANTITIES, UNITS, Measured
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.guarded import GuardedFile, opened
 from softjaw.study.writing import beside
 

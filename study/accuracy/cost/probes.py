@@ -13,7 +13,7 @@ from softjaw.friction.patch import NoContactError
 from softjaw.study.accuracy.cost.winkler import POINTS, WinklerPad, winkler_pad
 from softjaw.study.case import model, sweep
 from softjaw.study.case.build import build_object
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 
 MOST_LOOKED_AT = 60  # units of work, evenly spread, among which the candidates are chosen

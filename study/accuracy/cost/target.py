@@ -12,7 +12,7 @@ from softjaw.study.accuracy.cost.choose import Choice, choose, explicit
 from softjaw.study.accuracy.cost.file import CostStudy, load, save
 from softjaw.study.accuracy.cost.measure import measure_once, warm_up
 from softjaw.study.accuracy.cost.study import costs, new_study
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.problems import SceneError
 

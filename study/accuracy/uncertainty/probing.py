@@ -12,7 +12,7 @@ from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.grasp import quality
 from softjaw.study.case.solving import solver
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.run.stopping import TimeLimitError
 
 NAMES = ("e_n", "quality")
