@@ -213,7 +213,7 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
     add("kind", choices=tuple(KINDS), help="what to start from")
     add("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the kind, or the "
         "name of the mesh)")  # fmt: skip
-    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj or .ply")
+    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
     add("--axis", choices=("x", "y", "z"), default="z", help="axis of the mesh along which grasps are spread "
         "(default z)")  # fmt: skip

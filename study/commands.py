@@ -62,23 +62,12 @@ def _mesh_size(options: Namespace) -> list[float]:
     return [1e3 * float(high - low) for low, high in zip(*bounds, strict=True)]
 
 
-def _catalogue(options: Namespace) -> bool:
-    from softjaw.study.catalogue.model import is_catalogue
-
-    return is_catalogue(Path(options.scene))
-
-
 def check(options: Namespace) -> int:
-    """Find every error of a scene or of a catalogue, or say what would be run."""
+    """Find every error of a scene, or say what would be run."""
     from softjaw.study.case.build import check_object
     from softjaw.study.show.tables.columns import hanging, terminal_width
     from softjaw.study.show.tables.overview import scene_text
 
-    if _catalogue(options):
-        from softjaw.study.catalogue.run import check_text
-
-        say(check_text(Path(options.scene), options.overrides))
-        return DONE
     scene = scene_of(options)
     check_object(scene)
     say(hanging(scene_text(scene, options.scene), terminal_width()))
@@ -91,9 +80,6 @@ def plan(options: Namespace) -> int:
     from softjaw.study.run.plan import make_plan, plan_text
     from softjaw.study.show.tables.columns import hanging, terminal_width
 
-    if _catalogue(options):
-        text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
-        raise StudyError(USAGE, f"{options.scene}: {text}")
     scene = scene_of(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
@@ -275,11 +261,6 @@ def run(options: Namespace) -> int:
 
 def _run_on(comm: Any, options: Namespace) -> int:
     from softjaw.study.run.session import on_rank0, run_study
-
-    if on_rank0(comm, _catalogue, options):
-        from softjaw.study.catalogue.run import run_catalogue
-
-        return run_catalogue(options, comm)
 
     def read() -> tuple[Any, Path]:
         scene = scene_of(options)

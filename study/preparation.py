@@ -92,9 +92,6 @@ def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     from softjaw.study.run.plan import make_plan
 
     _check_petsc(dict(scene.petsc))
-    if scene.accuracy.e_n is not None and choice is None:
-        text = f"accuracy.e_n: found {scene.accuracy.e_n:g} in a case of a catalogue, expected it in scenes only"
-        raise StudyError(USAGE, f"{text}; give the case its mesh, or run it as a scene of its own")
     given = [*options.overrides, *petsc_overrides(options.petsc), *overrides(choice)]
     plan = make_plan(scene, options.scene, given)
     check_poses(scene, [unit.scene for unit in plan.units])

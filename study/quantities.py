@@ -28,7 +28,6 @@ MONOMIALS = tuple(
 # Levels of each effect, cheapest first, and what its indicator is, where it has one.
 EFFECTS = {
     "object": ("rigid", "linear shell", "nonlinear shell"),
-    "pad": ("linear", "hyperelastic"),
     "sheet": ("rigid", "elastic plate"),
     "model_size": ("quarter", "half", "full"),
     "fingers": ("one", "two"),
@@ -39,7 +38,6 @@ EFFECTS = {
 }
 INDICATORS = {
     "object": "dent that a linear wall would get at the largest force, over the wall's thickness",
-    "pad": "largest |principal stretch - 1| of the pads in this state",
     "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",

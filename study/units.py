@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.fem.objects.mesh_file import LENGTHS
 
 
 class Unit(NamedTuple):

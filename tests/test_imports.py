@@ -18,7 +18,7 @@ ALLOWED = {
     "friction": {"softjaw.friction"} | NUMERICS,
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
-    "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
+    "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules", "xarray"} | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}

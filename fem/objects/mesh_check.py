@@ -9,10 +9,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.crossing import crossing_pairs
-from softjaw.fem.objects.file_limits import MOST_TRIANGLES
 from softjaw.fem.objects.gap import IntArray
-from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.fem.objects.mesh_file import LENGTHS, MOST_TRIANGLES
 from softjaw.fem.objects.pose import FloatArray
 
 MOST_PIECES = 50
@@ -24,10 +24,6 @@ FLAT = 1e-6  # volume of a piece over its area and size, below which it has no i
 SURE = 1e-3  # winding numbers this close to 0 and 1 are those of points outside and inside; others lie on the surface
 MOST_ASKED = 100  # corners of a piece that are asked whether they lie in another
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
-
-
-class MeshError(ValueError):
-    """A mesh that cannot serve as an object; the message says why and what to do."""
 
 
 def sound_mesh(

@@ -32,22 +32,20 @@ def effects_of(
     """Level, indicator and reason of every effect of one case; keys and levels as in ``EFFECTS``.
 
     The indicators are those of ``INDICATORS``. Levels that change the solve are chosen before it, by
-    `study.case.wall`, `study.case.pad_level` and `study.case.sheet_level`; here they only get their names.
+    `study.case.wall` and `study.case.sheet_level`; here they only get their names.
     """
     wanted = scene.effects
 
     def only(name: str) -> int:
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
-    pad, sheet = solving.pad_level, sheet_level(scene)
-    strain = max(c.state.checks.max_strain for c in contacts)
+    sheet = sheet_level(scene)
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["curved"] for own in bounds]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
     size = MODEL_SIZES[solving.planes]
     return {
         "object": _object(solving.level),
-        "pad": (EFFECTS["pad"][not pad.linear], strain, REASONS.index(pad.reason)),
         "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),

@@ -12,7 +12,6 @@ from softjaw.fem.contact.problem import Gap
 from softjaw.fem.objects.gap import GapFunction, GapObject
 from softjaw.fem.objects.pose import Pose
 from softjaw.fem.objects.touch import first_touch
-from softjaw.fem.pad.linear_pad import CondensedPad, linearised
 from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case.build import pad_material, pad_shape, sheet
 from softjaw.study.scene import Scene
@@ -27,14 +26,6 @@ def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bo
     """Discrete pad with its sheet; the same for all candidates, so it is made once."""
     behind = sheet(gripper) if elastic_sheet else None
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
-
-
-@lru_cache(maxsize=8)
-def condensed_pad(
-    gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool
-) -> CondensedPad:
-    """Discrete pad for small strains, reduced to its front; one factorisation for all candidates."""
-    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser, elastic_sheet)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from softjaw.fem.contact.friction_coupling import CoupledProblem, way
-from softjaw.fem.contact.linear_press import linear_press
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
-from softjaw.fem.pad.linear_pad import linearised
 from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case import model
 from softjaw.study.case.build import pad_shape
@@ -27,15 +25,12 @@ def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) 
     return model.pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
 
 
-def press_of(scene: Scene, finger: Finger, coarser: bool, linear: bool) -> Press:
-    """Pad of small (``linear``) or finite strains, with friction where the scene wants it to act back."""
+def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    """Pad of finite strain, with friction where the scene wants it to act back."""
     elements, rule = pad_shape(scene.gripper, coarser).elements, scene.accuracy.contact
     symmetry = model.usable_symmetry(scene, finger, elements)
     wanted, nodal = (pad_of(scene, symmetry, r, coarser) for r in (rule, "nodal"))
     fallback = None if nodal is wanted else nodal
-    if linear:
-        pad = model.condensed_pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
-        return linear_press(pad, finger.gap, linearised(fallback) if fallback else None, settings(scene))
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
         steps = {"problem_of": problem, "way": way, "stepping": Stepping}

@@ -12,9 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from softjaw.fem.contact.extract import half_turned, mirrored
-from softjaw.fem.contact.press import Press, Pressed
-from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.pad.linear_pad import linearised
+from softjaw.fem.contact.press import Pressed
+from softjaw.fem.errors import CheckError
 from softjaw.fem.pad.spring_bed import SpringBed
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
@@ -24,7 +23,6 @@ from softjaw.study.case.build import pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.model import Finger
-from softjaw.study.case.pad_level import PadLevel, choose_pad_level, level_on_wall
 from softjaw.study.case.pressing import pad_of, press_of, settings
 from softjaw.study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
 from softjaw.study.scene import Scene
@@ -51,7 +49,6 @@ class Solver(Protocol):
     """
 
     level: Level | None
-    pad_level: PadLevel
     fingers_solved: int
     planes: int
 
@@ -84,14 +81,12 @@ class OnRigid:
         self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
-        self.pad_level = choose_pad_level(scene, solved)
-        linear = self.pad_level.linear
-        self.presses = [[press_of(scene, f, coarser, linear) for coarser in meshes] for f in solved]
+        self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        ladders = (zip(*(self._climbed(p, forces) for p in own), strict=True) for own in self.presses)
+        ladders = (zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses)
         for states in zip(*ladders, strict=True):
             contacts = [
                 [Contact(self.scene, f, state) for state in own] for f, own in zip(self.fingers, states, strict=False)
@@ -99,15 +94,6 @@ class OnRigid:
             if self.shared:  # an image finger has its partner's states; only its place differs
                 contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
             yield Solved(contacts, [s for own in states for s in own], [])
-
-    def _climbed(self, press: Press, forces: Sequence[float]) -> Iterator[Pressed]:
-        try:
-            yield from press.ladder(forces)
-        except (ConvergenceError, CheckError) as error:
-            if not self.pad_level.linear:
-                raise
-            hint = "the scene asks for pads at small strains; effects.pad = 'auto' allows finite ones"
-            raise type(error)(f"{error} ({hint})") from error
 
     def destroy(self) -> None:
         """See `Solver`."""
@@ -119,7 +105,7 @@ class OnWall:
     """Fingers on a thin wall press against each other through it."""
 
     def __init__(self, scene: Scene, fingers: list[Finger], level: Level) -> None:
-        self.scene, self.fingers, self.level, self.pad_level = scene, fingers, level, level_on_wall(scene)
+        self.scene, self.fingers, self.level = scene, fingers, level
         meshes = (False, True)[: scene.accuracy.meshes]
         self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
         self.grips = [
@@ -197,8 +183,6 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarse
 
     def problem(rule: str) -> GripProblem:
         pad = pad_of(scene, held.pad_symmetry, rule, coarser)
-        if scene.effects.pad == "linear":
-            pad = linearised(pad)
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]

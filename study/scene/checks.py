@@ -34,13 +34,10 @@ OTHERS = "others go into the environment variable PETSC_OPTIONS"
 
 
 def _coupling(shape: Shape, effects: Effects) -> Iterator[Finding]:
-    """Friction acts back on pads of finite strain that press on rigid objects."""
+    """Friction acts back on pads that press on rigid objects."""
     if effects.friction_pressure_coupling != "tangential":
         return
     where = ("effects", "friction_pressure_coupling")
-    if effects.pad == "linear":
-        found, remedy = '"tangential" with pad = "linear"', 'write pad = "hyperelastic", or "none" here'
-        yield Finding(where, found, "pads at finite strains", remedy)
     if isinstance(shape, Walled) and shape.wall is not None and effects.object != "rigid":
         found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
         yield Finding(where, found, "a rigid object", remedy)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from softjaw.fem.objects.file_limits import ENDINGS, LARGEST_FILE
+from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
 from softjaw.study.scene.objects import Box, Mesh, Plate, Revolution, Sections, Shape, Span, Walled
 from softjaw.study.scene.problems import Finding, KeyPath, shown
 from softjaw.study.scene.sections import Candidates, Effects, GraspPose, Gripper
@@ -229,7 +229,7 @@ def mesh_file(shape: Mesh) -> Iterator[Finding]:
     file, path = Path(shape.mesh), ("object", "mesh")
     remedy = "the path is relative to the scene file"
     if file.suffix.lower() not in ENDINGS:
-        yield Finding(path, shown(file.name), "a triangle mesh in a .stl, .ply or .obj file", "convert it to .stl")
+        yield Finding(path, shown(file.name), f"a triangle mesh in a {', '.join(ENDINGS)} file", "convert it to .stl")
     elif not file.is_file():
         found = "a directory" if file.is_dir() else "no such file"
         yield Finding(path, f"{found} at {file}", "the file of a triangle mesh", remedy)

@@ -229,9 +229,6 @@ class Effects(Section):
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
         "auto", description="the object's compliance; the shells need object.wall_mm"
     )
-    pad: Literal["auto", "linear", "hyperelastic"] = Field(
-        "auto", description="the deformation of the pads: small strains (condensed once for all cases), or finite"
-    )
     sheet: Literal["auto", "rigid", "elastic"] = Field(
         "auto", description="the sheet behind the pad: rigid, or a plate that bends"
     )

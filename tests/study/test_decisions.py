@@ -137,7 +137,7 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
-    from softjaw.study.case import coupling_level, pad_level, sheet_level, wall
+    from softjaw.study.case import coupling_level, sheet_level, wall
     from softjaw.study.case.margin import surely_below
     from softjaw.study.scene import parse_scene
 
@@ -149,11 +149,6 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     monkeypatch.setattr(coupling_level, "neglected_traction", lambda state, mu: coupling_level.SMALL * on)
     reason = coupling_level.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
     assert coupling_level.REASONS[reason].startswith("left out")
-    monkeypatch.setattr(pad_level, "departure", lambda law, strain: pad_level.NEARLY_LINEAR * on)
-    monkeypatch.setattr(pad_level.model, "usable_symmetry", lambda *_: (True, True))
-    bed = SimpleNamespace(travel=lambda force: 1e-3)
-    monkeypatch.setattr(pad_level, "SpringBed", lambda *_: bed)
-    assert not pad_level.choose_pad_level(scene, [SimpleNamespace(gap=None)]).linear
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
     for dent, ratio, level in (
         (wall.STIFF * on, 0.1, wall.LINEAR),

@@ -53,6 +53,11 @@ def cases(*arguments, **choices):
     return [result.values for _, ladder in solved(*arguments, **choices) for result in ladder]
 
 
+def e_n(*arguments, **choices):
+    """e_n of the first finger in every case [m]."""
+    return np.array([values["maps/e_n"][0] for values in cases(*arguments, **choices)])
+
+
 def differing(found, expected, tolerance, scale=None):
     """Names of the values, timings aside, that differ by more than a share of their size."""
     assert found.keys() == expected.keys()

@@ -67,7 +67,7 @@ def test_what_was_written_is_read(path):
         assert np.array_equal(read.checks("tension")[1, 1, 1], result.values["checks/tension"])
         assert np.array_equal(read.patch(10)["normal"], patch["normal"])
         assert np.isnan(read.patch(10)["centroid"]).all()
-        assert {k: v[1, 1, 1] for k, v in read.effects("pad").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
+        assert {k: v[1, 1, 1] for k, v in read.effects("sheet").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
         assert read.messages[1, 1, 1] == "grüße"
         assert (read.status == 1).sum() == 1
         assert read.scene == 'a = "µ"\n'

@@ -27,7 +27,7 @@ EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
 # Time over that of the level which is taken for granted, about; more than the unknowns tell.
 DEARER = {
-    "gripper.element": {"hex27": 1.25}, "effects.pad": {"linear": 0.2}, "effects.sheet": {"elastic": 1.3},
+    "gripper.element": {"hex27": 1.25}, "effects.sheet": {"elastic": 1.3},
     "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
 }  # fmt: skip
 

@@ -1,21 +1,18 @@
-"""Write the triangle meshes of jobs/hard-cases.toml beside this file: one egg in many guises, cubes, broken bodies.
+"""Write the triangle meshes of the hard cases beside this file: one egg in many guises, cubes, broken bodies.
 
-Run from the repository's root: ``python -m jobs.objects.make_hard`` or ``python jobs/objects/make_hard.py``.
+Run from the repository's root: ``python -m tests.hard_cases.objects.make_hard``.
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
+from jobs.objects.make_flask import write_stl
+from softjaw.fem.objects.gap import grid_triangles
+
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1]))
-
-from jobs.objects.make_flask import write_stl  # noqa: E402
-from softjaw.fem.objects.gap import grid_triangles  # noqa: E402
-
 SEMI_AXES_MM = np.array([25.0, 20.0, 35.0])
 ROWS, COLUMNS = 20, 36
 MM_PER_INCH = 25.4
