@@ -17,14 +17,13 @@ from typing import IO, Any
 from softjaw.study import commands
 from softjaw.study.accuracy.cost.command import add_options as add_cost_options
 from softjaw.study.environment import keep_compiled_loops, pin_threads
-from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError
+from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError, complain, first_rank
 from softjaw.study.patch.command import add_options as add_patch_options
 from softjaw.study.run.memory import is_out_of_memory, no_room
 from softjaw.study.show.figures.command import add_options as add_figure_options
 from softjaw.study.show.tables.watch import add_options as add_watch_options
 from softjaw.study.show.view.command import add_choice
 from softjaw.study.show.view.command import add_options as add_view_options
-from softjaw.study.speaking import complain, first_rank
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 KINDS = {

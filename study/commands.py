@@ -10,10 +10,9 @@ from argparse import ArgumentParser, Namespace, _SubParsersAction
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.messages import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError, complain, say
 from softjaw.study.preparation import prepare, scene_of, target, with_target_met, work
 from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
-from softjaw.study.speaking import complain, say
 from softjaw.study.writing import write_file
 
 FILES = ("SCENE", "FILE", "HTML", "PNG", "PICTURE", "VTKHDF")  # metavars of words that are files

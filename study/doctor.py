@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from softjaw.study.environment import THREADS, ask, compiled_loops_pass, mpirun
-from softjaw.study.exits import CANNOT_WRITE, DONE, USAGE
+from softjaw.study.messages import CANNOT_WRITE, DONE, USAGE
 
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"

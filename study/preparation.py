@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 
 
 def petsc_overrides(words: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError
 
 
 @contextmanager

@@ -10,7 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not dep
 
 import pytest
 
-from softjaw.study.speaking import RANK
+from softjaw.study.messages import RANK
 
 LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK")
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene.grasp_checks import station_warnings
 
 if TYPE_CHECKING:

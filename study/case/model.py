@@ -20,7 +20,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case.build import build_object, pad_material, pad_shape, sheet
 from softjaw.study.case.candidates import candidates
 from softjaw.study.case.effects import sheet_level
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 

@@ -52,7 +52,7 @@ class GraspMap:
 
     Raises
     ------
-    study.exits.StudyError
+    study.messages.StudyError
         The file cannot be read.
     ValueError
         ``where`` does not name one point of the sweep.

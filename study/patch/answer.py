@@ -21,8 +21,8 @@ from softjaw.scoring.epsilon_search import epsilon
 from softjaw.scoring.grasp import grasp_score
 from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
-from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.flags import Flag
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.patch.reading import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene.problems import Problem

@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 
 PICTURES = (".png", ".svg")
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.orientation import slivers
 from softjaw.friction.patch import ContactPatch, FloatArray
-from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.scene.problems import Problem, closest
 
 ENDINGS = (".csv", ".vtu", ".vtp")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError, shortened
 from softjaw.study.patch.reading import (
     CENTRE,
     CORNERS,
@@ -25,7 +25,6 @@ from softjaw.study.patch.reading import (
     split_header,
 )
 from softjaw.study.scene.problems import Problem, shown
-from softjaw.study.show.tables.printable import shortened
 
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
 

@@ -11,9 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from softjaw.study.exits import IN_USE, OTHER_FILE, StudyError
+from softjaw.study.messages import IN_USE, OTHER_FILE, StudyError, printable
 from softjaw.study.result.trial import trouble
-from softjaw.study.show.tables.printable import printable
 
 DEFLATE = 1000  # no data get smaller by more than this
 # what h5py raises for damage: its own errors have no class of their own

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import checksums
 from softjaw.study.result.guarded import text_of
 from softjaw.study.result.layout import FAILED, LABEL, MISSING, PROGRAM, READABLE, ROOT, SESSIONS, layout_from_options

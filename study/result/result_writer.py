@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError
 from softjaw.study.quantities import FIRST, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING, STATE, SUMS

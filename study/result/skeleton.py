@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError
 from softjaw.study.result import checksums, grid
 from softjaw.study.result.datasets import CLOSING, SUMS
 from softjaw.study.result.guarded import GuardedFile, reason

@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import checksums
 from softjaw.study.result.checksums import broken_rows, broken_states
 from softjaw.study.result.guarded import GuardedFile, opened

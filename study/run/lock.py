@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from softjaw.study.exits import CANNOT_WRITE, IN_USE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, IN_USE, StudyError
 
 NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 BUSY = {errno.EWOULDBLOCK, errno.EACCES}

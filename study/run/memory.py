@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 
 ITSELF = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
 SIGNS = ("Cannot allocate memory", "failed to map segment")  # of a file or library that finds no memory

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.run.plan import by_cost
 from softjaw.study.run.progress import duration
 

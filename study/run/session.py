@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from softjaw.study.exits import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError
+from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify

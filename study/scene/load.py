@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from softjaw.study.messages import shortened
 from softjaw.study.scene.checks import LEVELS, MOST_CASES
 from softjaw.study.scene.grasp_checks import mesh_file
 from softjaw.study.scene.model import (
@@ -27,7 +28,6 @@ from softjaw.study.scene.model import (
 from softjaw.study.scene.objects import Mesh, Section
 from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, shown, unknown_key
 from softjaw.study.scene.text import flat, key_lines, parse_toml, read_text
-from softjaw.study.show.tables.printable import shortened
 
 ALTERNATIVES = (("stations_mm",), ("stations", "station_range_mm"), ("poses",))  # ways of giving candidates
 NOT_SWEPT = {

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
+from softjaw.study.messages import UNPRINTABLE
 from softjaw.study.scene.checks import findings, value_warnings
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, Section
 from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, model_findings, shown
@@ -31,7 +32,6 @@ from softjaw.study.scene.sections import (
     Uncertainty,
 )
 from softjaw.study.scene.text import toml_text
-from softjaw.study.show.tables.printable import UNPRINTABLE
 
 Option = str | int | float | bool
 WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print

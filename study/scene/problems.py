@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from softjaw.study.show.tables.printable import printable
+from softjaw.study.messages import printable
 from softjaw.study.units import UNITS, split_unit
 
 KeyPath = tuple[str | int, ...]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softjaw.fem.errors import MeshError
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.scene.problems import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
 

@@ -20,13 +20,12 @@ from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
-from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.reading import Reading, read_patch
 from softjaw.study.result.store import open_result
 from softjaw.study.result.trial import trouble
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.show.tables.columns import csv_text
-from softjaw.study.show.tables.printable import UNPRINTABLE
 from softjaw.study.show.view.server import server
 from tests.fuzz.lies import EVIL, LIES
 from tests.fuzz.readers import QUICK, SCENE, obj, ply, stl

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softjaw.study.show.tables.printable import UNPRINTABLE
+from softjaw.study.messages import UNPRINTABLE
 from tests.fuzz.edits import BINARY, edited, edits
 from tests.fuzz.readers import QUICK, slow_readers
 

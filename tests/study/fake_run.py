@@ -106,10 +106,9 @@ def main():
     options = parser.parse_args()
     from mpi4py import MPI
 
-    from softjaw.study.exits import StudyError
+    from softjaw.study.messages import StudyError, complain
     from softjaw.study.run.session import Work, run_study
     from softjaw.study.show.tables.status import summary
-    from softjaw.study.speaking import complain
 
     comm = MPI.COMM_WORLD
     if options.file_limit:

@@ -20,7 +20,7 @@ import pytest
 from softjaw import study
 from softjaw.study.cli import main, program
 from softjaw.study.environment import launch_environment
-from softjaw.study.exits import MEANING, StudyError
+from softjaw.study.messages import MEANING, StudyError
 from softjaw.study.preparation import petsc_overrides
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch

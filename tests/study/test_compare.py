@@ -11,14 +11,13 @@ import pytest
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.cli import main
-from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.lookup import GraspMap
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, RANK, USAGE, StudyError
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.store import open_result
 from softjaw.study.show.tables.compare import compare
 from softjaw.study.show.tables.compare_text import comparison_csv, comparison_json, comparison_text
 from softjaw.study.show.tables.export import FINGER, MEANING, as_csv, as_json, cases
-from softjaw.study.speaking import RANK
 from tests.study.formula_results import (
     FORCES,
     SCENE,

@@ -225,7 +225,7 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 def test_another_file_is_refused(tmp_path):
     from softjaw.study.accuracy.cost.study import load
-    from softjaw.study.exits import OTHER_FILE, StudyError
+    from softjaw.study.messages import OTHER_FILE, StudyError
 
     (tmp_path / "text.hdf").write_text("no HDF5")
     for name in ("text.hdf", "missing.hdf"):
@@ -342,7 +342,7 @@ def test_words_tell_price_and_need():
 
 def test_ranks_are_refused(monkeypatch):
     from softjaw.study.accuracy.cost.command import refuse_ranks
-    from softjaw.study.exits import USAGE, StudyError
+    from softjaw.study.messages import USAGE, StudyError
 
     for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"):
         monkeypatch.delenv(name, raising=False)
@@ -406,7 +406,7 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
 def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
     from softjaw.study.accuracy.cost.study import load
     from softjaw.study.cli import main
-    from softjaw.study.exits import DONE, OTHER_FILE, USAGE
+    from softjaw.study.messages import DONE, OTHER_FILE, USAGE
 
     file, out = tmp_path / "small.toml", tmp_path / "small-cost.hdf"
     file.write_text(CYLINDER)
@@ -432,7 +432,7 @@ def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
 @pytest.mark.long
 @pytest.mark.launches
 def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, once):
-    from softjaw.study.exits import DONE
+    from softjaw.study.messages import DONE
     from softjaw.study.result.store import open_result
     from tests.study.launching import launch
 

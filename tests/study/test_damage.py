@@ -12,8 +12,8 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import sweep
 from softjaw.study.cli import main
-from softjaw.study.exits import OTHER_FILE, StudyError
 from softjaw.study.lookup import GraspMap
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import guarded
 from softjaw.study.result.derived import finalise
 from softjaw.study.result.layout import DONE, MISSING

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data

@@ -17,9 +17,9 @@ import scipy.sparse as sp
 
 from softjaw.fem.blas_buffers import take_buffers
 from softjaw.fem.petsc import NonlinearSolver
-from softjaw.study import exits
+from softjaw.study import messages
 from softjaw.study.environment import launch_environment
-from softjaw.study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
+from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run import memory
@@ -99,7 +99,7 @@ def smoke(tmp_path, *words, addresses=None, ranks=0):
 def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
     """From 0.8 to 0.92 GB the run's first product in BLAS asked for memory for ever; below, and above, it crashed."""
     code, errors = smoke(tmp_path, addresses=1024 * kilobytes)
-    assert code == exits.USAGE
+    assert code == messages.USAGE
     assert f"limited to {1024 * kilobytes / 1e9:.2f} GB" in errors
     assert len(errors.splitlines()) == 1
     assert not list(tmp_path.iterdir())
@@ -108,7 +108,7 @@ def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
 @pytest.mark.long
 @pytest.mark.launches
 def test_a_run_with_enough_addresses_starts_and_ends(tmp_path):
-    assert smoke(tmp_path, addresses=int(1.3e9))[0] == exits.DONE
+    assert smoke(tmp_path, addresses=int(1.3e9))[0] == messages.DONE
 
 
 @pytest.mark.long
@@ -117,7 +117,7 @@ def test_a_run_with_enough_addresses_starts_and_ends(tmp_path):
 def test_the_least_memory_that_a_scene_may_set_is_enough_on_every_rank(tmp_path, ranks):
     """The second rank made its first product in BLAS within the bound, and asked for ever for 128 MB."""
     code, errors = smoke(tmp_path, "--set", "run.memory_gb=0.1", ranks=ranks)
-    assert code == exits.DONE, errors
+    assert code == messages.DONE, errors
 
 
 def test_libraries_of_linear_algebra_are_not_let_loose_without_room():

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.friction.frame import FrameFlag
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.patch.answer import SURFACES, check_facing, judge, principal_direction
 from softjaw.study.patch.reading import Reading, corner_geometry, read_patch
 from softjaw.study.patch.text import PLANES, section

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 import softjaw
-from softjaw.study.exits import OTHER_FILE, StudyError
 from softjaw.study.flags import Flag
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.read import FIELDS, STATES
 from softjaw.study.result.record import record

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.result import CaseResult
-from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.flags import Flag
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.result.layout import Derived, Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
+from softjaw.study.messages import RANK
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data
 from softjaw.study.show.report import object_view
 from softjaw.study.show.view.model import View
-from softjaw.study.speaking import RANK
 from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.formula_results import make

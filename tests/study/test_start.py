@@ -10,7 +10,7 @@ import pytest
 
 from softjaw.study.cli import KINDS, main
 from softjaw.study.environment import launch_environment
-from softjaw.study.exits import CANNOT_WRITE, USAGE
+from softjaw.study.messages import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT
 

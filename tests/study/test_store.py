@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.result import CaseResult
-from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
 from softjaw.study.result.grid import Surface
 from softjaw.study.result.layout import Derived, Header, Layout, layout_from_options

@@ -19,7 +19,7 @@ import pytest
 
 from softjaw.fem.objects.shapes import Box, EllipticCylinder
 from softjaw.study.cli import main
-from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data

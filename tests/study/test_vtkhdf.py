@@ -9,7 +9,7 @@ import pyvista as pv
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from softjaw.study.cli import main
-from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError
 from softjaw.study.result.grid_values import fill_grid
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create

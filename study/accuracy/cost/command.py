@@ -8,7 +8,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError
 from softjaw.study.writing import write_file
 
 TIME_LIMIT = 300.0  # CPU seconds

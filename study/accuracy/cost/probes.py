@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.study.case import model, sweep
 from softjaw.study.case.build import build_object
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 

@@ -30,7 +30,7 @@ from softjaw.study.accuracy.cost.knobs import (
     with_level,
 )  # fmt: skip
 from softjaw.study.accuracy.cost.measure import QUANTITIES, UNITS, Measured, calibration_seconds, measure, warm_up
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import provenance
 from softjaw.study.result.guarded import GuardedFile, opened
 from softjaw.study.run.progress import duration

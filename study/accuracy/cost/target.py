@@ -22,7 +22,7 @@ from softjaw.study.accuracy.cost.knobs import Knob, Level, contact_knobs, weight
 from softjaw.study.accuracy.cost.measure import Measured, measure_once, warm_up
 from softjaw.study.accuracy.cost.study import CostStudy, costs, load, new_study, plain, save, setting_of
 from softjaw.study.case import sweep
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.text import changes

@@ -17,7 +17,7 @@ from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of
 from softjaw.study.case.solving import solver
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.run.stopping import TimeLimitError
 from softjaw.study.scene import Scene
 

@@ -11,7 +11,7 @@ from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from softjaw.study.exits import CANNOT_WRITE, USAGE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.writing import write_file
 
 HERE = Path(__file__).parent

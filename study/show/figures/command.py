@@ -9,9 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softjaw.study.exits import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
+from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError, first_rank
 from softjaw.study.show.figures import JOBS
-from softjaw.study.speaking import first_rank
 from softjaw.study.writing import write_file
 
 if TYPE_CHECKING:

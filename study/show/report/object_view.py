@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.exits import StudyError
+from softjaw.study.messages import StudyError
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number

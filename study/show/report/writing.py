@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError
 from softjaw.study.result.store import open_result
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.exits import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.result.layout import DONE
 from softjaw.study.scene.text import changes
 from softjaw.study.show.tables.ranking import TIE

@@ -10,8 +10,8 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from softjaw.study.exits import DONE as ENDED
-from softjaw.study.exits import SOME_FAILED, STOPPED
+from softjaw.study.messages import DONE as ENDED
+from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.lock import holder

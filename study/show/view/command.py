@@ -9,7 +9,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softjaw.study.exits import CANNOT_WRITE, USAGE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.writing import beside, write_file
 
 if TYPE_CHECKING:

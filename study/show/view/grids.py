@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.vtkhdf import write_grid
 from softjaw.study.show.view.model import View

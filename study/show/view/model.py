@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.flags import flag_words
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, swept_object
