@@ -104,6 +104,16 @@ class CostStudy:
         """Measurements of a setting, one for each probe."""
         return [self.measured[setting, label] for label in self.candidates]
 
+    def completed(
+        self, setting: str, probes: Sequence[Probe], solve: Callable[[Probe], Measured], after: Callable[[], Any] = bool
+    ) -> list[Measured]:
+        """Measurements of a setting on some probes; what is not there is solved, kept and followed by ``after()``."""
+        for probe in probes:
+            if (setting, probe.label) not in self.measured:
+                self.add(solve(probe))
+                after()
+        return [self.measured[setting, probe.label] for probe in probes]
+
     @property
     def spent(self) -> float:
         """CPU time of all measurements [s]."""
@@ -316,21 +326,17 @@ class Measuring:
         return f"would take about {duration(self.expected(task))}; raise --time-limit"
 
     def _measure(self, task: Task) -> None:
-        for i, probe in enumerate(self.probes):
-            if (task.setting, probe.label) in self.study.measured:
-                continue
-            if task.level is not None:
-                found = replace(measure(task.setting, probe, task.level), what=task.name)
-            else:
-                contacts = self._solved()
-                if len(contacts) < len(self.probes):
-                    return
-                from softjaw.study.accuracy.cost.judging import judge
+        level = task.level
+        if level is not None:
+            solve = lambda probe: replace(measure(task.setting, probe, level), what=task.name)  # noqa: E731
+        else:
+            from softjaw.study.accuracy.cost.judging import judge
 
-                found = judge(contacts[i], task.knob, task.name)
-            self.study.add(found)
-            self._save()
-        own = self.study.of(task.setting)
+            contacts = dict(zip((p.label for p in self.probes), self._solved(), strict=False))
+            if not contacts:
+                return
+            solve = lambda probe: judge(contacts[probe.label], task.knob, task.name)  # noqa: E731
+        own = self.study.completed(task.setting, self.probes, solve, self._save)
         failed = sum(bool(m.message) for m in own)
         told = f", {failed} of {len(own)} candidates failed" if failed else ""
         knob = f"{task.knob}: " if task.knob else ""
