@@ -45,11 +45,13 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
 
 def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome: Solved) -> CaseResult:
     """Values, checks, work, effects and patches of one case."""
+    # of two meshes the finer one is the result, the coarser one tells its error
     start = time.perf_counter()
     fine = [c for c, *_ in outcome.contacts]
     values, fits = evaluate(fine, settings)
     values |= _state_values(fine)
     values["maps/flags"] |= state_flags(fine)
+    # a rigid object has no wall, and neither values nor flags of one
     if outcome.grips:
         values |= solving.wall_values(outcome)
         values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)

@@ -19,7 +19,8 @@ ALLOWED = {
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
-    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "shtab", "vtkmodules", "xarray"}
+    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "shtab", "vtkmodules"}
+    | {"xarray"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}

@@ -68,6 +68,7 @@ class Contact:
         self.pose = pose or Pose(np.eye(3), np.zeros(3))
         self.frame: Frame = contact_frame(patch, x_hint, whole_face)
         self.local: ContactPatch = in_frame(patch, self.frame)
+        # what may fail is done here; what takes time waits until it is asked for
         self.rho = contact_length(self.local)
 
     @cached_property

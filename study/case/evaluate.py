@@ -110,6 +110,7 @@ def evaluate(
     fits : list of dict
         For each contact its limit surface in every friction model.
     """
+    # friction limits come with the contacts, so fitting is the first step that takes time
     fits = _per_patch(contacts, lambda c: {m: fit_surface(c, m, settings.surface) for m in MODELS})
     scores, best = _scores(contacts, fits, settings)
     values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.sampled, settings.six)
@@ -123,12 +124,14 @@ def evaluate(
 
 def _per_patch(contacts: Sequence[Contact], work: Callable[[Contact], Any]) -> list[Any]:
     """A result for each contact, computed once where the second one is an image with the patch of the first."""
+    # the patch object itself tells an image: equal numbers would tell it too, but cost a comparison of all faces
     first = work(contacts[0])
     return [first, first if contacts[1].patch is contacts[0].patch else work(contacts[1])]
 
 
 def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     """Friction limits of each contact, and of the weaker one."""
+    # axes: finger, friction model
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
@@ -155,6 +158,7 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     }
     for name in ("semi_axes", "rank"):
         values[f"limit_surface/{name}"] = [[getattr(c.ellipsoids[m], name) for m in MODELS] for c in contacts]
+    # a grasp carries what its weaker finger carries
     for name, key in LIMITS:
         values |= {f"maps/{key}": limits[name].min(axis=0), f"fingers/{key}": limits[name]}
     values |= {f"maps/{key}": limits[key].min(axis=0) for key in ("e_n", "e_n_projected")}
@@ -186,6 +190,7 @@ def mesh_errors(
         errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
     for key, value in _overestimates(coarse).items():
         errors[f"maps/{key}_error"] = abs(values[f"maps/{key}"] - value)
+    # only the ellipsoids' quality: fits on the coarse mesh would double their time
     best, other = values["maps/quality"][0], quality(coarse, settings)
     return errors | {"maps/quality_error": abs(other - best) / best if best > 0 else np.nan}
 
@@ -210,6 +215,7 @@ def _scores(
         both = _closed_volume(
             [(c.mu**3 * own[m].rho / settings.torques * own[m].surface.volume, c.mu**2 * own[m].surface.shadow_area)
              for own, c in zip(fits, contacts, strict=True)], contacts, settings)  # fmt: skip
+        # a contact that carries nothing in some direction leaves no volume in any pose
         if facing or closed[m].quality == 0:
             values = closed[m].quality, both, closed[m].epsilon
         else:
@@ -217,6 +223,7 @@ def _scores(
             if not any(isinstance(body, Quartic) for body in bodies):
                 both = _volume(contacts, bodies, settings)
             else:
+                # quartics in a pose take seconds: the pose enters by ellipsoids near them
                 tilt = _tilt(contacts, bodies, settings) if math.isnan(tilt) else tilt
                 both *= tilt
             ellipsoids = [c.ellipsoids[m] for c in contacts]
@@ -305,6 +312,7 @@ def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: A
     for m in MODELS:
         soft = []
         for c, own in zip(contacts, fits, strict=True):
+            # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
             wrench = c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]]
             soft.append(c.soft(PolytopeBody(np.vstack([wrench, -wrench]))))
         factors.append(hold_task(soft, grip, weight).safety_factor)

@@ -87,6 +87,7 @@ def fit_surfaces(
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
+    # a fit is judged by motions that it has not seen
     own, others = slice(samples), slice(samples, None)
     reference = _misfit(ellipsoid, W[others], T[others])
     found = {}

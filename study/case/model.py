@@ -12,7 +12,6 @@ from softjaw.fem.contact.friction_coupling import CoupledProblem, way
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
-from softjaw.fem.objects.gap import Gap as PointGap
 from softjaw.fem.objects.gap import GapFunction, GapObject
 from softjaw.fem.objects.pose import Pose
 from softjaw.fem.objects.touch import NoContactError, first_touch
@@ -66,14 +65,19 @@ def approach(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Fi
     NoContactError
         If the pad passes the object.
     """
+    touch = touching(obj, pose, size)
+    box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
+    return Finger(touch, obj.near(touch, box * [-1, -1, -0.5], box))
+
+
+def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:
+    """Pose at first touch; see `approach`."""
     lower, upper = obj.bounds
     reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
     ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
     start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
     distance = first_touch(obj, start, _front(size), 2.0 * reach)
-    touching = Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
-    box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
-    return Finger(touching, obj.near(touching, box * [-1, -1, -0.5], box))
+    return Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
 
 
 def _front(size: tuple[float, float, float]) -> FloatArray:
@@ -147,26 +151,6 @@ def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))
 
 
-@dataclass(frozen=True, eq=False)
-class _AsItIs:
-    """An object that is touched and not pressed: the region that a mesh would sample for a contact is not needed."""
-
-    object: GapObject
-
-    @property
-    def bounds(self) -> np.ndarray:
-        """Corners ``(2, 3)`` [m]."""
-        return self.object.bounds
-
-    def gap(self, x: np.ndarray) -> PointGap:
-        """Signed distance with its derivatives."""
-        return self.object.gap(x)
-
-    def near(self, pose: Pose, lower: np.ndarray, upper: np.ndarray) -> _AsItIs:
-        """Return the object itself."""
-        return self
-
-
 def check_poses(scene: Scene, points: list[Scene]) -> None:
     """Refuse explicit poses of which a pad passes the object; stations lie on the object anyway.
 
@@ -188,7 +172,7 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
     missed: dict[int, str] = {}
     tried = 0
     for shape, size in dict.fromkeys((point.object, point.gripper.pad_size) for point in points):
-        obj = _AsItIs(build_object(shape))
+        obj = build_object(shape)
         for number, place in enumerate(places):
             if number not in missed and tried < MOST_TRIED:
                 tried += 2
@@ -207,7 +191,7 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
 
 def _passes(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> bool:
     try:
-        approach(obj, pose, size)
+        touching(obj, pose, size)
     except NoContactError:
         return True
     return False

@@ -23,7 +23,7 @@ from softjaw.study.case.build import pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, pad_of, press_of, settings
-from softjaw.study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.scene import Scene
 
@@ -105,7 +105,7 @@ class Solver(Protocol):
     ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
     """
 
-    level: Level | None
+    level: WallLevel | None
     fingers_solved: int
     planes: int
 
@@ -133,7 +133,7 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
 class OnRigid:
     """Fingers on a rigid object do not feel each other."""
 
-    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: Level | None) -> None:
+    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: WallLevel | None) -> None:
         self.scene, self.fingers, self.level = scene, fingers, level
         self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
         meshes = (False, True)[: scene.accuracy.meshes]
@@ -160,7 +160,7 @@ class OnRigid:
 class OnWall:
     """Fingers on a thin wall press against each other through it."""
 
-    def __init__(self, scene: Scene, fingers: list[Finger], level: Level) -> None:
+    def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel) -> None:
         self.scene, self.fingers, self.level = scene, fingers, level
         meshes = (False, True)[: scene.accuracy.meshes]
         self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
@@ -230,7 +230,7 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     return held
 
 
-def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: Level, coarser: bool) -> Grip:
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: WallLevel, coarser: bool) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size

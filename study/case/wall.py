@@ -47,7 +47,7 @@ def thin_body(shape: Walled) -> ThinWalled:
 
 
 @dataclass(frozen=True)
-class Level:
+class WallLevel:
     """How the object's compliance is simulated.
 
     ``indicator`` is the dent that a linear wall would get at the largest force, over the wall's thickness; ``share``
@@ -60,8 +60,8 @@ class Level:
     forced: bool
 
 
-def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
-    """Level of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
+def choose_level(scene: Scene, held: Grasp, travel: float) -> WallLevel:
+    """WallLevel of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
 
     ``travel`` is that of the pads on the rigid object at the largest force [m].
     """
@@ -69,10 +69,10 @@ def choose_level(scene: Scene, held: Grasp, travel: float) -> Level:
     body = thin_body(scene.object)
     dent, ratio = estimated_dent(body, held, scene, travel)
     if scene.effects.object != "auto":
-        return Level(names[scene.effects.object], ratio, dent / travel, forced=True)
+        return WallLevel(names[scene.effects.object], ratio, dent / travel, forced=True)
     soft = NONLINEAR if not surely_below(ratio, SMALL_DENT) else LINEAR
     number = RIGID if surely_below(dent, STIFF * travel) else soft
-    return Level(number, ratio, dent / travel, forced=False)
+    return WallLevel(number, ratio, dent / travel, forced=False)
 
 
 def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> tuple[float, float]:

@@ -216,6 +216,7 @@ def grasp_record(
     scores = {}
     for model in MODELS:
         soft = [c.soft(judged.surface(model, kind)) for c, judged in zip(contacts, both, strict=True)]
+        # exact in any pose: one grasp may take its time, unlike the maps of a study
         volume, ball = grasp_score(soft, *lengths, with_epsilon=False), epsilon(soft, *lengths)
         scores[model] = {"quality": volume.quality, "quality_l1": volume.quality_l1}
         scores[model]["epsilon"] = [ball.lower, ball.upper]
@@ -228,6 +229,7 @@ def grasp_record(
 def _opposite(contact: Contact, distance: float) -> Contact:
     """The same contact facing this one, half a turn about its x away."""
     axes, origin = contact.frame.axes, contact.frame.origin
+    # half a turn that leaves the contact's own x where it is, seen from the object
     turn = axes.T @ FACING @ axes
     return contact.at(Pose(turn, origin + distance * axes[2] - turn @ origin))
 
@@ -303,6 +305,7 @@ def _surfaces_record(judged: JudgedPatch, model: str) -> dict[str, Any]:
         found[kind] = {"volume": surface.volume, "semi_axes": surface.semi_axes}
         if kind != "exact":
             fit = judged.fits[model][kind]
+            # samples in a plane bound no body, so there is nothing to be off from
             errors = fit.misfit if judged.exact[model].rank == SPACE else (None, None, None)
             found[kind] |= {"stands_in": fit.certificate == STANDS_IN}
             found[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))

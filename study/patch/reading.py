@@ -199,6 +199,7 @@ def _grid(path: Path) -> Any:
     import pyvista as pv  # slow to import, and not needed for tables
     from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
+    # VTK writes its complaints past Python's streams
     before, complaints = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(complaints)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
@@ -230,6 +231,7 @@ def _corner_ids(path: Path, grid: Any) -> NDArray[np.int64]:
     kinds, points = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity)
     start = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
     sizes = np.diff(start)
+    # ParaView writes rectangles of image data as pixels, whose corners go line by line
     flat = np.isin(kinds, (TRIANGLE, QUAD, PIXEL)) | ((kinds == POLYGON) & (sizes >= 3) & (sizes <= 4))
     if not flat.all():
         i = int(np.argmin(flat))

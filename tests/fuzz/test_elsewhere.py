@@ -153,7 +153,7 @@ TABLE = QUICK["table"].content
     ("old", "new", "words"),
     [
         (b"\n1,0", b'\n"1,0', "a line that is no table"),
-        (b"\n1,0,0", b"\n1,0,99999999999", "coordinates within 1000 m"),
+        (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
         (b",7\n", b",1e300\n", "at most 1e+12 Pa"),
         (b"1.25", b"1e300", "at most 10000 m^2"),
         (b"0.1", b"1e300", "a length of 1"),

@@ -136,7 +136,7 @@ def all_flags(solved, tmp_path_factory):
     """A file of one case with every flag that a file holds."""
     unit, _ = solved
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "flags", lambda *_: OF_FILE)
+        patch.setattr(pipeline, "state_flags", lambda *_: OF_FILE)
         case = next(iter(pipeline.solve_unit(unit)))[1]
     plan = make_plan(unit.scene, "cylinder.toml")
     path = tmp_path_factory.mktemp("flags") / "all.hdf"

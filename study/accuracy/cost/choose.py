@@ -282,11 +282,9 @@ def _solved(
     costs: Costs, study: CostStudy, solve: Solve, combination: Combination, cases: Sequence[Probe]
 ) -> list[Measured]:
     """What a combination gives at some cases, from the study or solved and added to it."""
-    setting = setting_of(costs.scene, combination.level)
-    for probe in cases:
-        if (setting, probe.label) not in study.measured:
-            study.add(replace(solve(setting, probe, combination.level), what=combination.level.name))
-    return [study.measured[setting, probe.label] for probe in cases]
+    level = combination.level
+    setting = setting_of(costs.scene, level)
+    return study.completed(setting, cases, lambda probe: replace(solve(setting, probe, level), what=level.name))
 
 
 def _against(best: Sequence[Measured], doubt: float) -> Reference:

@@ -230,6 +230,7 @@ class KnobErrors:
         made = []
         for i, (name, own) in enumerate(zip(self.names, self.found, strict=True)):
             errors = np.array([np.abs(self.values[i, :, q] - e.value) / np.abs(e.value) for q, e in enumerate(ends)])
+            # an extrapolated limit may lie on the finest level by chance
             if i == len(self.names) - 1 and self.ladder:
                 errors = np.fmax(errors, np.array([e.uncertainty / np.abs(e.value) for e in self.limits]))
             seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
@@ -297,6 +298,7 @@ def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, st
             own = _own([settings[knob.name, v.name] for v in levels], table.values, study)
             made.append(replace(table, own=own))
     for i, table in enumerate(made):
+        # meshes of both kinds of elements, and rules of collocation, lead to one limit
         best = best_known(made, table.family) if table.family else table
         if best is not table:
             made[i] = replace(table, reference=best.limits)

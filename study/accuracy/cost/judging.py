@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedProbe:
     """Contacts of a probe at its forces, with the CPU time of one contact solve [s]."""
 
     probe: Probe
@@ -49,7 +49,7 @@ class Solved:
         return EvaluationSettings(*lengths(self.scene, self.obj), self.scene.limit_surface)
 
 
-def solved(probe: Probe) -> Solved:
+def solved(probe: Probe) -> SolvedProbe:
     """Solve a probe's contacts at the scene's own settings.
 
     Raises
@@ -69,10 +69,10 @@ def solved(probe: Probe) -> Solved:
             solving.destroy()
 
     seconds, contacts = cpu_seconds(climb)
-    return Solved(probe, obj, contacts, seconds / len(probe.forces))
+    return SolvedProbe(probe, obj, contacts, seconds / len(probe.forces))
 
 
-def judge(found: Solved, knob: str, level: str) -> Measured:
+def judge(found: SolvedProbe, knob: str, level: str) -> Measured:
     """A probe's cases at a level of a knob; the score's hulls only at the highest force, because they take seconds."""
     work: Callable[[list[Contact], float], FloatArray] = {
         "contact model": _contact_model, "motions sampled": _motions, "limit surface": _surface, "score": _score,
@@ -95,19 +95,19 @@ def judge(found: Solved, knob: str, level: str) -> Measured:
     )
 
 
-def _contact_model(found: Solved, level: str) -> Callable:
+def _contact_model(found: SolvedProbe, level: str) -> Callable:
     if level == WINKLER:
         return lambda _, force: winkler_case(found, force)
     number = MODELS.index("flat" if level.endswith("planar") else "curved")
     return lambda contacts, _: _judged(found, contacts, found.scene.limit_surface, number)
 
 
-def _motions(found: Solved, level: str) -> Callable:
+def _motions(found: SolvedProbe, level: str) -> Callable:
     choice = found.scene.limit_surface.model_copy(update={"samples": int(level)})
     return lambda contacts, _: _judged(found, contacts, choice, 0, "quality_fitted")
 
 
-def _surface(found: Solved, level: str) -> Callable:
+def _surface(found: SolvedProbe, level: str) -> Callable:
     for name, kind, objective in SURFACES:
         if name == level:
             update = {"model": kind, "objective": objective}
@@ -116,7 +116,7 @@ def _surface(found: Solved, level: str) -> Callable:
     return lambda contacts, _: _with_quality(found, contacts, [_wrench_hull(found.scene, c) for c in contacts])
 
 
-def _score(found: Solved, level: str) -> Callable:
+def _score(found: SolvedProbe, level: str) -> Callable:
     def ellipsoids(contacts: list[Contact]) -> list[EllipsoidBody]:
         return [EllipsoidBody(c.ellipsoids["curved"].semi_axes) for c in contacts]
 
@@ -137,7 +137,9 @@ def _score(found: Solved, level: str) -> Callable:
     return hull
 
 
-def _judged(found: Solved, contacts: list[Contact], choice: Any, number: int, score: str = "quality") -> FloatArray:
+def _judged(
+    found: SolvedProbe, contacts: list[Contact], choice: Any, number: int, score: str = "quality"
+) -> FloatArray:
     """`QUANTITIES` with a limit surface fitted as ``choice`` says."""
     values, _ = evaluate(contacts, replace(found.settings, surface=choice))
     return from_maps(values, number, score)
@@ -149,7 +151,7 @@ def _limits(contacts: list[Contact], name: str) -> tuple[float, float, float]:
     return min(x.e_n for x in own), max(min(x.f_x for x in own), min(x.f_y for x in own)), min(x.tau_z for x in own)
 
 
-def _with_quality(found: Solved, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
+def _with_quality(found: SolvedProbe, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
     """`QUANTITIES` with the exact quality of any bodies in the pose that the contacts have."""
     return np.array([*_limits(contacts, "curved"), volume_in_pose(contacts, bodies, found.settings)])
 
@@ -165,7 +167,7 @@ def _wrench_hull(scene: Scene, contact: Contact) -> PolytopeBody:
         return PolytopeBody(wrench)
 
 
-def winkler_case(found: Solved, force: float) -> FloatArray:
+def winkler_case(found: SolvedProbe, force: float) -> FloatArray:
     """`QUANTITIES` of a rigid object between two Winkler foundations, from the scene alone."""
     scene, contacts = found.scene, []
     for pose in found.probe.unit.candidate.poses:

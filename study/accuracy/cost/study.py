@@ -28,7 +28,7 @@ from softjaw.study.accuracy.cost.knobs import (
     judging_knobs,
     weight,
     with_level,
-)  # fmt: skip
+)
 from softjaw.study.accuracy.cost.measure import QUANTITIES, UNITS, Measured, calibration_seconds, measure, warm_up
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import provenance
@@ -104,47 +104,48 @@ class CostStudy:
         """Measurements of a setting, one for each probe."""
         return [self.measured[setting, label] for label in self.candidates]
 
+    def completed(
+        self, setting: str, probes: Sequence[Probe], solve: Callable[[Probe], Measured], after: Callable[[], Any] = bool
+    ) -> list[Measured]:
+        """Measurements of a setting on some probes; what is not there is solved, kept and followed by ``after()``."""
+        for probe in probes:
+            if (setting, probe.label) not in self.measured:
+                self.add(solve(probe))
+                after()
+        return [self.measured[setting, probe.label] for probe in probes]
+
     @property
     def spent(self) -> float:
         """CPU time of all measurements [s]."""
         return sum(m.spent for m in self.measured.values())
 
 
+TEXTS = ("setting", "level", "candidate", "message")  # of the columns
 HEADER = ("scene", "digest", "title", "scene_file", "base", "calibration", "machine")
 
 
 def save(path: Path, study: CostStudy) -> None:
     """Write the study; raise `StudyError` where that cannot be done."""
+    rows = [
+        (m.setting, m.what, m.candidate, force, *values, flags, m.seconds, m.own, m.repeats, m.message)
+        for m in study.measured.values()
+        for force, values, flags in zip(m.forces, m.values, m.flags, strict=True)
+    ]
+    columns = zip(*rows, strict=True) if rows else [()] * len(MEANING)
     with beside(path, folders=True) as part, h5py.File(part, "w") as file:
         file.attrs.update(program=PROGRAM, kind=KIND, version=VERSION)
-        for name in HEADER:
-            file.attrs[name] = getattr(study, name)
+        file.attrs.update({name: getattr(study, name) for name in HEADER})
         file.attrs["calibration_meaning"] = "CPU seconds of one sparse factorisation of fixed size on this machine"
         file.create_dataset("candidates", data=np.array(study.candidates, object), dtype=TEXT)
-        for name, values in _columns(study).items():
-            units, meaning = MEANING[name]
-            text = isinstance(values[0], str) if values else name in ("setting", "level", "candidate", "message")
-            made = file.create_dataset(
-                f"measurements/{name}",
-                data=np.array(values, object if text else float),
-                dtype=TEXT if text else "<f8",
-                fletcher32=True if values and not text else None,  # what HDF5 then compares whenever it is read
-            )
+        for (name, (units, meaning)), values in zip(MEANING.items(), columns, strict=True):
+            # HDF5 compares checksums whenever numbers are read; texts of variable length have none
+            kind = {"dtype": TEXT} if name in TEXTS else {"dtype": "<f8", "fletcher32": bool(rows) or None}
+            data = np.array(values, object if name in TEXTS else float)
+            made = file.create_dataset(f"measurements/{name}", data=data, **kind)
             made.attrs.update(units=units, long_name=meaning)
-        for name in ("knob", "level", "reason"):
-            values = [getattr(s, name) for s in study.skipped]
-            file.create_dataset(f"skipped/{name}", data=np.array(values, object), dtype=TEXT)
-
-
-def _columns(study: CostStudy) -> dict[str, list]:
-    columns: dict[str, list] = {name: [] for name in MEANING}
-    for m in study.measured.values():
-        for force, values, flags in zip(m.forces, m.values, m.flags, strict=True):
-            row = [m.setting, m.what, m.candidate, float(force), *map(float, values), float(flags), m.seconds,
-                   m.own, float(m.repeats), m.message]  # fmt: skip
-            for name, value in zip(MEANING, row, strict=True):
-                columns[name].append(value)
-    return columns
+        for name in vars(Skipped("", "", "")):
+            values = np.array([getattr(s, name) for s in study.skipped], object)
+            file.create_dataset(f"skipped/{name}", data=values, dtype=TEXT)
 
 
 def load(path: Path) -> CostStudy:
@@ -165,36 +166,32 @@ def _read(path: Path, file: GuardedFile) -> CostStudy:
         raise StudyError(OTHER_FILE, f"{path}: not a cost study of this version; choose another file with -o")
     header = {name: str(found[name]) for name in HEADER}
     study = CostStudy(**{**header, "calibration": float(header["calibration"])}, candidates=file.texts("candidates"))
-    columns = {name: f"measurements/{name}" for name in MEANING}
-    texts = ("setting", "level", "candidate", "message")
-    read = {name: file.texts(at) if name in texts else _numbers(file, at) for name, at in columns.items()}
-    if len({len(values) for values in read.values()}) != 1:
-        raise ValueError("its columns are not equally long")
     skipped = zip(*(file.texts(f"skipped/{name}") for name in ("knob", "level", "reason")), strict=True)
     study.skipped = [Skipped(*texts) for texts in skipped]
-    _fill(study, read)
-    return study
-
-
-def _numbers(file: GuardedFile, path: str) -> np.ndarray:
-    found = file.plain(path)
-    if found.ndim != 1 or found.dtype.kind != "f":
-        raise ValueError(f"{path} is no list of numbers")
-    return file.values(found)
-
-
-def _fill(study: CostStudy, read: dict) -> None:
+    read = {name: _column(file, name) for name in MEANING}
+    if len({len(values) for values in read.values()}) != 1:
+        raise ValueError("its columns are not equally long")
     rows: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(zip(read["setting"], read["candidate"], strict=True)):
         rows.setdefault(key, []).append(i)
     for (setting, candidate), own in rows.items():
-        first = own[0]
+        level, message = (read[name][own[0]] for name in ("level", "message"))
+        seconds, part, repeats = (float(read[name][own[0]]) for name in ("cpu_seconds", "own_seconds", "repeats"))
         values = np.column_stack([read[name][own] for name in QUANTITIES])
-        study.add(
-            Measured(setting, read["level"][first], candidate, read["normal_force"][own], values,
-                     float(read["cpu_seconds"][first]), float(read["own_seconds"][first]),
-                     int(read["repeats"][first]), read["message"][first], read["flags"][own])
-        )  # fmt: skip
+        study.add(Measured(setting, level, candidate, read["normal_force"][own], values, seconds, part, int(repeats),
+                           message, read["flags"][own]))  # fmt: skip
+    return study
+
+
+def _column(file: GuardedFile, name: str) -> Any:
+    """Texts, or numbers ``(rows,)``."""
+    path = f"measurements/{name}"
+    if name in TEXTS:
+        return file.texts(path)
+    found = file.plain(path)
+    if found.ndim != 1 or found.dtype.kind != "f":
+        raise ValueError(f"{path} is no list of numbers")
+    return file.values(found)
 
 
 # --- what is measured -------------------------------------------------------------------------------------------------
@@ -329,21 +326,17 @@ class Measuring:
         return f"would take about {duration(self.expected(task))}; raise --time-limit"
 
     def _measure(self, task: Task) -> None:
-        for i, probe in enumerate(self.probes):
-            if (task.setting, probe.label) in self.study.measured:
-                continue
-            if task.level is not None:
-                found = replace(measure(task.setting, probe, task.level), what=task.name)
-            else:
-                contacts = self._solved()
-                if len(contacts) < len(self.probes):
-                    return
-                from softjaw.study.accuracy.cost.judging import judge
+        level = task.level
+        if level is not None:
+            solve = lambda probe: replace(measure(task.setting, probe, level), what=task.name)  # noqa: E731
+        else:
+            from softjaw.study.accuracy.cost.judging import judge
 
-                found = judge(contacts[i], task.knob, task.name)
-            self.study.add(found)
-            self._save()
-        own = self.study.of(task.setting)
+            contacts = dict(zip((p.label for p in self.probes), self._solved(), strict=False))
+            if not contacts:
+                return
+            solve = lambda probe: judge(contacts[probe.label], task.knob, task.name)  # noqa: E731
+        own = self.study.completed(task.setting, self.probes, solve, self._save)
         failed = sum(bool(m.message) for m in own)
         told = f", {failed} of {len(own)} candidates failed" if failed else ""
         knob = f"{task.knob}: " if task.knob else ""

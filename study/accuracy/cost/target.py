@@ -8,7 +8,7 @@ the same command chooses the same again and a run can be resumed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -260,13 +260,9 @@ def quick_choice(
         remark = "the scene gives the mesh itself, so nothing is left to choose and its error is not known"
         return nothing(target, remark)
 
-    def solved(level: Level, probes: Iterable[Probe]) -> list[Measured]:
+    def solved(level: Level, probes: Sequence[Probe]) -> list[Measured]:
         setting = setting_of(own, level)
-        for probe in probes:
-            if (setting, probe.label) not in study.measured:
-                study.add(solve(setting, probe, level))
-                save()
-        return [study.measured[setting, probe.label] for probe in probes]
+        return study.completed(setting, probes, lambda probe: solve(setting, probe, level), save)
 
     probes = list(found)
     for count in range(FEWEST, len(levels) + 1):

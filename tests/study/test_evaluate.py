@@ -1,0 +1,80 @@
+"""All values of a case from two patches and settings, without a solver: closed forms of cylinders face to face."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from softjaw.fem.objects.pose import Pose
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, mesh_errors, quality
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS
+from tests.friction.closed_forms import cylinder_torque
+from tests.generators import cylinder_grid
+
+MU, R, ANGLE, LENGTH, PRESSURE, DISTANCE = 0.5, 0.03, math.pi / 3, 0.04, 2e4, 0.06
+S, F_N = 2 * R * ANGLE * LENGTH * PRESSURE, 2 * R * math.sin(ANGLE) * LENGTH * PRESSURE
+SETTINGS = EvaluationSettings(arms=0.09, torques=0.05)
+
+
+def pair(tilt=0.0, strips=65):
+    """A patch, and the same half a turn about x away, tilted about x [rad]."""
+    patch = cylinder_grid(R, ANGLE, LENGTH, strips, 64)
+    one = Contact(replace(patch, pressure=PRESSURE * patch.pressure), MU)
+    turn = np.diag([1.0, -1.0, -1.0]) @ Rotation.from_euler("x", tilt).as_matrix()
+    return one, one.at(Pose(turn, np.add(one.origin, [0, 0, DISTANCE]) - turn @ one.frame.origin))
+
+
+def test_forces_torque_and_e_n_are_those_of_the_closed_form():
+    values, fits = evaluate(pair(), SETTINGS)
+    torque = R**3 * PRESSURE * cylinder_torque(1.0, 1.0, ANGLE, LENGTH / R)
+    assert values["maps/S"] == pytest.approx(S, rel=1e-12)
+    assert values["maps/F_N"] == pytest.approx(F_N, rel=5e-5)
+    assert values["maps/f_x_max"] == pytest.approx([MU * S, MU * S, MU * values["maps/F_N"]], rel=1e-12)
+    assert values["maps/f_y_max"][0] == pytest.approx(MU * values["maps/F_N"], rel=1e-12)
+    assert values["maps/e_n"][0] == pytest.approx(torque / S, rel=1e-4)
+    assert values["maps/e_n_projected"][0] == pytest.approx(torque / F_N, rel=2e-4)
+    assert values["maps/f_y_overestimate"] == pytest.approx(1 - F_N / S, rel=2.5e-4)  # F_N is good to 5e-5
+    assert values["maps/contact_distance"] == pytest.approx(DISTANCE, rel=1e-12)
+    assert fits[0] is fits[1]  # an image is fitted once
+    assert not values["maps/flags"] & (Flag.ASKEW | Flag.SLIPS | Flag.NO_FIT)
+
+
+def test_the_quality_of_facing_ellipsoids_is_its_closed_form_and_nearly_that_of_a_slight_tilt():
+    """14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per newton of S, d over the arms' length and tau_z over the torques'."""
+    contacts = pair()
+    values, _ = evaluate(contacts, SETTINGS)
+    for m, model in enumerate(MODELS):
+        f_x, f_y, tau = (values[f"maps/{name}_max"][m] / S for name in ("f_x", "f_y", "tau_z"))
+        expected = 14 / 9 * math.pi**2 * (DISTANCE / 0.09) ** 2 * f_x**2 * f_y**2 * tau / 0.05
+        assert values["maps/quality"][m] == pytest.approx(expected, rel=1e-9)
+        assert quality(contacts, SETTINGS, model) == values["maps/quality"][m]
+    assert quality(pair(1.01 * FACING), SETTINGS) == pytest.approx(values["maps/quality"][0], rel=1e-3)
+
+
+def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
+    fine, coarse = pair(math.radians(8.0)), pair(math.radians(8.0), strips=17)
+    values, _ = evaluate(fine, SETTINGS)
+    assert values["maps/flags"] & Flag.ASKEW
+    assert values["maps/misalignment"] == pytest.approx(math.radians(8.0), rel=1e-9)
+    errors = mesh_errors(fine, coarse, values, SETTINGS)
+    other, _ = evaluate(coarse, SETTINGS)
+    for name in ("e_n", "f_y_max", "quality"):
+        expected = abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
+        assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert not any(mesh_errors(fine, fine, values, SETTINGS).values())
+
+
+def test_a_weight_between_the_pads_is_held_by_their_friction():
+    """Along x both pads carry mu S together, here per newton of F_N."""
+    weight = np.array([-1.0, 0, 0, 0, 0, 0])
+    contacts = pair()
+    middle = np.add(contacts[0].origin, [0, 0, DISTANCE / 2])
+    weight[3:] = np.cross(middle, weight[:3])
+    values, _ = evaluate(contacts, replace(SETTINGS, weight=weight))
+    assert values["maps/safety_factor"][0] == pytest.approx(2 * MU * S, rel=2e-2)
