@@ -86,6 +86,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
         told.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+        told += [[str(text) for text in found["options"]]] if "options" in found else []
     crc = zlib.crc32(repr(told).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
     arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)

@@ -86,6 +86,8 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
         scale = study["axes"].create_dataset(name, data=np.asarray(axis.values, "<f8"))
         long_name = f"{axis.long_name} [{axis.units}]" if axis.units else axis.long_name
         scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
+        if options := getattr(axis, "options", ()):
+            _write_attribute(scale, "options", list(options))
         scale.make_scale(name)
     for name, length in layout.counters.items():
         count = study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4"))
