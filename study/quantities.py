@@ -14,7 +14,8 @@ from softjaw.study.flags import flag_definitions
 MODELS = ("curved", "flat", "projected")
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("missing", "done", "failed")  # of a case, by their codes
+STATES = ("missing", "done", "failed")  # of a case, by these codes:
+MISSING, DONE, FAILED = range(3)
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.datasets import CLOSING, MISSING, STATE, SUMS, Column
+from softjaw.study.quantities import MISSING
+from softjaw.study.result.datasets import CLOSING, STATE, SUMS, Column
 from softjaw.study.result.guarded import GuardedFile
 from softjaw.study.result.layout import DONE, FAILED, ROOT, Layout
 
