@@ -119,12 +119,11 @@ def scale(options: Namespace) -> int:
 
 def show(options: Namespace) -> int:
     """Print the best grasps."""
-    from softjaw.study.result.store import open_result
+    from softjaw.study.result.read import open
     from softjaw.study.show.tables.columns import terminal_width
     from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 
-    with open_result(options.file) as result:
-        table = best(result, options.force, options.top, whole_lines=options.form is None)
+    table = best(open(options.file), options.force, options.top, whole_lines=options.form is None)
     forms = {"json": as_json, "csv": as_csv}
     say(forms[options.form](table) if options.form else as_text(table, terminal_width()))
     return DONE
@@ -132,13 +131,13 @@ def show(options: Namespace) -> int:
 
 def compare(options: Namespace) -> int:
     """Print two maps side by side."""
-    from softjaw.study.result.store import open_result
+    from softjaw.study.result.read import open
     from softjaw.study.show.tables.columns import terminal_width
     from softjaw.study.show.tables.compare import compare
     from softjaw.study.show.tables.compare_text import comparison_csv, comparison_json, comparison_text
 
-    with open_result(options.files[0]) as one, open_result(options.files[1]) as other:
-        found = compare(one, other, options.quantity, options.model)
+    one, other = map(open, options.files)
+    found = compare(one, other, options.quantity, options.model)
     forms = {"json": comparison_json, "csv": comparison_csv}
     text = forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
     say(text)
@@ -147,11 +146,10 @@ def compare(options: Namespace) -> int:
 
 def export(options: Namespace) -> int:
     """Write every case for planners."""
-    from softjaw.study.result.store import open_result
+    from softjaw.study.result.read import open
     from softjaw.study.show.tables.export import as_csv, as_json
 
-    with open_result(options.file) as result:
-        text = {"json": as_json, "csv": as_csv}[options.form](result, options.model)
+    text = {"json": as_json, "csv": as_csv}[options.form](open(options.file), options.model)
     if options.output is None:
         say(text)
         return DONE

@@ -14,8 +14,9 @@ from softjaw.study.flags import flag_definitions
 MODELS = ("curved", "flat", "projected")
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("missing", "done", "failed")  # of a case, by their codes
-PARTS = ("assembly", "factorisation", "rest", "friction", "total")  # of a case's time
+STATES = ("missing", "done", "failed")  # of a case, by these codes:
+MISSING, DONE, FAILED = range(3)
+PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
 HELD = ("cor grid", "samples", "probes", "patches")
@@ -260,7 +261,7 @@ TABLE = (
     Quantity("cuts", F, "", "step cuts", "Solves that failed and were tried again in shorter steps.", "work"),
     *(
         Quantity(f"seconds_{part}", (), "s", f"seconds in {part}", f"Time of the case spent in {part}.", "work")
-        for part in PARTS
+        for part in (*PARTS, "total")
     ),
     # limit surfaces
     Quantity("semi_axes", (*FM, "component"), "-, -, m", "semi-axes of the ellipsoid from three motions",
@@ -345,6 +346,7 @@ TABLE = (
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
+WINDOW = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
 
 

@@ -32,12 +32,13 @@ SWEPT = {
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of the maps: ``values`` ``(k,)`` in SI units; texts are numbered and listed in ``long_name``."""
+    """One axis of the maps: ``values`` ``(k,)`` in SI units; texts are numbered and listed in ``options``."""
 
     name: str
     values: FloatArray
     units: str
     long_name: str
+    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,7 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
     for (key, values), (stem, unit) in zip(sweep.items(), stems, strict=True):
         name = stem if taken.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
         if any(isinstance(v, str) for v in values):
-            legend = ", ".join(f"{i} = {v}" for i, v in enumerate(values))
-            made.append(Axis(name, np.arange(len(values), dtype=float), "", f"{key} ({legend})"))
+            made.append(Axis(name, np.arange(len(values), dtype=float), "", key, tuple(map(str, values))))
         else:
             units = UNITS[unit].si if unit else ""
             made.append(Axis(name, np.array([in_si(key, v) for v in values], dtype=float), units, key))

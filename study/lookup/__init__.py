@@ -27,9 +27,10 @@ from softjaw.study.lookup.interpolation import (
     plain,
 )
 from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
-from softjaw.study.lookup.source import Source, read_source, turning
+from softjaw.study.lookup.source import Source, turning
 from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import open as open_dataset
 from softjaw.study.units import UNITS
 
 NUMBER = (float, int)
@@ -67,7 +68,7 @@ class GraspMap:
     """
 
     def __init__(self, file: str | Path, where: Mapping[str, Any] | None = None) -> None:
-        self.source: Source = read_source(Path(file), dict(where or {}))
+        self.source: Source = Source(open_dataset(file), dict(where or {}))
         station, angle, force = self.source.axes
         self.by_poses = not station.units
         period, half_turn = (2 * math.pi, False) if self.by_poses else turning(self.source)
@@ -76,7 +77,7 @@ class GraspMap:
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
         self.done = self._grid(self.source.status == DONE)
-        self.snapped = self.done & (np.nan_to_num(self._grid(self.source.read("flags"))).astype(int) & Flag.SNAPPED > 0)
+        self.snapped = self.done & (self._grid(self.source.read("flags")) & Flag.SNAPPED > 0)
         self._whole = self._whole_cells()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}

@@ -9,6 +9,7 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
+from softjaw.study.quantities import MAIN, WINDOW
 from softjaw.study.result.layout import MISSING
 from softjaw.study.units import shown_text
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
 INSIDE, OUTSIDE, NO_RESULT, SNAP = range(4)
-TOLD = ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "dent", "force_low", "force_high")
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ class GraspPoint:
         lines = [", ".join(words)]
         if self.reason:
             return f"{lines[0]}: {self.reason}"
-        for name in (n for n in TOLD if self.map.source.has(n)):
+        for name in (n for n in (*MAIN, *WINDOW) if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
             lines.append(f"  {name:<13} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]

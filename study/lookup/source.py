@@ -3,86 +3,61 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from softjaw.study.result.layout import MODELS, ROOT
-from softjaw.study.result.store import open_result
-from softjaw.study.show.tables.show import place
-
-GROUPS = ("fingers", "limit_surface")
-TOO_LARGE = ("cor_wrench",)
+from softjaw.study.quantities import BY_KEY
+from softjaw.study.result.read import axes_of, maps_in, values_of
+from softjaw.study.show.tables.columns import place_text
+from softjaw.study.units import UNITS, split_unit
 
 
 class Source:
-    """Everything that was read of a file at one point of its sweep; the file is closed.
+    """A result file at one point of its sweep.
 
     ``axes`` are station, angle and force; ``point`` holds the values of the swept keys as the scene writes them;
     ``maps`` gives unit and definition of every quantity of a case.
     """
 
-    def __init__(self, result: Any, where: Mapping[str, Any]) -> None:
-        self.file, self.scene, self.labels = result.path, result.scene, result.labels
-        self.all_axes, self.layout = result.axes, result.layout
-        self.axes = result.axes[-3:]
-        self.index, self.point = _sweep_point(result.axes[:-3], where)
-        self.status, self.messages = result.status[self.index], result.messages[self.index]
-        shape = result.layout.shape
-        paths = [d.path.removeprefix(f"{ROOT}/") for d in result.layout.datasets if d.shape[: len(shape)] == shape]
-        maps = [q for q in result.layout.quantities if q.group == "maps"]
-        names = {q.name for q in maps}
-        wanted = [p for p in paths if p.split("/")[0] in (*GROUPS, *names) and p.split("/")[1] not in TOO_LARGE]
-        self._values = {path: result.read(path)[self.index] for path in wanted}
-        self._by_model = {q.name if q.group == "maps" else q.key: q.by_model for q in result.layout.quantities}
-        self.maps = {q.name: (q.unit, q.definition) for q in maps}
-        for d in result.layout.derived:
-            over = tuple(n.replace(".", "_") for n in d.axes)
-            if over in (result.layout.names, result.layout.names[:-1]) and not d.shape:
-                found = result.derived(d.name)[self.index]
-                found = found if over == result.layout.names else found[..., None]
-                self._values[f"{d.name}/{d.name}"] = np.broadcast_to(found, self.status.shape)
-                self.maps[d.name] = d.units, d.definition
+    def __init__(self, ds: xr.Dataset, where: Mapping[str, Any]) -> None:
+        self.file, self.scene, self.labels = Path(ds.file), ds.scene, ds.label.values
+        self.all_axes = axes_of(ds)
+        self.axes = self.all_axes[-3:]
+        self.index, self.point = _sweep_point(self.all_axes[:-3], where)
+        self._data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
+        self.status, self.messages = self._data.status.values, self._data.message.values
+        self.maps = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
 
     def read(self, name: str, model: str = "curved") -> np.ndarray:
         """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""
-        if "/" in name and name in self._values:
-            values = self._values[name]
-            return values[..., MODELS.index(model), *self._trailing(name)] if self._by_model[name] else values
         if name in self.maps:
-            return self._values[f"{name}/{model if self._by_model.get(name) else name}"]
-        raise KeyError(f"{name} is not in {self.file}; it has {', '.join(sorted(self.maps))}")
+            return values_of(self._data, name, model)
+        if not self.has(name):
+            raise KeyError(f"{name} is not in {self.file}; it has {', '.join(sorted(self.maps))}")
+        found = self._data[BY_KEY[name].variable]
+        return (found.sel(model=model) if "model" in found.dims else found).values
 
     def has(self, name: str) -> bool:
-        """Whether the file has such a map or dataset."""
-        return name in self.maps or name in self._values
+        """Whether the file has such a map or dataset of the fingers."""
+        q = BY_KEY.get(name)
+        return name in self.maps or bool(q and "finger" in q.dims and q.variable in self._data)
 
     def case(self, index: tuple[int, ...]) -> str:
         """A case in words, by its index along station, angle and force."""
-        whole = SimpleNamespace(axes=self.all_axes, layout=self.layout, labels=self.labels)
-        return place(whole, int(np.ravel_multi_index((*self.index, *index), self.layout.shape)))
-
-    def _trailing(self, name: str) -> tuple[slice, ...]:
-        return (slice(None),) * (self._values[name].ndim - 5)
-
-
-def read_source(file: Path, where: Mapping[str, Any]) -> Source:
-    """What a lookup needs of a file."""
-    with open_result(file) as result:
-        return Source(result, where)
+        return place_text(self.all_axes, self.labels, (*self.index, *index))
 
 
 def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Any]]:
     """Index along the swept axes, and the values of their keys as the scene writes them."""
     index, point, left = [], {}, dict(where)
     for axis in axes:
-        key, _, legend = axis.long_name.partition(" (")
+        key = axis.long_name
         factor = _size(key)
-        options: list[Any] = re.findall(r"(?:^|, )\d+ = ([^,)]*)", legend) or [v / factor for v in axis.values.tolist()]
+        options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         told = f"{key} = {', '.join(map(_text, options))}"
         if key not in left and axis.name not in left:
             if len(options) > 1:
@@ -97,14 +72,12 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
         index.append(found[0])
         point[key] = options[found[0]]
     if left:
-        known = ", ".join(axis.long_name.partition(" (")[0] for axis in axes) or "nothing: the file has no sweep"
+        known = ", ".join(axis.long_name for axis in axes) or "nothing: the file has no sweep"
         raise ValueError(f"where has {', '.join(left)}: expected {known}")
     return tuple(index), point
 
 
 def _size(key: str) -> float:
-    from softjaw.study.units import UNITS, split_unit
-
     unit = split_unit(key)[1]
     return UNITS[unit].size if unit else 1.0
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.datasets import CLOSING, MISSING, STATE, SUMS, Column
+from softjaw.study.quantities import MISSING
+from softjaw.study.result.datasets import CLOSING, STATE, SUMS, Column
 from softjaw.study.result.guarded import GuardedFile
 from softjaw.study.result.layout import DONE, FAILED, ROOT, Layout
 
@@ -86,6 +87,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
         told.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+        told += [[str(text) for text in found["options"]]] if "options" in found else []
     crc = zlib.crc32(repr(told).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
     arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)

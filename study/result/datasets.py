@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.quantities import BY_KEY, FIRST, MODELS, Quantity, map_row
+from softjaw.study.quantities import BY_KEY, FIRST, MISSING, MODELS, Quantity, map_row
 
-MISSING = 0  # state of a case that has not been solved
 MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
 MESSAGE_3 = 240  # as files of version 3 have them
 ROOT = "/study"

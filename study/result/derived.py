@@ -23,7 +23,7 @@ def derived(scene: Scene) -> list[Derived]:
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
     """Fill all of it, by one rank, after all cases."""
-    from softjaw.study.result.grid_values import fill_grid
+    from softjaw.study.result.grid import fill_grid
     from softjaw.study.result.plain_report import plain_report
 
     for kind in KINDS:

@@ -2,21 +2,21 @@
 
 One unstructured grid over the normal force: the object's surface, coloured by the maps, and the fronts of every
 candidate's two pads with their pressure. All steps share the cells of the first; only points and values advance. Of a
-sweep it shows the first point. The space is reserved when the file is made; `grid_values` fills it at the end.
+sweep it shows the first point. The space is reserved when the file is made; `fill_grid` fills it at the end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from softjaw.study.quantities import FINGERS, ON_OBJECT
-from softjaw.study.result.datasets import MISSING, Dataset
-from softjaw.study.result.grid_arrays import quads_of, shared_steps, topology
+from softjaw.study.quantities import DONE, FINGERS, MISSING, ON_OBJECT
+from softjaw.study.result.datasets import Dataset
 
 PATH = "/VTKHDF"
+KINDS = {3: 5, 4: 9}  # VTK's numbers for triangles and quadrilaterals, by their corners
 OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those that no candidate grasps
 ABOUT = (
     "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
@@ -104,3 +104,90 @@ def skeleton(layout: Any, surface: Surface) -> dict[str, np.ndarray]:
     }
     steps = shared_steps(layout.axes[-1].values, points, _advances(layout, cells))
     return {f"{PATH}/{name}": v for name, v in {**found, **{f"Steps/{k}": v for k, v in steps.items()}}.items()}
+
+
+def fill_grid(writer: Any) -> None:
+    """Write points and values of every force, from what the file holds of the first point of its sweep."""
+    layout = writer.result().layout
+    _, cells = sizes(layout)
+    if not cells:
+        return
+    candidate = writer.read(f"{PATH}/CellData/candidate")
+    first = (0,) * (len(layout.shape) - 3)
+    states = writer.read("status/code")[first].reshape(-1, layout.shape[-1])
+    for k in range(layout.shape[-1]):
+        start, state = k * cells, states[:, k]
+        writer.fill(f"{PATH}/CellData/status", start, np.where(candidate == NOBODY, -1, state[candidate].astype(int)))
+        for name, q in maps_of(layout).items():
+            path = f"{name}/curved" if q.by_model else f"{name}/{name}"
+            values = writer.read(path)[first].reshape(states.shape)[:, k]
+            shown = np.where(state == DONE, values, np.nan)
+            writer.fill(f"{PATH}/CellData/{name}", start, np.where(candidate == NOBODY, np.nan, shown[candidate]))
+        if layout.front[0]:
+            _fill_pads(writer, layout, k, state)
+
+
+def _fill_pads(writer: Any, layout: Any, k: int, state: np.ndarray) -> None:
+    """Fronts and pressures of all candidates at one force; of those that are not solved nothing is seen."""
+    points, cells = sizes(layout)
+    i, j = layout.front
+    width, faces = FINGERS * (i + 1) * (j + 1), FINGERS * i * j
+    for c in np.flatnonzero(state == DONE):
+        index = (*(0,) * (len(layout.shape) - 3), *divmod(int(c), layout.shape[-2]), k)
+        row = int(np.ravel_multi_index(index, layout.shape))
+        centroid, pressure = (writer.read(f"patch/{name}", row) for name in ("centroid", "pressure"))
+        R, o = (writer.read(f"fingers/pose_{name}", index) for name in ("rotation", "origin"))
+        if not all(np.isfinite(v).all() for v in (centroid, pressure, R, o)):
+            continue
+        front = np.stack([corners_of(x.reshape(i, j, 3)).reshape(-1, 3) for x in centroid])
+        placed = np.einsum("fab,fnb->fna", R, front) + o[:, None]
+        writer.fill(f"{PATH}/Points", k * points + layout.surface[0] + c * width, placed.reshape(-1, 3))
+        writer.fill(f"{PATH}/CellData/pressure", k * cells + layout.surface[1] + c * faces, pressure.ravel())
+
+
+def corners_of(centres: np.ndarray) -> np.ndarray:
+    """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``, continued beyond the rim."""
+    for axis in (0, 1):
+        c = np.moveaxis(centres, axis, 0)
+        if len(c) > 1:
+            c = np.concatenate([2 * c[:1] - c[1:2], c, 2 * c[-1:] - c[-2:-1]])
+            c = 0.5 * (c[1:] + c[:-1])
+        else:
+            c = np.concatenate([c, c])
+        centres = np.moveaxis(c, 0, axis)
+    return centres
+
+
+def topology(points: int, blocks: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+    """Datasets that tell the cells: blocks of triangles ``(m, 3)`` and quadrilaterals ``(m, 4)``, one after another."""
+    corners = np.repeat([b.shape[1] for b in blocks], [len(b) for b in blocks])
+    numbers = {"Points": points, "Cells": len(corners), "ConnectivityIds": int(corners.sum())}
+    found = {f"NumberOf{name}": np.array([number], "<i8") for name, number in numbers.items()}
+    return found | {
+        "Connectivity": np.concatenate([b.ravel() for b in blocks]).astype("<i8"),
+        "Offsets": np.concatenate([[0], np.cumsum(corners)]).astype("<i8"),
+        "Types": np.array([KINDS[n] for n in (3, 4)], "u1")[corners - 3],
+    }
+
+
+def quads_of(faces: tuple[int, int], first: int, count: int = 1) -> np.ndarray:
+    """Corners ``(count i j, 4)`` of the faces of equal grids of ``i x j`` faces, whose points follow ``first``."""
+    i, j = faces
+    number = first + np.arange(count * (i + 1) * (j + 1)).reshape(count, i + 1, j + 1)
+    corners = [number[:, :-1, :-1], number[:, 1:, :-1], number[:, 1:, 1:], number[:, :-1, 1:]]
+    return np.stack(corners, axis=-1).reshape(-1, 4)
+
+
+def shared_steps(
+    steps: Sequence[float], points: int, on_cells: Mapping[str, int], on_points: Mapping[str, int] | None = None
+) -> dict[str, np.ndarray]:
+    """Datasets below ``Steps`` that say where each step begins, if all share the cells of the first.
+
+    ``on_cells`` and ``on_points`` give for each array by how many values it advances: 0 for one that stays.
+    """
+    number, none = np.arange(len(steps), dtype="<i8"), np.zeros(len(steps), "<i8")
+    found = {"Values": np.asarray(steps, "<f8"), "NumberOfParts": none + 1, "PartOffsets": none}
+    found |= {"PointOffsets": points * number, "CellOffsets": none[:, None], "ConnectivityIdOffsets": none[:, None]}
+    for kind, arrays in (("Cell", on_cells), ("Point", on_points or {})):
+        found |= {f"{kind}DataOffsets/{name}": size * number for name, size in arrays.items()}
+    return found

@@ -26,14 +26,15 @@ from softjaw.study.quantities import (
     definitions,
     quantities,
 )
+from softjaw.study.quantities import DONE as DONE
+from softjaw.study.quantities import FAILED as FAILED
+from softjaw.study.quantities import MISSING as MISSING
 from softjaw.study.result.datasets import CLOSING, MESSAGE, MESSAGE_3, Column, Dataset, columns_of, datasets_of
-from softjaw.study.result.datasets import MISSING as MISSING
 from softjaw.study.result.datasets import ROOT as ROOT
 from softjaw.study.result.grid import grid_datasets
 
 PROGRAM, VERSION = "softjaw", 4
 READABLE = (3, 4)  # 3 has one checksum for a whole row, and none of its state, its timings and what is not in rows
-DONE, FAILED = 1, 2
 LABEL, SESSIONS, REPORT = 80, 256, 8192
 SESSION_3 = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),

@@ -8,6 +8,7 @@ import textwrap
 from typing import Any
 
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.read import dataset
 from softjaw.study.show.data import Data
 from softjaw.study.show.report.words import CAVEAT, subtitle, verdict
 from softjaw.study.show.tables.show import best
@@ -29,7 +30,7 @@ def plain_report(result: Any, mu: float | None) -> str:
     data = Data(result)
     size = subtitle(data).partition(": ")[2]
     what = f"{data.title}: {size}" if result.title else size
-    table = [as_text(best(result, top=TOP, whole_lines=True), WIDTH)] if data.best else []
+    table = [as_text(best(dataset(result), top=TOP, whole_lines=True), WIDTH)] if data.best else []
     notes = "\n".join(line for state in (FAILED, DONE) for line in _notes(data, state))
     parts = [what, plain(verdict(data, mu)), *table, notes, READING, CAVEAT.replace("the scene below", "/study/scene")]
     lines = "\n\n".join(part for part in parts if part).splitlines()

@@ -6,7 +6,6 @@ PETSc, and works on a file that a run is still writing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +13,12 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
-from softjaw.study.quantities import EFFECTS, FINGERS, MODELS, REASONS
-from softjaw.study.result.datasets import Dataset
-from softjaw.study.result.layout import DONE, ROOT
-from softjaw.study.result.reading import Result
+from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, TABLE, Quantity
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.reading import Result, StoredAxis
 from softjaw.study.result.store import open_result
 
-STATES = ("missing", "done", "failed")  # by their codes
 XYZ = ("x", "y", "z")
-PREFIX = {"fingers": "finger", "checks": "check", "effects": "effect", "probes": "probe"}  # of names that maps have too
 FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to be read with the rest
 
 
@@ -81,14 +77,13 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
     with open_result(file) as result:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
         rows = rows.isel(at)
-        described = {d.path: d for d in result.layout.datasets}
         faces = [result.patch(int(row)) for row in rows.values.ravel()]
         found = {}
         for name in faces[0] if faces else ():
             values = np.stack([one[name] for one in faces]).reshape(rows.shape + faces[0][name].shape)
             values[(result.status.ravel()[rows.values] != DONE)] = np.nan
-            d = described[f"{ROOT}/patch/{name}"]
-            found[name] = xr.Variable((*rows.dims, *d.scales[1:]), values, _about(d))
+            q = BY_KEY[f"patch/{name}"]
+            found[name] = xr.Variable((*rows.dims, *q.dims), values, _about(q))
         return xr.Dataset(found, {"finger": np.arange(1, FINGERS + 1), "component": [*XYZ]} if found else {})
 
 
@@ -110,81 +105,82 @@ def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
         The file cannot be read or is damaged.
     """
     with open_result(file) as result:
-        d = next((d for d in result.layout.datasets if d.path == f"{ROOT}/{path}"), None)
-        if d is None:
+        q = next((q for q in result.layout.quantities if q.key == path), None)
+        if q is None:
             raise KeyError(f"{file}: found no dataset {path}")
-        values = _solved(result, d.scales, result.read(path))
-        return xr.DataArray(values, dims=d.scales, attrs=_about(d), name=path.replace("/", "_")).isel(at)
+        return xr.DataArray(_variable(result, q), name=q.variable).isel(at)
 
 
 def dataset(result: Result) -> xr.Dataset:
     """The dataset of an open result file."""
     layout = result.layout
-    variables = {name: xr.Variable(d.scales, values, _about(d)) for name, d, values in _plain(result)}
-    for q in layout.quantities:
-        if q.group == "maps" and q.by_model:
-            values = np.stack([result.map(q.name, model) for model in MODELS], axis=-1)
-            variables[q.name] = xr.Variable((*layout.names, "model"), values, _of(q))
+    listed = [q for q in layout.quantities if q.group not in ("patch", "status") and q.key not in FIELDS]
+    variables = {q.variable: _variable(result, q) for q in listed}
     for d in layout.derived:
-        scales = tuple(name.replace(".", "_") for name in d.axes)
         if not d.shape:
             about = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
-            variables[d.name] = xr.Variable(scales, result.derived(d.name), about)
+            variables[d.name] = xr.Variable(_scales(d), result.derived(d.name), about)
+    for name in ("attempts", "message"):
+        found = result.messages if name == "message" else result.read(f"status/{name}")
+        variables[name] = xr.Variable(layout.names, found, _about(BY_KEY[f"status/{name}"]))
     status = result.status  # last: rows that a run began anew meanwhile are missing now
     for variable in variables.values():
-        _blank(variable, status, layout.names)
+        if variable.dims[: len(layout.names)] == layout.names and variable.dtype.kind == "f":
+            variable.values[status != DONE] = np.nan
     flags = np.nan_to_num(variables["flags"].values).astype(np.int64)
     known = [flag for flag in Flag if flag & OF_FILE]
     marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": tuple(flag.word for flag in known)}
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
-    codes = {"long_name": "state of the case", "units": "", "flag_values": tuple(range(len(STATES)))}
-    variables["status"] = xr.Variable(layout.names, status.astype(np.int8), codes | {"flag_meanings": STATES})
-    about = {"long_name": "why a case failed, or what to know about a result", "units": ""}
-    variables["message"] = xr.Variable(layout.names, result.messages, about)
+    variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
     return xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
 
 
-def _plain(result: Result) -> Iterator[tuple[str, Dataset, np.ndarray]]:
-    """Name, description and values of every dataset that becomes one variable as it stands."""
-    layout = result.layout
-    models = {f"{q.name}/{model}" for q in layout.quantities if q.group == "maps" and q.by_model for model in MODELS}
-    for d in layout.datasets:
-        path = d.path.removeprefix(f"{ROOT}/")
-        group, _, name = path.partition("/")
-        if group in ("checksums", "patch", "derived", "map") or path in (*FIELDS, *models):
-            continue
-        if path in ("status/code", "status/message", "status/crc") or path.startswith("wrenches/"):
-            continue
-        yield name if name in (group, "attempts") else f"{PREFIX.get(group, group)}_{name}", d, result.read(path)
+def axes_of(ds: xr.Dataset) -> tuple[StoredAxis, ...]:
+    """The axes of the cases: swept keys, station, angle and normal force."""
+    return tuple(
+        StoredAxis(str(name), ds[name].values, ds[name].units, ds[name].long_name, ds[name].attrs.get("options", ()))
+        for name in ds.status.dims
+    )
 
 
-def _blank(variable: xr.Variable, status: np.ndarray, names: tuple[str, ...]) -> None:
-    """No values where a case is not done; what has no value for each case by itself stays as it is."""
-    if variable.dims[: len(names)] == names and variable.dtype.kind == "f":
-        variable.values[status != DONE] = np.nan
+def values_of(ds: xr.Dataset, name: str, model: str = "curved") -> np.ndarray:
+    """A map over the cases, of one friction model where it has several; NaN where a case is not done.
+
+    What is known of a candidate only has the same value at every force.
+    """
+    found = ds[name].sel(model=model, drop=True) if "model" in ds[name].dims else ds[name]
+    return found.broadcast_like(ds.status).transpose(*ds.status.dims).values
 
 
-def _solved(result: Result, scales: tuple[str, ...], values: np.ndarray) -> np.ndarray:
-    if scales[: len(result.layout.names)] == result.layout.names:
+def maps_in(ds: xr.Dataset) -> dict[str, str]:
+    """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
+    names = [q.name for q in TABLE if q.group == "maps" and q.name in ds]
+    over = ds.status.dims
+    names += [name for name in ds.attrs["derived"] if name in ds and ds[name].dims in (over, over[:-1])]
+    return {name: ds[name].attrs["units"] for name in names}
+
+
+def _variable(result: Result, q: Quantity) -> xr.Variable:
+    """A quantity of all cases; of one that some candidates have alone, over these."""
+    names = result.layout.names
+    if q.group == "maps" and q.by_model:
+        values = np.stack([result.map(q.name, model) for model in MODELS], axis=-1)
+    else:
+        values = result.map(q.name) if q.group == "maps" else result.read(q.key)
+    lead = (*names[:-3], q.among, names[-1]) if q.among else names
+    if not q.among and values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
-    return values
+    return xr.Variable((*lead, *q.dims), values, _about(q))
 
 
-def _of(q: Any) -> dict[str, Any]:
-    return {"units": q.unit, "long_name": q.label, "definition": q.definition}
+def _scales(derived: Any) -> tuple[str, ...]:
+    return tuple(name.replace(".", "_") for name in derived.axes)
 
 
-def _about(d: Dataset) -> dict[str, Any]:
-    """Attributes of a variable: the file's, with the label free of its unit."""
-    found, units = dict(d.attributes), d.attributes.get("units", "")
-    found["long_name"] = found["long_name"].removesuffix(f" [{units}]")
-    group, _, name = d.path.removeprefix(f"{ROOT}/").partition("/")
-    if group == "effects" and not name.endswith("_indicator"):
-        effect, _, part = name.rpartition("_")
-        words = EFFECTS[effect] if part == "level" else REASONS
-        found |= {"flag_values": tuple(range(len(words))), "flag_meanings": words}
-    found.pop("meaning", None)
-    return found
+def _about(q: Quantity) -> dict[str, Any]:
+    """Attributes of a variable; codes list what they mean, as in the CF conventions."""
+    codes = {"flag_values": tuple(range(len(q.meanings))), "flag_meanings": q.meanings} if q.meanings else {}
+    return {"units": q.unit, "long_name": q.label, "definition": q.definition, **codes}
 
 
 def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
@@ -193,6 +189,9 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
         name: xr.Variable(name, axis.values, {"units": axis.units, "long_name": axis.long_name})
         for name, axis in zip(layout.names, result.axes, strict=True)
     }
+    for name, axis in zip(layout.names, result.axes, strict=True):
+        if axis.options:
+            found[name].attrs["options"] = axis.options
     found["label"] = xr.Variable(layout.names[-3:-1], result.labels, {"long_name": "name of the candidate"})
     known = {"finger": [*range(1, FINGERS + 1)], "model": [*MODELS], "component": [*XYZ], "component_2": [*XYZ]}
     used = {dim for variable in variables.values() for dim in variable.dims}

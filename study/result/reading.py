@@ -25,6 +25,7 @@ class StoredAxis(NamedTuple):
     values: np.ndarray
     units: str
     long_name: str
+    options: tuple[str, ...] = ()  # texts that the values stand for
 
 
 class Result:
@@ -246,7 +247,11 @@ class Result:
         values = self.file.values(found)
         if not (np.abs(values) < BEYOND).all():
             raise ValueError(f"axis '{name}' has values that are no numbers")
-        return StoredAxis(name, values, units, str(attributes.get("long_name", name)).removesuffix(f" [{units}]"))
+        label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
+        options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
+        if options and len(options) != len(values):
+            raise ValueError(f"axis '{name}' has {len(values)} values and {len(options)} options")
+        return StoredAxis(name, values, units, label, options)
 
     def _text(self, name: str) -> Any:
         found = self.file.plain(f"{ROOT}/{name}")

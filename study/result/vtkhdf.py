@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from softjaw.study.result.grid_arrays import shared_steps, topology
+from softjaw.study.result.grid import shared_steps, topology
 from softjaw.study.writing import beside
 
 LIBVER = ("earliest", "v110")

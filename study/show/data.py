@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT
+from softjaw.study.result.read import dataset
 from softjaw.study.show.tables.ranking import BORNE, LOST, TIE, borne_level, judged, ranking
 from softjaw.study.units import shown as in_shown
 from softjaw.study.units import shown_unit
@@ -65,6 +66,11 @@ class Data:
         self.by_poses = not self.axes[-3].units
         self._paths = {d.path.removeprefix(f"{ROOT}/"): d for d in result.layout.datasets}
         self._read: dict[str, np.ndarray] = {}
+
+    @cached_property
+    def dataset(self) -> Any:
+        """The whole file as `study.result.read.open` gives it."""
+        return dataset(self.result)
 
     @property
     def title(self) -> str:
@@ -136,7 +142,7 @@ class Data:
     @cached_property
     def flags(self) -> np.ndarray:
         """Flags of all cases as `study.show.tables.ranking.judged` gives them."""
-        return judged(self.result)
+        return judged(self.dataset)
 
     @property
     def lost(self) -> np.ndarray:
@@ -204,9 +210,8 @@ class Data:
         return axis.name.replace("_", " ")
 
     def texts(self, axis: Any) -> list[str]:
-        """The values of a sweep over texts, which the axis lists in its long name; empty for numbers."""
-        found = re.findall(r"(?:\(|, )\d+ = ([^,)]*)", axis.long_name) if not axis.units else []
-        return found if len(found) == len(axis.values) else []
+        """The values of a sweep over texts; empty for numbers."""
+        return list(axis.options)
 
     def axis_label(self, axis: Any) -> str:
         """An axis with the unit people read."""

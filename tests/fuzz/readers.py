@@ -108,13 +108,15 @@ def _mesh(path):
 
 
 def _result(path):
+    from softjaw.study.result.read import dataset
     from softjaw.study.result.store import open_result
     from softjaw.study.show.tables.export import as_csv
     from softjaw.study.show.tables.show import as_json, best
     from softjaw.study.show.tables.status import status_text
 
     with open_result(path) as result:
-        return as_csv(result), as_json(best(result, None, 3, whole_lines=False)), status_text(result, 80)
+        ds = dataset(result)
+        return as_csv(ds), as_json(best(ds, None, 3, whole_lines=False)), status_text(result, 80)
 
 
 def _cost(path):

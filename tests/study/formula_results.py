@@ -53,7 +53,7 @@ def make(path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(
     """
     axes = axes or grid_axes()
     layout = Layout(axes, 0, meshes, patches=False, derived=derived)
-    kind = f"{[(axis.long_name, axis.values.tolist()) for axis in axes]}{layout.options()}{scene}{labels}"
+    kind = f"{[(axis.long_name, axis.values.tolist(), axis.options) for axis in axes]}{layout.options()}{scene}{labels}"
     if kind not in SKELETONS:
         create(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
         SKELETONS[kind] = path.read_bytes()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
+from softjaw.study.quantities import MISSING
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, MISSING, STATE, SUMS
+from softjaw.study.result.datasets import CLOSING, STATE, SUMS
 from softjaw.study.result.guarded import GuardedFile
 from softjaw.study.result.layout import ROOT
 from softjaw.study.result.reading import Result

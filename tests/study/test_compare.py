@@ -9,6 +9,7 @@ import json
 import numpy as np
 import pytest
 
+import softjaw
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.cli import main
 from softjaw.study.lookup import GraspMap
@@ -47,8 +48,7 @@ def pair(tmp_path_factory):
 
 
 def compared(one, other, **options):
-    with open_result(one) as a, open_result(other) as b:
-        return compare(a, b, **options)
+    return compare(softjaw.open(one), softjaw.open(other), **options)
 
 
 def told(words, monkeypatch):
@@ -156,8 +156,7 @@ def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
     assert " neck " in comparison_text(compared(poses, poses))
 
     def swept(words):
-        legend = ", ".join(f"{i} = {w}" for i, w in enumerate(words))
-        axis = StoredAxis("material", np.arange(len(words), dtype=float), "", f"gripper.material ({legend})")
+        axis = StoredAxis("material", np.arange(len(words), dtype=float), "", "gripper.material", tuple(words))
         name = "-".join(words)
         return make(tmp_path / f"{name}.hdf", lambda *x: 0.01 + x[0] + 0 * sum(x), grid_axes(sweep=(axis,)))
 
@@ -183,9 +182,9 @@ def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch)
 
 
 def test_every_case_is_exported_with_its_state(pair):
-    with open_result(pair[1]) as result:
-        data, rows = json.loads(as_json(result, "flat")), list(csv.DictReader(io.StringIO(as_csv(result, "flat"))))
-        e_n = result.map("e_n", "flat").ravel()
+    ds = softjaw.open(pair[1])
+    data, rows = json.loads(as_json(ds, "flat")), list(csv.DictReader(io.StringIO(as_csv(ds, "flat"))))
+    e_n = ds.e_n.sel(model="flat").values.ravel()
     assert len(data["cases"]) == len(rows) == 4 * 6 * 3
     assert data["meaning"] == MEANING
     row = int(np.ravel_multi_index((2, 1, 1), (4, 6, 3)))
@@ -204,9 +203,8 @@ def test_every_case_is_exported_with_its_state(pair):
 def test_frames_are_those_of_the_object(tmp_path):
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     path = make(tmp_path / "a.hdf", fingers__pose_rotation=turn, flags__flags=4096.0 + 256)
-    with open_result(path) as result:
-        case = next(cases(result))
-        data = json.loads(as_json(result))["cases"][0]
+    case = next(cases(softjaw.open(path)))
+    data = json.loads(as_json(softjaw.open(path)))["cases"][0]
     one = case["fingers"][0]
     assert one["frame_origin"] == pytest.approx(turn @ [0, 0, 0.001] + [0, 0, -0.02])
     assert one["frame_axes"] == pytest.approx(turn.T)  # rows x, y, N of a frame that is the pad's
@@ -218,8 +216,7 @@ def test_an_exported_surface_is_the_one_that_is_looked_up(tmp_path):
     axes = grid_axes()
     bound = np.full((5, 6), 4.0)
     path = make(tmp_path / "a.hdf", axes=axes, derived=window(axes), derived__force_high=bound)
-    with open_result(path) as result:
-        case = next(c for c in cases(result) if c["place"]["normal_force"] == FORCES[2])
+    case = next(c for c in cases(softjaw.open(path)) if c["place"]["normal_force"] == FORCES[2])
     one = case["fingers"][0]
     surface = GraspMap(path).at(0, 0, FORCES[2]).limit_surface(1)
     w = fibonacci_twists(20, 1.0) * one["unit"]

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -127,9 +128,10 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
     from softjaw.study.show.tables.ranking import judged
 
     factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
-    layout = SimpleNamespace(derived=[SimpleNamespace(name="force_low")])
-    result = SimpleNamespace(layout=layout, map=lambda name, model="": factor if model else np.zeros((1, 4)))
-    assert (judged(result) & Flag.TOO_WEAK > 0).tolist() == [[False, False, True, False]]
+    over = ("angle", "normal_force")
+    known = {"flags": (over, np.zeros((1, 4), np.int64)), "force_low": ("angle", [1.0])}
+    ds = xr.Dataset(known | {"safety_factor": ((*over, "model"), factor[..., None])}, {"model": ["curved"]})
+    assert (judged(ds) & Flag.TOO_WEAK > 0).tolist() == [[False, False, True, False]]
 
 
 # --- levels of effects ------------------------------------------------------------------------------------------------

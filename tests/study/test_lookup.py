@@ -222,10 +222,9 @@ def test_explicit_poses_go_by_number_and_force(tmp_path):
 
 
 def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
-    materials = "gripper.material (0 = blatz_ko, 1 = neo_hooke)"
     sweep = (
         StoredAxis("semi_axis_b", np.array([0.01, 0.025]), "m", "object.semi_axis_b_mm"),
-        StoredAxis("material", np.array([0.0, 1.0]), "", materials),
+        StoredAxis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_ko", "neo_hooke")),
     )
 
     def formula(b, material, station, angle, force):

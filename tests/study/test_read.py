@@ -13,8 +13,9 @@ import xarray as xr
 import softjaw
 from softjaw.study.flags import Flag
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.quantities import STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.read import FIELDS, STATES
+from softjaw.study.result.read import FIELDS
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
 from tests.study.fake_run import fake_plan, fake_result

@@ -6,38 +6,45 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from softjaw.friction.frame import FrameFlag
 from softjaw.study.cli import main
 from softjaw.study.flags import Flag, raised
-from softjaw.study.quantities import TABLE, quantities
+from softjaw.study.quantities import MODELS, quantities
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.show.tables.show import as_csv, as_text, best, place
-from softjaw.study.show.tables.status import reasons
+from softjaw.study.result.read import axes_of
+from softjaw.study.show.tables.show import as_csv, as_text, best
+from softjaw.study.show.tables.status import place, reasons
 
 FORCES = np.array([1.0, 5.0])
 
 
-def study(quality, flags=0.0, labels=None, status=DONE):
+def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
     """Result with this quality ``(stations, angles)`` at both forces; with ``labels`` its candidates are poses."""
     quality = np.asarray(quality, dtype=float)
-    stations, angles = quality.shape
-    shape = (stations, angles, len(FORCES))
-    maps = {"flags": np.broadcast_to(np.reshape(flags, (-1, 1, 1)), shape)}
-    axes = (
-        StoredAxis("station", np.arange(stations, dtype=float), "" if labels else "m", "station"),
-        StoredAxis("angle", np.arange(angles) * np.pi / 2, "rad", "angle"),
-        StoredAxis("normal_force", FORCES, "N", "force"),
-    )
-    return SimpleNamespace(
-        axes=axes,
-        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1, quantities=TABLE[:4]),
-        status=np.full(shape, status),
-        messages=np.full(shape, "no contact at this force" if status == FAILED else ""),
-        labels=np.array(labels).reshape(-1, 1) if labels else np.full((stations, angles), ""),
-        map=lambda name, model=None: maps.get(name, np.repeat(quality[..., None], len(FORCES), axis=-1)),
-    )
+    shape = (*quality.shape, len(FORCES))
+    over = ("station", "angle", "normal_force")
+    every = np.broadcast_to(quality[..., None], shape)
+    maps = {
+        q.name: ((*over, *q.dims), np.broadcast_to(every[..., None], (*shape, 3)) if q.by_model else every,
+                 {"units": q.unit})
+        for q in quantities(needs) if q.group == "maps"
+    }  # fmt: skip
+    maps["flags"] = (over, np.broadcast_to(np.reshape(flags, (-1, 1, 1)), shape).astype(np.int64))
+    maps["status"] = (over, np.full(shape, status))
+    given = np.array(labels).reshape(-1, 1) if labels else np.full(quality.shape, "")
+    axes = {"station": (np.arange(shape[0], dtype=float), "" if labels else "m"),
+            "angle": (np.arange(shape[1]) * np.pi / 2, "rad"), "normal_force": (FORCES, "N")}  # fmt: skip
+    coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
+    coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
+    return xr.Dataset(maps, coordinates, {"planar": "flat", "poses": bool(labels), "derived": ()})
+
+
+def stored(ds, message):
+    """The same as `softjaw status` reads it."""
+    return SimpleNamespace(axes=axes_of(ds), layout=SimpleNamespace(shape=ds.status.shape), status=ds.status.values,
+                           messages=np.full(ds.status.shape, message), labels=ds.label.values)  # fmt: skip
 
 
 @pytest.mark.parametrize("top", [1, 2, 3, 0])
@@ -72,13 +79,13 @@ def test_flags_are_words_with_a_legend(bit, word):
 
 
 def test_explicit_poses_are_listed_by_their_labels():
-    poses = study([[2.0], [1.0]], labels=["near", "far"], status=FAILED)
+    poses = stored(study([[2.0], [1.0]], labels=["near", "far"], status=FAILED), "no contact at this force")
     assert place(poses, 3) == '"far", normal_force 5 N'
     assert reasons(poses) == [
         "  failed 4 x no contact at this force",
         '      at "near", normal_force 1 N; "near", normal_force 5 N; "far", normal_force\n      1 N; and 1 more',
     ]
-    assert place(study([[2.0], [1.0]]), 3) == "station 1000 mm, angle 0 deg, normal_force 5 N"
+    assert place(stored(study([[2.0], [1.0]]), ""), 3) == "station 1000 mm, angle 0 deg, normal_force 5 N"
 
 
 @pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
@@ -94,20 +101,18 @@ def test_a_force_between_the_levels_is_answered_with_the_nearest():
 
 
 def test_the_safety_factor_has_a_column_where_the_mass_is_known():
-    heavy = study([[2.0], [1.0]])
-    assert "safety" not in as_text(best(heavy))
-    heavy.layout.quantities = quantities(["mass"])
+    assert "safety" not in as_text(best(study([[2.0], [1.0]])))
+    heavy = study([[2.0], [1.0]], needs=["mass"])
     assert "safety" in as_text(best(heavy), 200).splitlines()[2]
     assert "safety_factor" in as_csv(best(heavy)).splitlines()[0]
 
 
-WIDE = quantities(["mass", "wall", "two meshes"])
+WIDE = ("mass", "wall", "two meshes", "two scores")
 
 
 @pytest.mark.parametrize("width", [60, 80, 100, 200])
 def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
-    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.ASKEW)])
-    walls.layout.quantities = WIDE
+    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.ASKEW)], needs=WIDE)
     table = best(walls)
     lines = as_text(table, width).splitlines()
     assert max(map(len, lines)) <= width
@@ -121,8 +126,7 @@ def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
 
 
 def test_errors_stand_behind_what_they_belong_to_and_are_percent():
-    known = study([[0.04]])
-    known.layout.quantities = WIDE
+    known = study([[0.04]], needs=WIDE)
     names = [name for name, _ in best(known).columns]
     for name in ("e_n", "f_x_max", "f_y_max", "tau_z_max"):
         assert names[names.index(name) + 1] == f"{name}_error"

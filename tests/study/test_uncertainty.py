@@ -6,7 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
+import softjaw
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.volume import volume_linf
 from softjaw.study.accuracy.uncertainty import interval, probing
@@ -18,7 +20,6 @@ from softjaw.study.case import sweep
 from softjaw.study.case.candidates import axis_poses
 from softjaw.study.lookup import GraspMap
 from softjaw.study.result.layout import Derived, Layout
-from softjaw.study.result.store import open_result
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.show.tables.compare import compare
@@ -242,11 +243,11 @@ def test_show_compare_export_and_lookup_take_bands_from_the_file(tmp_path):
     given = {"derived__quality_band": 0.1 * quality, "derived__quality_band_mesh": np.full(shape, 0.1),
              "derived__e_n_band": np.full(shape, 1e-3), "derived__e_n_band_mesh": np.full(shape, 0.01)}  # fmt: skip
     path = make(tmp_path / "b.hdf", axes=axes, derived=(*bands, *parts), quality__curved=quality, **given)
-    with open_result(path) as result, open_result(path) as other:
-        table = best(result)
-        text = as_text(table, 200)
-        assert compare(result, other).asked.error == pytest.approx(np.full(shape, 2e-3))
-        assert next(cases(result))["maps"]["e_n_band"] == 1e-3
+    ds = softjaw.open(path)
+    table = best(ds)
+    text = as_text(table, 200)
+    assert compare(ds, ds).asked.error == pytest.approx(np.full(shape, 2e-3))
+    assert next(cases(ds))["maps"]["e_n_band"] == 1e-3
     names = [name for name, _ in table.columns]
     assert table.rows[0][names.index("quality_band")] == pytest.approx(0.2)
     assert (
@@ -257,8 +258,9 @@ def test_show_compare_export_and_lookup_take_bands_from_the_file(tmp_path):
 
 
 def test_a_file_without_errors_knows_none():
-    layout = SimpleNamespace(quantities=(), derived=())
-    assert sure(SimpleNamespace(layout=layout, map=lambda *_: np.ones((2, 2, 1))), "quality", 0) is None
+    quality = (("station", "angle", "normal_force", "model"), np.ones((2, 2, 1, 1)))
+    ds = xr.Dataset({"quality": quality}, {"model": ["curved"]}, {"derived": ()})
+    assert sure(ds, "quality", 0) is None
 
 
 # --- against solves --------------------------------------------------------------------------------------------------

@@ -21,11 +21,12 @@ from softjaw.fem.objects.shapes import Box, EllipticCylinder
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.grid import corners_of
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data
 from softjaw.study.show.view import colours, command, limits
 from softjaw.study.show.view.model import quantity_of, view_of
-from softjaw.study.show.view.pads import corners_of, pads
+from softjaw.study.show.view.pads import pads
 from softjaw.study.show.view.page import page, payload
 from softjaw.study.show.view.server import server
 from softjaw.study.show.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals

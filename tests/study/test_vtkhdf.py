@@ -10,7 +10,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, StudyError
-from softjaw.study.result.grid_values import fill_grid
+from softjaw.study.result.grid import fill_grid
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create
 from softjaw.study.result.vtkhdf import write_grid

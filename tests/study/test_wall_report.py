@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
 from softjaw.study import pipeline
 from softjaw.study.case import model, wall, window
@@ -16,6 +16,7 @@ from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import dataset
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
@@ -151,8 +152,8 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
 
 def test_show_has_dents_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
-        text = as_text(best(result), 200)
-        strong = best(result, force=3.0)
+        text = as_text(best(dataset(result)), 200)
+        strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
     assert names.split()[-3:] == ["dent", "stress", "window"]
@@ -174,29 +175,26 @@ def test_show_has_dents_stress_and_the_window_of_forces(can):
 @pytest.mark.parametrize(("bit", "word"), [(16384, "slides out"), (32768, "yields"), (8192, "snapped")])
 def test_grasps_that_slide_out_or_yield_come_last_and_are_named(tmp_path, can, bit, word):
     with open_result(can) as result:
-        first = best(result, force=1.0).rows[0][1]
+        first = best(dataset(result), force=1.0).rows[0][1]
         index = (int(np.abs(result.axes[0].values - first).argmin()), 0, 0)
     with open_result(changed(can, tmp_path, "flags/flags", bit, index)) as result:
-        table = best(result, force=1.0)
+        table = best(dataset(result), force=1.0)
     assert (table.rows[0][1] == first) == (word == "snapped")
     assert f"\n{word}: " in as_text(table)
 
 
 def test_cases_outside_their_window_are_judged_by_the_force():
     """A weight held from 2 N on and a wall that bears 3 N leave 2 and 3 N of 1, 2, 3 and 4 N."""
-    layout = SimpleNamespace(derived=[SimpleNamespace(name=n) for n in ("force_low", "force_high")])
-    maps = {"flags": np.zeros((1, 4)), "safety_factor": np.array([[0.5, 1.0, 1.5, 2.0]])}
-    result = SimpleNamespace(
-        layout=layout, axes=[SimpleNamespace(values=np.array([1.0, 2, 3, 4]))],
-        map=lambda name, model=None: maps[name], derived=lambda name: np.array([3.0]),
-    )  # fmt: skip
-    flags = judged(result)
+    over = ("angle", "normal_force")
+    ds = xr.Dataset({"flags": (over, np.zeros((1, 4), np.int64)), "normal_force": [1.0, 2, 3, 4]})
+    assert judged(ds).tolist() == [[0, 0, 0, 0]]
+    ds["safety_factor"] = ((*over, "model"), np.array([[[0.5], [1.0], [1.5], [2.0]]]))
+    ds = ds.assign(force_low=("angle", [2.0]), force_high=("angle", [3.0])).assign_coords(model=["curved"])
+    flags = judged(ds)
     assert flags.tolist() == [[Flag.TOO_WEAK, 0, 0, Flag.TOO_STRONG]]
     assert borne_level(np.full((1, 4), DONE), flags) == 2
     assert borne_level(np.full((1, 4), DONE), flags | Flag.TOO_WEAK) is None
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
-    layout.derived = []
-    assert judged(result).tolist() == [[0, 0, 0, 0]]
 
 
 def test_the_report_answers_at_a_force_that_the_wall_bears(page, can):

@@ -52,25 +52,25 @@ class Sure:
         return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
 
 
-def sure(result: Any, name: str, k: int) -> Sure | None:
+def sure(ds: Any, name: str, k: int) -> Sure | None:
     """``quality`` or ``e_n`` (curved) of all candidates at a force level; None where a file knows no error of it."""
-    values = result.map(name, "curved")[..., k].ravel()
-    shares = {d.name: d.name.removeprefix(f"{name}_") for d in getattr(result.layout, "derived", ())}
+    values = ds[name].sel(model="curved").values[..., k].ravel()
+    shares = {full: full.removeprefix(f"{name}_") for full in ds.attrs["derived"]}
     own, common = np.zeros(values.shape), dict[str, FloatArray]()
     if f"{name}_band" in shares:
         for full, short in shares.items():
             kind, _, of = short.partition("_")
             if full == short or not of:
                 continue
-            change = result.derived(full)[..., k].ravel() * values
+            change = ds[full].values[..., k].ravel() * values
             if kind == "change":
                 common[of] = change
             else:
                 own = own + change**2
         unsigned = tuple(of for of in MOVES if f"{name}_band_{of}" in shares)
         return Sure(values, np.sqrt(own), common, unsigned)
-    if any(q.name == f"{name}_error" for q in result.layout.quantities):
-        return Sure(values, np.abs(result.map(f"{name}_error")[..., k].ravel() * values), common)
+    if f"{name}_error" in ds:
+        return Sure(values, np.abs(ds[f"{name}_error"].values[..., k].ravel() * values), common)
     return None
 
 

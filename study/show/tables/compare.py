@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.scene.text import changes
 from softjaw.study.show.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]
 ALIKE = 1e-9  # relative difference of coordinates that is only rounding
-MAIN = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "dent", "wall_stress")
 
 
 @dataclass(frozen=True)
@@ -81,12 +83,12 @@ class Comparison:
     asked: Difference
 
 
-def compare(one: Any, other: Any, quantity: str = "e_n", model: str = "curved") -> Comparison:
-    """Compare two open result files.
+def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "curved") -> Comparison:
+    """Compare two result files, as `study.result.read.open` gives them.
 
     Parameters
     ----------
-    one, other : Result
+    one, other : xarray.Dataset
     quantity : str
         Map to be listed case by case.
     model : str
@@ -97,39 +99,38 @@ def compare(one: Any, other: Any, quantity: str = "e_n", model: str = "curved") 
     StudyError
         Different kinds of axes, nothing in common, or an unknown quantity.
     """
-    axes = _matched(one, other)
-    done = tuple(result.status[_block(axes, i)] == DONE for i, result in enumerate((one, other)))
-    names = _common_names(one, other)
+    pair = (one, other)
+    axes = _matched(*pair)
+    done = tuple(ds.status.values[_block(axes, i)] == DONE for i, ds in enumerate(pair))
+    names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
     if quantity not in names:
         text = f"--quantity: found '{quantity}', expected one that both files have: {', '.join(names)}"
         raise StudyError(USAGE, text)
-    found = {
-        name: _difference(one, other, axes, done, name, model)
-        for name in dict.fromkeys([*(m for m in MAIN if m in names), quantity])
-    }
-    labels = one.labels[axes[-3].at[0]][:, 0] if not one.axes[-3].units else None
-    paths = one.path, other.path
-    return Comparison(paths, _settings(one, other), axes, done, labels, tuple(found.values()), found[quantity])
+    found = {name: _difference(pair, axes, name, model) for name in names if map_row(name).rank or name == quantity}
+    labels = None if one[axes[-3].name].units else one.label.values[axes[-3].at[0]][:, 0]
+    paths = Path(one.file), Path(other.file)
+    return Comparison(paths, _settings(*pair), axes, done, labels, tuple(found.values()), found[quantity])
 
 
-def _settings(one: Any, other: Any) -> tuple[tuple[str, Any, Any], ...] | None:
+def _settings(one: xr.Dataset, other: xr.Dataset) -> tuple[tuple[str, Any, Any], ...] | None:
     try:
         return tuple(changes(one.scene, other.scene))
     except ValueError:
         return None
 
 
-def _matched(one: Any, other: Any) -> tuple[AxisMatch, ...]:
-    kinds = [[(axis.name, axis.units) for axis in result.axes] for result in (one, other)]
+def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[AxisMatch, ...]:
+    both = axes_of(one), axes_of(other)
+    kinds = [[(axis.name, axis.units) for axis in axes] for axes in both]
     if kinds[0] != kinds[1]:
         words = [", ".join(f"{n} [{u}]" if u else n for n, u in kind) for kind in kinds]
-        text = f"the maps have different axes: {words[0]} in {one.path}, {words[1]} in {other.path}"
+        text = f"the maps have different axes: {words[0]} in {one.file}, {words[1]} in {other.file}"
         raise StudyError(USAGE, f"{text}; compare files with the same kind of candidates and the same swept keys")
-    axes = tuple(_match(*pair) for pair in zip(one.axes, other.axes, strict=True))
+    axes = tuple(_match(*pair) for pair in zip(*both, strict=True))
     for axis in axes:
         if not len(axis.common):
             here, there = (", ".join(f"{v:.6g}" for v in values[:5]) for values in axis.only)
-            text = f"no common {axis.name} [{axis.units or '-'}]: {here} in {one.path}, {there} in {other.path}"
+            text = f"no common {axis.name} [{axis.units or '-'}]: {here} in {one.file}, {there} in {other.file}"
             raise StudyError(USAGE, f"{text}; there is nothing to compare")
     return axes
 
@@ -137,48 +138,33 @@ def _matched(one: Any, other: Any) -> tuple[AxisMatch, ...]:
 def _match(one: Any, other: Any) -> AxisMatch:
     scale = max(np.abs(one.values).max(), np.abs(other.values).max(), 1e-300)
     same = np.abs(one.values[:, None] - other.values) <= ALIKE * scale
-    if not one.units and one.long_name.partition(" (")[2] != other.long_name.partition(" (")[2]:
-        same &= _options(one)[:, None] == _options(other)
+    if one.options and other.options:  # numbers stand for texts
+        same = np.array(one.options)[:, None] == np.array(other.options)
     at = np.nonzero(same)
     only = one.values[~same.any(axis=1)], other.values[~same.any(axis=0)]
     return AxisMatch(one.name, one.units, one.values[at[0]], (at[0], at[1]), only)
-
-
-def _options(axis: Any) -> NDArray[np.str_]:
-    """What the numbers of an axis stand for: texts of a sweep, else the numbers."""
-    words = axis.long_name.partition(" (")[2].rstrip(")").split(", ")
-    return np.array(words if len(words) == len(axis.values) else [f"{v:g}" for v in axis.values])
 
 
 def _block(axes: tuple[AxisMatch, ...], i: int) -> tuple[NDArray[np.int64], ...]:
     return np.ix_(*(axis.at[i] for axis in axes))
 
 
-def _common_names(one: Any, other: Any) -> list[str]:
-    maps = [[q.name for q in r.layout.quantities if q.group == "maps" and q.name != "flags"] for r in (one, other)]
-    return [name for name in maps[0] if name in maps[1]]
+def _difference(pair: tuple[xr.Dataset, xr.Dataset], axes: tuple[AxisMatch, ...], name: str, model: str) -> Difference:
+    values = [values_of(ds, name, model)[_block(axes, i)] for i, ds in enumerate(pair)]
+    errors = [_error(ds, name, model) for ds in pair]
+    known = [np.full(v.shape, np.nan) if e is None else e[_block(axes, i)]
+             for i, (v, e) in enumerate(zip(values, errors, strict=True))]  # fmt: skip
+    stated = (errors[0] is not None, errors[1] is not None)
+    return Difference(name, map_row(name).unit, (values[0], values[1]), known[0] + known[1], stated)
 
 
-def _difference(
-    one: Any, other: Any, axes: tuple[AxisMatch, ...], done: tuple[Any, ...], name: str, model: str
-) -> Difference:
-    q = next(q for q in one.layout.quantities if q.group == "maps" and q.name == name)
-    values, errors, stated = [], [], []
-    for i, result in enumerate((one, other)):
-        solved = np.where(done[i], result.map(name, model if q.by_model else None)[_block(axes, i)], np.nan)
-        values.append(solved)
-        found = _error(result, name, model, solved, _block(axes, i))
-        errors.append(np.full(solved.shape, np.nan) if found is None else found)
-        stated.append(found is not None)
-    return Difference(name, q.unit, (values[0], values[1]), errors[0] + errors[1], (stated[0], stated[1]))
-
-
-def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[Any, ...]) -> FloatArray | None:
-    """Error of a quantity in its unit; None where the file has none, as for models but the curved."""
-    if model == "curved" and f"{name}_band" in {d.name for d in getattr(result.layout, "derived", ())}:
-        return result.derived(f"{name}_band")[block]
-    there = {q.name: q for q in result.layout.quantities if q.group == "maps"}
-    if f"{name}_error" not in there or (there[name].by_model and model != "curved"):
+def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
+    """Error of a map in its unit; None where the file has none, as for models but the curved."""
+    if map_row(name).by_model and model != "curved":
         return None
-    found = result.map(f"{name}_error")[block]
-    return np.abs(found * values) if there[f"{name}_error"].relative_to else np.abs(found)
+    if f"{name}_band" in ds:
+        return values_of(ds, f"{name}_band")
+    if f"{name}_error" not in ds:
+        return None
+    share = values_of(ds, f"{name}_error")
+    return np.abs(share * values_of(ds, name) if map_row(f"{name}_error").relative_to else share)

@@ -6,15 +6,18 @@ import csv
 import io
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.study.flags import flags_in
-from softjaw.study.quantities import MODELS, MONOMIALS
+from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import axes_of, maps_in, values_of
 from softjaw.study.show.tables.columns import cell
 
-STATES = ("missing", "done", "failed")
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
 # Name, unit of every component, names of the components; of each finger, in the object's frame.
@@ -45,86 +48,64 @@ MEANING = {
 }
 
 
-def cases(result: Any, model: str = "curved") -> Iterator[dict[str, Any]]:
+def cases(ds: xr.Dataset, model: str = "curved") -> Iterator[dict[str, Any]]:
     """Every case: place, state, message, flags, maps in one friction model, and both fingers.
 
     Arrays are numpy arrays, NaN where a case has no result.
     """
-    maps = {name: _map(result, name, model) for name in _units(result)}
-    flags = np.nan_to_num(maps.pop("flags")).astype(int)
-    status, messages, labels = result.status, result.messages, result.labels
-    fingers = _fingers(result, model)
-    for index in np.ndindex(result.layout.shape):
-        done = STATES[status[index]] == "done"
+    axes, status, messages = axes_of(ds), ds.status.values, ds.message.values
+    names = [name for name in maps_in(ds) if name != "flags"]
+    maps = {name: np.where(status == DONE, values_of(ds, name, model), np.nan) for name in names}
+    labels, flags, fingers = ds.label.values, ds.flags.values, _fingers(ds, model)
+    for index in np.ndindex(status.shape):
         yield {
-            "place": {axis.name: float(axis.values[i]) for axis, i in zip(result.axes, index, strict=True)},
+            "place": {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)},
             "label": str(labels[index[-3:-1]]),
             "state": STATES[status[index]],
             "message": str(messages[index]),
-            "flags": int(flags[index]) if done else 0,
-            "maps": {name: values[index] if done else np.nan for name, values in maps.items()},
-            "fingers": [
-                {name: values[index][f] if done else np.full_like(values[index][f], np.nan)
-                 for name, values in fingers.items()} for f in range(2)
-            ],
-        }  # fmt: skip
+            "flags": int(flags[index]),
+            "maps": {name: values[index] for name, values in maps.items()},
+            "fingers": [{name: values[index][f] for name, values in fingers.items()} for f in range(FINGERS)],
+        }
 
 
-def _units(result: Any) -> dict[str, str]:
-    """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
-    derived = {d.name: d.units for d in result.layout.derived if len(d.axes) >= len(result.axes) - 1 and not d.shape}
-    return {q.name: q.unit for q in result.layout.quantities if q.group == "maps"} | derived
-
-
-def _map(result: Any, name: str, model: str) -> np.ndarray:
-    q = next((q for q in result.layout.quantities if q.group == "maps" and q.name == name), None)
-    if q is None:
-        found = result.derived(name)
-        return found if found.shape == result.layout.shape else np.broadcast_to(found[..., None], result.layout.shape)
-    return result.map(name, model if q.by_model else None)
-
-
-def _fingers(result: Any, model: str) -> dict[str, np.ndarray]:
+def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
     """What `FINGER` lists, over axes and finger."""
-    m = MODELS.index(model)
-    R, o = result.fingers("pose_rotation"), result.fingers("pose_origin")
-    S, rho = result.fingers("S"), result.read("limit_surface/rho")
-    limits = {name: result.fingers(name) for name in ("f_x_max", "f_y_max", "tau_z_max")}
-    muS = limits["f_x_max"][..., MODELS.index("flat")]  # the planar model's friction is mu S in every direction
+    own = ds.sel(model=model)
+    R, o = ds.finger_pose_rotation.values, ds.finger_pose_origin.values
+    S, rho = ds.finger_S.values, ds.limit_surface_rho.values
+    muS = ds.finger_f_x_max.sel(model="flat").values  # the planar model's friction is mu S in every direction
     found = {
         "pose_origin": o,
         "pose_rotation": R,
-        "frame_origin": np.einsum("...ij,...j->...i", R, result.fingers("frame_origin")) + o,
-        "frame_axes": result.fingers("frame_axes") @ np.swapaxes(R, -1, -2),
-        **{name: values[..., m] for name, values in limits.items()},
+        "frame_origin": np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o,
+        "frame_axes": ds.finger_frame_axes.values @ np.swapaxes(R, -1, -2),
+        **{name: own[f"finger_{name}"].values for name in ("f_x_max", "f_y_max", "tau_z_max")},
         "S": S,
-        "F_N": result.fingers("F_N"),
-        "semi_axes": result.read("limit_surface/semi_axes")[..., m, :] * S[..., None],
+        "F_N": ds.finger_F_N.values,
+        "semi_axes": own.limit_surface_semi_axes.values * S[..., None],
         "unit": muS[..., None] * np.stack([np.ones_like(rho), np.ones_like(rho), rho], axis=-1),
-        **{n: result.read(f"limit_surface/{n}")[..., m, :] for n in ("coefficients",)},
-        "matrix": result.read("limit_surface/matrix")[..., m, :, :],
-        "certificate": result.read("limit_surface/certificate")[..., m],
+        **{name: own[f"limit_surface_{name}"].values for name in ("coefficients", "matrix", "certificate")},
     }
     return {name: found[name] for name, _, _ in FINGER}
 
 
-def as_json(result: Any, model: str = "curved") -> str:
+def as_json(ds: xr.Dataset, model: str = "curved") -> str:
     """One object: file, units, meanings, and a list of cases; SI units, null where there is nothing."""
-    units = {axis.name: axis.units for axis in result.axes}
-    units |= _units(result)
+    units = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
     units |= {name: unit for name, unit, _ in FINGER}
     rows = []
-    for case in cases(result, model):
+    for case in cases(ds, model):
         place, words = case.pop("place"), [flag.word for flag in flags_in(case["flags"])]
         rows.append(place | {k: _plain(v) for k, v in case.items()} | {"flag_words": words})
-    about = {"file": result.path.name, "model": model, "units": units, "meaning": MEANING}
+    about = {"file": Path(ds.file).name, "model": model, "units": units, "meaning": MEANING}
     return json.dumps({**about, "cases": rows}, indent=1)
 
 
-def as_csv(result: Any, model: str = "curved") -> str:
+def as_csv(ds: xr.Dataset, model: str = "curved") -> str:
     """One line for each case, SI units in the header, empty where there is nothing."""
-    maps = {name: unit for name, unit in _units(result).items() if name != "flags"}
-    head = [_head(axis.name, axis.units) for axis in result.axes]
+    maps = {name: unit for name, unit in maps_in(ds).items() if name != "flags"}
+    head = [_head(axis.name, axis.units) for axis in axes_of(ds)]
     head += ["label", "state", "message", "flags", *(_head(*pair) for pair in maps.items())]
     for f in (1, 2):
         for name, unit, parts in FINGER:
@@ -134,7 +115,7 @@ def as_csv(result: Any, model: str = "curved") -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
-    for case in cases(result, model):
+    for case in cases(ds, model):
         flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
         numbers = [*(float(case["maps"][name]) for name in maps), *flat]
         lead = [*case["place"].values(), cell(case["label"]), case["state"], cell(case["message"]), case["flags"]]

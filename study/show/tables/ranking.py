@@ -17,18 +17,17 @@ TIE = 1e-6  # relative difference of values that is none: images of one grasp, o
 NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 
-def judged(result: Any) -> IntArray:
+def judged(ds: Any) -> IntArray:
     """Flags of all cases, with `Flag.TOO_WEAK` and `Flag.TOO_STRONG` where a case lies outside its window of forces.
 
     A force is too weak where the grasp does not hold the object's weight, and too strong above ``force_high``. Files
     that derive no window have their own flags only.
     """
-    flags = np.nan_to_num(result.map("flags")).astype(np.int64)
-    bounds = {d.name for d in getattr(result.layout, "derived", ())}
-    if "force_low" in bounds:
-        flags |= Flag.TOO_WEAK * (result.map("safety_factor", "curved") < 1 - TIE)
-    if "force_high" in bounds:
-        flags |= Flag.TOO_STRONG * (result.axes[-1].values > result.derived("force_high")[..., None] * (1 + 1e-9))
+    flags = ds["flags"].values.copy()
+    if "force_low" in ds:
+        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="curved").values < 1 - TIE)
+    if "force_high" in ds:
+        flags |= Flag.TOO_STRONG * (ds["normal_force"].values > ds["force_high"].values[..., None] * (1 + 1e-9))
     return flags
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softjaw.study.flags import flag_words, flags_in
+from softjaw.study.quantities import BY_KEY, MAIN, MODELS, WINDOW
 from softjaw.study.show.tables.columns import PAPER, aligned, digits, fitting, two_lines, wrapped
 from softjaw.study.units import shown, shown_unit
 
@@ -16,13 +18,7 @@ if TYPE_CHECKING:
     from softjaw.study.show.tables.show import Table
 
 Columns = tuple[tuple[str, str], ...]  # names and units
-WINDOW = ("force_low", "force_high")  # derived bounds; people see them in one column
 WINDOW_MEANS = "normal forces that hold the object, if its mass is given, and that its wall bears, as far as was solved"
-# names that are too long for a line of text
-HEADS = {"quality_fitted": "fitted", "safety_factor": "safety", "wall_stress": "stress"}
-# left out of a narrow terminal, the first ones first
-LEAST = ("misfit", "f_x_max_error", "f_y_max_error", "tau_z_max_error", "quality_fitted", "e_n_flat", "e_n_projected",
-         "f_y_max", "f_x_max", "wall_stress", "tau_z_max", "quality_error", "safety_factor", "dent")  # fmt: skip
 ERROR, ERROR_MEANS = "+-", "error of the column before it, from the coarser of two meshes"
 BAND_MEANS = "half-width of the band of the column before it; about 95 of 100 lie within. [uncertainty] says of what"
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
@@ -41,13 +37,31 @@ def as_text(table: Table, width: int = PAPER) -> str:
     heads = [_head(name, units) for name, units in told.columns]
     rows = [*(list(line) for line in zip(*heads, strict=True)), *body]
     names = [name for name, _ in told.columns]
-    drop = [names.index(name) for name in LEAST if name in names]
+    drop = [names.index(name) for name in least(names)]
     kept = fitting([[*row[:-1], row[-1][:FLAGS_WIDTH]] for row in rows], drop, width)
     left = [kept.index(len(names) - 1)] + [k for k, i in enumerate(kept) if names[i] == "label"]
     lines = aligned([[row[i] for i in kept] for row in rows], left)
     absent = ", ".join(names[i] for i in sorted(set(drop) - set(kept)))
     verdict = [wrapped(table.verdict, width, more="  ")] * bool(table.verdict)
     return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(told, flags, absent, width)])
+
+
+def symbol(name: str) -> str:
+    """Head of a column."""
+    q = BY_KEY.get(f"maps/{name}")
+    return q.symbol if q and q.symbol else name
+
+
+def least(names: Sequence[str]) -> list[str]:
+    """Columns that a narrow terminal does without, the first ones first; those of the two first maps stay.
+
+    >>> least(["quality", "quality_error", "misfit", "e_n", "e_n_error", "e_n_flat", "f_x_max", "f_x_max_error"])
+    ['misfit', 'f_x_max_error', 'e_n_flat', 'f_x_max', 'quality_error']
+    """
+    main = [name for name in reversed(MAIN[2:]) if name in names]
+    errors = [f"{name}_error" for name in main if f"{name}_error" in names]
+    planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
+    return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *(n for n in ("quality_error",) if n in names)]
 
 
 def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
@@ -65,7 +79,7 @@ def _head(name: str, units: str) -> tuple[str, str]:
     """Both lines above a column."""
     if name.endswith(("_error", "_band")):
         return two_lines(ERROR, shown_unit(units) or "%" * name.endswith("_error"))
-    return two_lines(HEADS.get(name, name), shown_unit(units))
+    return two_lines(symbol(name), shown_unit(units))
 
 
 def _lines(table: Table) -> tuple[list[list[str]], int]:

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.quantities import PARTS, STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.run.lock import holder
 from softjaw.study.run.progress import duration
-from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
-from softjaw.study.show.tables.show import as_text, best, has_poses, place
+from softjaw.study.show.tables.columns import PAPER, csv_text, place_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
-PARTS = ("assembly", "factorisation", "friction", "rest")
-STATES = {MISSING: "missing", DONE: "done", FAILED: "failed"}
 
 
 def status_text(result: Any, width: int = PAPER) -> str:
@@ -32,7 +30,7 @@ def status_text(result: Any, width: int = PAPER) -> str:
 def status_json(result: Any) -> str:
     """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
     status = result.status
-    total = {name: int(np.sum(status == code)) for code, name in STATES.items()}
+    total = {name: int(np.sum(status == code)) for code, name in enumerate(STATES)}
     told = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     told |= {"cases": int(status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
     told |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
@@ -53,10 +51,15 @@ def _cases(result: Any, state: int) -> list[dict[str, Any]]:
     names = [axis.name for axis in result.axes]
     found = []
     for row in map(int, np.flatnonzero((result.status.ravel() == state) & (messages != ""))):
-        label = str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]]) if has_poses(result) else None
+        label = "" if result.axes[-3].units else str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]])
         where = dict(zip(names, _place(result, row), strict=True)) | ({"label": label} if label else {})
         found.append({"row": row, **where, "message": str(messages[row])})
     return found
+
+
+def place(result: Any, row: int) -> str:
+    """A case in words."""
+    return place_text(result.axes, result.labels, np.unravel_index(row, result.layout.shape))
 
 
 def _place(result: Any, row: int) -> list[float]:
@@ -66,8 +69,12 @@ def _place(result: Any, row: int) -> list[float]:
 
 def summary(result: Any) -> str:
     """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
+    # here and not above: 'status' must not wait for xarray
+    from softjaw.study.result.read import dataset
+    from softjaw.study.show.tables.show import as_text, best
+
     width = terminal_width()
-    table = [as_text(best(result, whole_lines=True), width)] if np.any(result.status == DONE) else []
+    table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
     missing = int(np.sum(result.status == MISSING))
     more = f"; {missing} cases are missing, the same command goes on" if missing else ""
     return "\n".join(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.result.grid import corners_of
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.data import Data
 
@@ -151,16 +152,3 @@ def _pad(gripper: Any, patch: dict[str, np.ndarray], R: Any, o: Any, travel: Any
         pressure=patch["pressure"].reshape(grid),
         area=patch["area"].reshape(grid),
     )
-
-
-def corners_of(centres: np.ndarray) -> np.ndarray:
-    """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``, continued beyond the rim."""
-    for axis in (0, 1):
-        c = np.moveaxis(centres, axis, 0)
-        if len(c) > 1:
-            c = np.concatenate([2 * c[:1] - c[1:2], c, 2 * c[-1:] - c[-2:-1]])
-            c = 0.5 * (c[1:] + c[:-1])
-        else:
-            c = np.concatenate([c, c])
-        centres = np.moveaxis(c, 0, axis)
-    return centres
