@@ -14,19 +14,18 @@ import pytest
 ROOT = Path(__file__).parent.parent
 OWN = ("study", "fem", "friction", "lsfit", "scoring")  # folders at the top, each linked into softjaw/
 NUMERICS = {"numpy", "scipy", "numba"}
+PAGES = {"plotly", "jinja2"}
 ALLOWED = {
     "friction": {"softjaw.friction"} | NUMERICS,
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
-    "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
+    "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS | PAGES,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
     "fem/objects/mesh_object.py",
-    "study/show/figures/rendering.py",
-    "study/show/view/drawing.py",
-    "study/show/view/sides.py",
+    "study/show/view/solids.py",
     "study/show/view/window.py",
 }
 DOORS = {
@@ -41,6 +40,8 @@ DOORS = {
         "study/accuracy/cost/file.py",
     },
     "pyvista": PICTURES,
+    "plotly": {"study/show/plots.py", "study/show/page.py", "study/show/view/object3d.py"},
+    "jinja2": {"study/show/page.py"},
     "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
 }
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))

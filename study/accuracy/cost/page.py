@@ -14,7 +14,7 @@ from softjaw.study.accuracy.cost.picture import work_precision
 from softjaw.study.accuracy.cost.words import BELOW, percent, seconds_text, sentences, settings_text
 from softjaw.study.run.progress import duration
 from softjaw.study.show import pictures
-from softjaw.study.show.report.page import box, bullets, heading, page, paragraph, picture, table, text_block
+from softjaw.study.show.page import Block, box, bullets, heading, page, table, text, verbatim
 
 MOST_SHOWN = 12
 NAMES = ("e_n", "max force", "max torque", "quality")
@@ -44,10 +44,10 @@ def cost_page(study: CostStudy, tables: Sequence[KnobErrors]) -> tuple[str, byte
     with pictures.style():
         shown, png = work_precision(tables, best)
     sections = [
-        ("answer", "", box(sentences(study, tables), "verdict")),
-        ("diagram", "Error against time", picture(shown)),
+        ("answer", "", [box(sentences(study, tables), "verdict")]),
+        ("diagram", "Error against time", [shown]),
         ("front", "Settings that nothing beats", _front(best, base)),
-        ("knobs", "Knob by knob", _legend() + "".join(_knob(t) for t in tables)),
+        ("knobs", "Knob by knob", [_legend(), *(part for t in tables for part in _knob(t))]),
         ("left-out", "Not measured", _left_out(study)),
         ("how", "How it was measured", _how(study, base)),
     ]
@@ -55,7 +55,7 @@ def cost_page(study: CostStudy, tables: Sequence[KnobErrors]) -> tuple[str, byte
     return page(title, f"{study.scene_file}, scene {study.digest[:8]}, {study.machine}", sections), png
 
 
-def _front(best: Sequence[Combination], base: float) -> str:
+def _front(best: Sequence[Combination], base: float) -> list[Block]:
     rows = [
         [seconds_text(c.seconds), f"{c.seconds / base:.2g}", percent(c.error), settings_text(c)]
         for c in best[:MOST_SHOWN]
@@ -67,25 +67,25 @@ def _front(best: Sequence[Combination], base: float) -> str:
         " and tries them on the probes and on cases held out."
     )
     more = f" The first {MOST_SHOWN} of {len(best)}." if len(best) > MOST_SHOWN else ""
-    return table("Pareto front, the cheapest first", head, rows, texts=(0,), wide=(3,)) + paragraph(told + more, "note")
+    return [table("Pareto front, the cheapest first", head, rows, texts=(0,), wide=(3,)), text(told + more, "note")]
 
 
-def _legend() -> str:
-    return paragraph(
+def _legend() -> Block:
+    return text(
         "Errors are relative to the limit of the knob's ladder, by Richardson extrapolation where the observed order"
         " allows it: the largest over all probe cases, in brackets the median. The first row is the cheapest setting;"
         " the scene's own is marked with an arrow."
     )
 
 
-def _knob(knob: KnobErrors) -> str:
+def _knob(knob: KnobErrors) -> list[Block]:
     own = any(np.isfinite(level.own) for level in knob.levels)
     head = ["level", "CPU per case", *(["of it this step"] if own else []), *NAMES]
     rows = [_row(level, i == knob.own, own) for i, level in enumerate(knob.levels)]
-    text = WHAT.get(knob.name, f"{knob.long_name.capitalize()}, forced for all candidates.")
-    html = heading(knob.name) + table(text, head, rows, texts=(0,))
+    caption = WHAT.get(knob.name, f"{knob.long_name.capitalize()}, forced for all candidates.")
+    found = [heading(knob.name), table(caption, head, rows, texts=(0,)), text(_orders(knob), "note")]
     failed = [f"{level.name}: {level.message}" for level in knob.levels if level.message]
-    return html + paragraph(_orders(knob), "note") + (bullets(failed) if failed else "")
+    return [*found, bullets(failed)] if failed else found
 
 
 def _row(level: LevelErrors, own: bool, with_own: bool) -> list[str]:
@@ -111,13 +111,13 @@ def _orders(knob: KnobErrors) -> str:
     return f"Observed on the three finest levels: {'; '.join(told)}.{end}"
 
 
-def _left_out(study: CostStudy) -> str:
+def _left_out(study: CostStudy) -> list[Block]:
     if not study.skipped:
-        return paragraph("Nothing was left out.")
-    return bullets(f"{s.knob}: {s.level}: {s.reason}" for s in study.skipped)
+        return [text("Nothing was left out.")]
+    return [bullets(f"{s.knob}: {s.level}: {s.reason}" for s in study.skipped)]
 
 
-def _how(study: CostStudy, base: float) -> str:
+def _how(study: CostStudy, base: float) -> list[Block]:
     forces = ", ".join(f"{f:g}" for f in study.of(study.base)[0].forces)
     items = [
         f"Probes: {'; '.join(study.candidates)}, each at {forces} N.",
@@ -130,4 +130,4 @@ def _how(study: CostStudy, base: float) -> str:
         f"The whole study took {duration(study.spent)} of CPU time.",
         f"Quantities: {', '.join(QUANTITIES)} of the weaker finger, curved model; definitions in the file.",
     ]
-    return bullets(items) + heading("Scene") + text_block(study.scene)
+    return [bullets(items), heading("Scene"), verbatim(study.scene)]

@@ -11,7 +11,7 @@ from softjaw.study.accuracy.cost.choose import NO_LOSS, Combination
 from softjaw.study.accuracy.cost.errors import KnobErrors
 from softjaw.study.accuracy.cost.levels import WINKLER
 from softjaw.study.show import pictures
-from softjaw.study.show.report.page import Picture
+from softjaw.study.show.page import Block, image
 
 TITLES = ("eccentricity parameter e_n", "largest friction force", "largest torque", "grasp quality")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"), ("#6b747b", "v"), ("#3d7a1f", "P"))
@@ -19,7 +19,7 @@ LEAST = 1e-6  # errors below are not drawn
 QUALITY = 3
 
 
-def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) -> tuple[Picture, bytes]:
+def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) -> tuple[Block, bytes]:
     """The diagram as SVG for a page and as PNG."""
     drawn, axes = pictures.figure(10, 7.2, 2, 2, gap=0.12, sharex=True)
     lines = [t for t in tables if not t.judging and t.name not in NO_LOSS]
@@ -48,7 +48,7 @@ def work_precision(tables: Sequence[KnobErrors], best: Sequence[Combination]) ->
         "The dotted line joins the combinations of all knobs that nothing beats, with predicted errors."
     )
     alt = "Four panels of relative error against CPU seconds per case, logarithmic, one line for each knob."
-    return Picture(pictures.as_svg(drawn), alt, caption), pictures.as_png(drawn)
+    return image(pictures.as_svg(drawn), caption, alt), pictures.as_png(drawn)
 
 
 def _ladder(panel: Any, table: KnobErrors, q: int, colour: str, marker: str) -> None:
