@@ -16,7 +16,7 @@ from softjaw.study.accuracy.cost.command import add_options as add_cost_options
 from softjaw.study.completion import add_options as add_completion_options
 from softjaw.study.environment import keep_compiled_loops, pin_threads
 from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
-from softjaw.study.file_options import add_repair_options, add_scale_options
+from softjaw.study.file_options import add_scale_options
 from softjaw.study.help import Formatter, Parser, Program
 from softjaw.study.patch.command import add_options as add_patch_options
 from softjaw.study.run.memory import is_out_of_memory, no_room
@@ -112,8 +112,6 @@ def program() -> Program:
                  "softjaw status results/bottle-rigid.hdf")  # fmt: skip
     add_watch_options(add("watch", commands.watch, "live view of a run, in another terminal",
                           "softjaw watch results/bottle-rigid.hdf --every 5"))  # fmt: skip
-    add_repair_options(add("repair", commands.repair, "what of a damaged file is good; make it usable again",
-                           "softjaw repair results/bottle-rigid.hdf --write"))  # fmt: skip
     add_scale_options(add("scale", commands.scale, "replay the times of a finished file on many ranks",
                           "softjaw scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"))  # fmt: skip
     show = add("show", commands.show, "the best grasps as a table",

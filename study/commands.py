@@ -32,7 +32,7 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
             return found
         if torn:
             text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
-            return StudyError(OTHER_FILE, f"{text}; 'softjaw repair {file}' says what is good")
+            return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
         if isinstance(error, SceneError):
             text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
             return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")
@@ -106,14 +106,6 @@ def watch(options: Namespace) -> int:
     from softjaw.study.show.tables.watch import watch
 
     return watch(Path(options.file), options.every)
-
-
-def repair(options: Namespace) -> int:
-    """Say what of a damaged file is good, and make it usable."""
-    from softjaw.study.result.repair import repair
-
-    say(repair(Path(options.file), options.write, options.in_place))
-    return DONE
 
 
 def scale(options: Namespace) -> int:

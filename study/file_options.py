@@ -1,16 +1,8 @@
-"""Options of the commands that look after a result file: ``softjaw repair`` and ``softjaw scale``."""
+"""Options of ``softjaw scale``."""
 
 from __future__ import annotations
 
 import argparse
-
-
-def add_repair_options(parser: argparse.ArgumentParser) -> None:
-    """Describe the words after ``softjaw repair``."""
-    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("--write", action="store_true", help="write what is good to a copy, NAME.repaired.hdf")
-    how.add_argument("--in-place", action="store_true", help="the same under the file's name; keeps NAME.hdf.backup")
 
 
 def add_scale_options(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from softjaw.study.speaking import first_rank
 
 GROUPS = (  # in the order of use; a command that stands nowhere is listed under the last title
     ("prepare", ("init", "check", "plan", "cost")),
-    ("solve", ("run", "watch", "status", "repair", "scale")),
+    ("solve", ("run", "watch", "status", "scale")),
     ("look at results", ("show", "report", "view", "figure", "compare")),
     ("use the numbers", ("export", "patch")),
     ("this program", ("schema", "doctor", "completion")),

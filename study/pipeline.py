@@ -27,7 +27,7 @@ from softjaw.study.case.solving import Solved, Solver, solver
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.case.weight import safety_factors
 from softjaw.study.flags import flag_sentences
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.result import CaseFailure, CaseResult
 from softjaw.study.scene import Scene
 
@@ -111,7 +111,7 @@ def _bounds(scene: Scene, contact: Contact) -> dict[str, Bound]:
 
 
 def _values(scene: Scene, obj, contacts: list[Contact], bounds: list[dict[str, Bound]]) -> dict[str, Any]:
-    """Maps and per-finger values of one case, keyed as in ``study.result.quantities``."""
+    """Maps and per-finger values of one case, keyed as in ``study.quantities``."""
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")

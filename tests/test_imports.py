@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parent.parent
 OWN = ("study", "fem", "friction", "lsfit", "scoring")  # folders at the top, each linked into softjaw/
 NUMERICS = {"numpy", "scipy", "numba"}
-PAGES = {"plotly", "jinja2"}
+SHOWN = {"matplotlib", "pyvista", "vtkmodules", "plotly", "jinja2"}
 ALLOWED = {
     "friction": {"softjaw.friction"} | NUMERICS,
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
-    "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS | PAGES,
+    "study": {"pydantic", "shtab", "mpi4py", "h5py", "xarray"} | SHOWN | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {

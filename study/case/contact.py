@@ -19,7 +19,7 @@ from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.score import ScoreFlag
 from softjaw.study.case.model import Finger
 from softjaw.study.flags import Flag, raised
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 
 from softjaw.fem.contact.press import Pressed
 from softjaw.study.case.margin import surely_below
-from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a

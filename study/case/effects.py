@@ -11,7 +11,7 @@ import numpy as np
 from softjaw.study.case.coupling_level import coupling_level
 from softjaw.study.case.limit_surface import dropped_share
 from softjaw.study.case.sheet_level import sheet_level
-from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 
 ONLY, FORCED, BELOW, ABOVE, SYMMETRY = range(5)  # of REASONS

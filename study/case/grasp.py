@@ -19,7 +19,7 @@ from softjaw.scoring.score import ScoreFlag, score
 from softjaw.scoring.volume import volume_linf
 from softjaw.study.case.contact import Contact, angles
 from softjaw.study.case.limit_surface import Bound
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4

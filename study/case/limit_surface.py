@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
-STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.result.finger_quantities says
+STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.quantities says
 
 
 class Bound(NamedTuple):
@@ -146,7 +146,7 @@ def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
 
 
 def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[str, Bound]]) -> dict[str, Any]:
-    """What is stored of both fingers' surfaces, keyed as in ``study.result.quantities``."""
+    """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
     every = [[b for b in own.values()] for own in bounds]
     per_model = {
         "matrix": lambda b: matrix(b.surface),
@@ -171,7 +171,7 @@ def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[
 
 
 def six_values(contacts: Sequence[Any]) -> dict[str, Any]:
-    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.result.quantities``."""
+    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
     found = [six_ellipsoid(c.local, c.rho, c.unit_limits["curved"].S) for c in contacts]
     names = ("matrix_6d", "rank_6d", "misfit_6d")
     return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*found, strict=True), strict=True)}

@@ -18,7 +18,7 @@ STIFF = 0.005
 
 @dataclass(frozen=True)
 class SheetLevel:
-    """Level of the sheets of a scene; ``reason`` is one of `study.result.quantities.REASONS`.
+    """Level of the sheets of a scene; ``reason`` is one of `study.quantities.REASONS`.
 
     ``compliance`` is the mean deflection of the sheet under an even pressure over that of the pad.
     """

@@ -134,7 +134,7 @@ class OnWall:
             yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
 
     def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.result.quantities``."""
+        """What the wall bears at one force, keyed as in ``study.quantities``."""
         shell = self.grips[0].problem.model.shell
         return wall_values(self.scene, self.held[0], solved.grips[0], shell)
 

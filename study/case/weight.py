@@ -11,7 +11,7 @@ from softjaw.scoring.contact import PolytopeBody, SoftContact
 from softjaw.scoring.task import hold_task, weight_wrench
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import Bound
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 

@@ -10,8 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from softjaw.study.exits import USAGE, StudyError
-from softjaw.study.result.quantities import quantities
-from softjaw.study.result.quantity import NEEDS
+from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene.errors import SceneError, first_of
 from softjaw.study.scene.loading import NAMES
 from softjaw.study.scene.shape import Section

@@ -13,7 +13,7 @@ from softjaw.friction.frame import FrameFlag
 from softjaw.friction.orientation import wound
 from softjaw.study.patch.evaluate import SPACE, Judged, minority, told_of
 from softjaw.study.patch.grasp import ANTIPODAL, Grasp
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",

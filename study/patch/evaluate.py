@@ -22,7 +22,7 @@ from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.study.case.limit_surface import STANDS_IN, fitted, judging_twists
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene.errors import Problem
 
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")  # as a scene names them

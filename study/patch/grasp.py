@@ -14,7 +14,7 @@ from softjaw.scoring.epsilon_search import EpsilonBound, epsilon
 from softjaw.scoring.grasp import grasp_score
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.patch.evaluate import Judged
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 
 ANTIPODAL = np.radians(5.0) + 1e-6  # beyond this the study flags a grasp; at 5 degrees rounding decides nothing
 ACROSS = 1e-6  # cosine between a normal and the line of the contacts: one across the line points neither way

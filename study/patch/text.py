@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.patch.answer import DEFINITIONS, UNITS, Answer, as_record
-from softjaw.study.result.quantity import MODELS
-from softjaw.study.show.tables.columns import DISPLAY
+from softjaw.study.quantities import MODELS
+from softjaw.study.units import shown, shown_unit
 
 FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
 SCORES = ("quality", "epsilon")
@@ -58,8 +58,8 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
 def _friction_table(patch: dict[str, Any]) -> list[str]:
     rows = [["friction", *MODELS]]
     for name in FRICTION:
-        unit, factor = DISPLAY.get(UNITS[name], (UNITS[name], 1.0))
-        rows.append([f"{name} [{unit}]", *(_number(factor * patch["friction"][model][name]) for model in MODELS)])
+        values = [shown(patch["friction"][model][name], UNITS[name]) for model in MODELS]
+        rows.append([f"{name} [{shown_unit(UNITS[name])}]", *map(_number, values)])
     return _aligned(rows)
 
 

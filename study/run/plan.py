@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.case.build import has_wall
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.run.progress import duration
 from softjaw.study.run.wall_cost import wall_size
 from softjaw.study.show.tables.overview import aligned
@@ -86,7 +86,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 
 
 def has(scene: Any) -> tuple[str, ...]:
-    """Which of `study.result.quantity.NEEDS` besides two meshes a scene asks for."""
+    """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)

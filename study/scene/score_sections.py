@@ -8,7 +8,7 @@ from pydantic import Field
 
 from softjaw.study.scene.sections import Vector
 from softjaw.study.scene.shapes import Section
-from softjaw.study.scene.units import si
+from softjaw.study.units import si
 
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 

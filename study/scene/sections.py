@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from softjaw.study.scene.shapes import Section
-from softjaw.study.scene.units import si
+from softjaw.study.units import si
 
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Count = Annotated[int, Field(ge=2, le=400)]

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from softjaw.study.scene.errors import Finding, KeyPath, closest, key_text, shown
-from softjaw.study.scene.units import UNITS, split_unit
+from softjaw.study.units import UNITS, split_unit
 
 EXAMPLES = {
     "stations_mm": "[25, 50, 75]", "station_range_mm": "[25, 175]", "angles_deg": "[0, 90]", "size_mm": "[60, 40, 120]",
@@ -44,7 +44,7 @@ def _converted(value: Any, unit: str, target: str) -> str:
     if not _is_number(value) or not unit or not target:
         return ""
     given, wanted = UNITS[unit], UNITS[target]
-    return f" = {value * given.size / wanted.size:.10g}" if given.kind == wanted.kind else ""
+    return f" = {value * given.size / wanted.size:.10g}" if given.si == wanted.si else ""
 
 
 def expectation(schema: Mapping[str, Any], key: str = "") -> str:
@@ -182,7 +182,7 @@ def _other_unit(value: float, unit: str, schema: Mapping[str, Any]) -> str:
     ours = UNITS[unit]
     for other in UNITS.values():
         meant = value * other.size / ours.size
-        if other.kind == ours.kind in ("length", "pressure") and other != ours and low < meant <= high:
+        if other.si == ours.si in ("m", "Pa") and other != ours and low < meant <= high:
             return f"the unit is {ours.text}: if {other.text} was meant, write {meant:.10g}"
     default = schema.get("default")
     return f"the default is {shown(default)}" if default is not None else f"write {_kind(schema)} in {ours.text}"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from softjaw.study.scene.units import in_si, si
+from softjaw.study.units import in_si, si
 
 Span = tuple[float, float]
 Length = Annotated[float, Field(gt=0)]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from softjaw.study.scene.shape import Length, Point, Section, Shape, Span, Walled
-from softjaw.study.scene.units import UNITS, si
+from softjaw.study.units import UNITS, si
 
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 

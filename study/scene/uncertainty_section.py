@@ -11,7 +11,7 @@ from softjaw.study.scene.errors import Finding, closest, shown
 from softjaw.study.scene.score_sections import Names
 from softjaw.study.scene.sections import Candidates, Friction
 from softjaw.study.scene.shapes import Section
-from softjaw.study.scene.units import si
+from softjaw.study.units import si
 
 Share = Annotated[float, Field(ge=0, le=50)]
 

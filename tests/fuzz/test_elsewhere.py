@@ -208,9 +208,7 @@ def test_a_trial_survives_what_it_tries():
 
 
 def commands(path, other, page):
-    yield from (
-        (*words, path) for words in (("status",), ("show", "--csv"), ("export", "--csv"), ("repair",), ("scale",))
-    )
+    yield from ((*words, path) for words in (("status",), ("show", "--csv"), ("export", "--csv"), ("scale",)))
     yield ("compare", path, other)
     yield ("view", path, "--html", page)
 

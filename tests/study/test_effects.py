@@ -15,7 +15,7 @@ from softjaw.study.case import coupling_level, model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.coupling_level import neglected_traction
 from softjaw.study.case.sweep import units
-from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.result.result import CaseFailure
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved

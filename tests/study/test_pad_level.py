@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.case import pad_level
-from softjaw.study.result.quantities import REASONS
+from softjaw.study.quantities import REASONS
 from tests.study.test_pipeline import BALL, BOX, OVAL, cases, solved
 from tests.study.test_walls import CUP, scene_of
 from tests.study.test_walls import solved as on_wall

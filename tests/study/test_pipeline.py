@@ -17,7 +17,7 @@ from softjaw.study.case.build import build_object
 from softjaw.study.case.sweep import units
 from softjaw.study.environment import launch_environment
 from softjaw.study.flags import Flag
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.result import CaseFailure
 from softjaw.study.scene import parse_scene
 

@@ -14,7 +14,7 @@ from softjaw.fem.objects.length_units import LENGTHS
 from softjaw.study.catalogue.model import is_catalogue
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
 from softjaw.study.scene.shapes import SHAPES, Mesh
-from softjaw.study.scene.units import in_si
+from softjaw.study.units import in_si
 
 ROOT = Path(__file__).parents[2]
 JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]
@@ -172,7 +172,7 @@ WRONG_VALUES = [
     ("stations_mm = [0]", "stations = 3\nstation_range_mm = [9, 0]", 7, "candidates.station_range_mm", "[9, 0]",
      "lower first",
      "[0, 9]"),
-    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [degrees]", "degrees"),
+    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [deg]", "deg"),
     ("[0]", "[0]\nangles_deg = [0, inf]", 7, "candidates.angles_deg[1]", "inf", "<= 360", "360"),
     ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2", "> 0 and <= 1000 [N]", "N"),
     ("[1]", "[0]", 9, "load.normal_force_n[0]", "0", "> 0", "N"),

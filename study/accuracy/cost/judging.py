@@ -29,7 +29,7 @@ from softjaw.study.case.contact import X_OF_PAD, Contact
 from softjaw.study.case.grasp import grasp_values, lengths
 from softjaw.study.case.limit_surface import bound
 from softjaw.study.case.solving import solver
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]

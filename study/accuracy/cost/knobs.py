@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from softjaw.study.case.build import has_wall
-from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.quantities import EFFECTS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.errors import SceneError
 from softjaw.study.scene.sections import Effects, WallSize

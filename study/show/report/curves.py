@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantity import MODELS
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.outline import swept_object

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.quantities import EFFECTS, PARTS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.quantities import EFFECTS
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.page import Block, label, plot
 from softjaw.study.show.report.tables import remark
 from softjaw.study.show.tables.ranking import largest
-from softjaw.study.show.tables.status import PARTS
 
 MOST_PANELS, MOST_LABELS, MOST_REMARKS = 6, 16, 8000
 FIRST = ("quality", "e_n")

@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.flags import flags_in
+from softjaw.study.quantities import EFFECTS, PARTS, REASONS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.quantities import EFFECTS, REASONS
 from softjaw.study.run.progress import duration
 from softjaw.study.show.data import ABOVE, LIMITS, Data, number, passes
 from softjaw.study.show.page import Block, bullets, details, table, text, verbatim
-from softjaw.study.show.report import verdict
 from softjaw.study.show.report.verdict import VALUES, flags_of, listed, safe_range, value
 from softjaw.study.show.tables.overview import RULE, wall_text
 from softjaw.study.show.tables.ranking import largest
-from softjaw.study.show.tables.status import PARTS
 
 HEADS = dict(zip(VALUES, ("quality", "quality, fitted", "e_n [mm]", "max f_x [N]", "max f_y [N]", "max tau_z [N mm]"),
                  strict=True))  # fmt: skip
@@ -167,13 +165,11 @@ def wall(data: Data, shape: Any) -> list[Block]:
     there = [name for name in WALL if data.map(name) is not None]
     level, rows = data.values("effects/object_level"), []
     for index in data.order(data.k)[:BEST]:
-        factors = (verdict.WALL_FACTORS.get(name, 1.0) for name in there)
-        values = [number(data.at(name, index) * factor) for name, factor in zip(there, factors, strict=True)]
+        values = [value(data, name, index, 3) for name in there]
         known = level is not None and np.isfinite(level[index])
         simulated = EFFECTS["object"][int(level[index])] if known else "–"
         rows.append([data.place(index), *values, safe_range(data, index), simulated])
-    units = {"dent": "mm", "wall_stress": "MPa", "wall_strain": "%", "support_force": "N"}
-    names = [f"{name.replace('_', ' ')}{f' [{units[name]}]' if name in units else ''}" for name in there]
+    names = [data.label(name) for name in there]
     head = ["grasp", *names, "safe forces [N]", "wall simulated as"]
     caption = f"The wall in the best grasps at {number(data.forces[data.k])} N per finger"
     return [text(" ".join([*limits, STRESS])), table(caption, head, rows, texts=(0, len(head) - 1), first=True)]
@@ -238,7 +234,7 @@ def time_split(data: Data) -> list[Block]:
 def definitions(data: Data) -> list[Block]:
     """The file's own definitions: its introduction, and one row for each quantity."""
     intro = data.result.definitions.partition("\n\n")[0]
-    rows = [[f"{q.group}/{q.name}", q.units, f"{q.long_name}. {q.definition}"] for q in data.result.layout.quantities]
+    rows = [[q.key, q.unit, f"{q.label}. {q.definition}"] for q in data.result.layout.quantities]
     rows += [[f"derived/{d.name}", d.units, f"{d.long_name}. {d.definition}"] for d in data.result.layout.derived]
     head = ["dataset", "unit (SI)", "meaning"]
     listed_rows = details("All datasets", [table("What the numbers mean", head, rows, (0, 1), (2,))])

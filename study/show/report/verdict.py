@@ -24,7 +24,6 @@ BANDED = (
     " parts that [uncertainty] in the scene asks for."
 )
 VALUES = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
-WALL_FACTORS = {"dent": 1e3, "wall_stress": 1e-6, "wall_strain": 1e2}
 
 
 def subtitle(data: Data) -> str:
@@ -119,10 +118,10 @@ def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
 
 def wall_sentence(data: Data, index: tuple[int, ...]) -> str:
     """How a thin wall takes one case, and between which forces it would be safe; empty without a wall."""
-    dent, stress = data.at("dent", index), data.at("wall_stress", index)
-    if not np.isfinite(dent):
+    if not np.isfinite(data.at("dent", index)):
         return ""
-    said = f"The wall is dented by {number(1e3 * dent)} mm and its stress reaches {number(1e-6 * stress)} MPa."
+    dent, stress = (f"{value(data, name, index, 3)} {data.units(name)[1]}" for name in ("dent", "wall_stress"))
+    said = f"The wall is dented by {dent} and its stress reaches {stress}."
     low, high = (data.bound(name) for name in ("force_low", "force_high"))
     if high is None or not np.isfinite(high[index[:-1]]):
         return said

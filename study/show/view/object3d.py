@@ -15,8 +15,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from softjaw.study.case.stored_surface import stored_surface
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.show import plots
 from softjaw.study.show.page import Block, Section, label, page, plot, text
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
