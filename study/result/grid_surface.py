@@ -1,25 +1,243 @@
-"""The object's surface of the grid in a result file, before anything is solved."""
+"""The surfaces of a result's object: cut along the cells of its candidates, and where its wall's stored places lie.
+
+Positions are in the object's frame [m]. The grid in the file and every display draw from here.
+"""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any, cast
+import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.build import has_wall
-from softjaw.study.result.grid import Surface
-from softjaw.study.show.data import Data
-from softjaw.study.show.view.model import View
+from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.grid import NOBODY, Surface
+
+ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
+NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]
+FINER = 6  # places between those of the file among which the nearest is searched
 
 
-def surface_of(scene: Any, axes: Any) -> Surface:
-    """The object of a scene, at the first point of its sweep, cut along the cells of its candidates."""
-    asked = SimpleNamespace(
-        result=SimpleNamespace(scene=scene.effective_toml()), axes=axes, shape=tuple(len(a.values) for a in axes),
-        by_poses=not axes[-3].units, walled=has_wall(scene.object),
-        values=lambda _: None,  # nothing is solved yet: no marks where the fingers touch
-    )  # fmt: skip
-    corners, cell = View(cast(Data, asked), (0,) * (len(axes) - 3)).surface
-    points, inverse = np.unique(np.round(corners[..., :3].reshape(-1, 3), 9), axis=0, return_inverse=True)
+def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> Surface:
+    """The object's surface at a point of a scene's sweep (by default the first), cut along its candidates' cells.
+
+    It is empty where the scene does not tell the object.
+
+    Raises
+    ------
+    ValueError, OSError
+        The object cannot be built, as when its mesh is not there.
+    """
+    from softjaw.study.case.build import build_object, has_wall
+
+    here = scene_at(scene, (0,) * (len(axes) - 3) if point is None else point)
+    if here is None:
+        return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
+    body = build_object(here.object)
+    points, triangles = body.surface()
+    corners = np.asarray(points, float)[triangles]
+    corners = corners[areas(corners) > 0]
+    cell = np.full(len(corners), NOBODY)
+    if axes[-3].units:
+        corners, cell = coloured(corners, cells_of(here, axes, body.axis_symmetry))
+        if has_wall(here.object):
+            kept = ~_lid(here.object, corners)
+            corners, cell = corners[kept], cell[kept]
+    points, inverse = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)
     return Surface(points, inverse.reshape(-1, 3), cell)
+
+
+def scene_at(scene: Any, index: tuple[int, ...]) -> Any:
+    """The scene with the values of one point of its sweep; None where these do not fit."""
+    from softjaw.study.scene.problems import SceneError
+
+    try:
+        return scene.with_values({key: found[i] for (key, found), i in zip(scene.sweep.items(), index, strict=False)})
+    except (SceneError, IndexError):
+        return None
+
+
+def cells_of(scene: Any, axes: Any, symmetry: int) -> Cells:
+    """The candidates of a scene as cells on the surface."""
+    length, width = scene.gripper.pad_size[:2]
+    c, s = abs(math.cos(scene.candidates.roll)), abs(math.sin(scene.candidates.roll))
+    stations, angles = (axes[k].values for k in (-3, -2))
+    return Cells(stations, angles, symmetry, c * length + s * width, c * width + s * length)
+
+
+def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:
+    """Borders of the cells round rising values, halfway between neighbours; one value gets a cell ``alone`` wide.
+
+    >>> edges(np.array([0.0, 1.0, 3.0]))
+    array([-0.5,  0.5,  2. ,  4. ])
+    """
+    values = np.asarray(values, float)
+    if len(values) == 1:
+        return values[0] + 0.5 * alone * np.array([-1.0, 1.0])
+    middle = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The candidates of a map: ``stations (s,)`` [m] and ``angles (a,)`` [rad] of finger 1 about the axis z.
+
+    The place of a candidate is under both fingers, so angles repeat after half a turn, or sooner on an object that
+    repeats itself ``symmetry`` times a turn (0: always). ``along`` and ``across`` are the pad's extents [m] along and
+    across the axis: they bound the cell of a station that is alone, and of an angle that is alone unless all are alike.
+    """
+
+    stations: np.ndarray
+    angles: np.ndarray
+    symmetry: int
+    along: float
+    across: float
+
+    @property
+    def period(self) -> float:
+        """Angle after which the map repeats itself [rad]."""
+        return 2 * math.pi / math.lcm(2, max(self.symmetry, 1))
+
+    def borders(self) -> tuple[np.ndarray, np.ndarray]:
+        """Planes between the cells: unit normals ``(p, 3)`` and offsets ``(p,)`` [m]."""
+        z = edges(np.sort(self.stations), self.along)
+        normals, offsets = [np.array([0.0, 0.0, 1.0])] * len(z), list(z)
+        for angle in self._between():
+            for turn in range(round(math.pi / self.period)):
+                phi = angle + turn * self.period
+                normals.append(np.array([-math.sin(phi), math.cos(phi), 0.0]))
+                offsets.append(0.0)
+        if self._narrow:
+            for turn in range(round(math.pi / self.period)):
+                phi = self.angles[0] + turn * self.period
+                normals += [np.array([-math.sin(phi), math.cos(phi), 0.0])] * 2
+                offsets += [-0.5 * self.across, 0.5 * self.across]
+        return np.array(normals), np.array(offsets)
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """Candidate ``(n,)`` (station times number of angles plus angle) of points ``(n, 3)`` between the borders."""
+        order = np.argsort(self.stations)
+        i = np.searchsorted(edges(self.stations[order], self.along), x[:, 2]) - 1
+        inside = (i >= 0) & (i < len(order))
+        phi = np.arctan2(x[:, 1], x[:, 0])
+        known, first = self._different()
+        apart = np.abs((phi[:, None] - known + 0.5 * self.period) % self.period - 0.5 * self.period)
+        j = first[apart.argmin(axis=1)]
+        if self._narrow:
+            beside = np.hypot(x[:, 0], x[:, 1]) * np.sin(np.minimum(apart[:, 0], 0.5 * math.pi))
+            inside &= beside <= 0.5 * self.across
+        return np.where(inside, order[np.clip(i, 0, len(order) - 1)] * len(self.angles) + j, NOBODY)
+
+    @property
+    def _narrow(self) -> bool:
+        return self.symmetry != 0 and len(self.angles) == 1
+
+    def _different(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rising angles within one period that are no images of others, and the first candidate angle of each."""
+        share, first = np.unique(np.round(self.angles / self.period % 1.0, 9) % 1.0, return_index=True)
+        return share * self.period, first
+
+    def _between(self) -> np.ndarray:
+        """Angles halfway between neighbours, round the period."""
+        known, _ = self._different()
+        if len(known) < 2:
+            return np.empty(0)
+        return 0.5 * (known + np.append(known[1:], known[0] + self.period))
+
+
+def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles ``(m, 3, 3)`` cut at the borders of the cells, and the candidate ``(m,)`` of each."""
+    for normal, offset in zip(*cells.borders(), strict=True):
+        corners = cut(corners, normal, offset)
+    return corners, cells.at(corners.mean(axis=1))
+
+
+def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
+    """Triangles ``(m, 3, 3)`` cut along the plane ``x . normal = offset``."""
+    d = corners @ normal - offset
+    d[np.abs(d) < ON_PLANE] = 0.0
+    through = (d.min(axis=1) < 0) & (d.max(axis=1) > 0)
+    if not through.any():
+        return corners
+    sign = np.sign(d[through])
+    alone = np.where(sign.sum(axis=1) > 0, sign.argmin(axis=1), sign.argmax(axis=1))
+    order = (alone[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(corners[through], order[..., None], axis=1).swapaxes(0, 1)
+    da, db, dc = np.take_along_axis(d[through], order, axis=1).T[..., None]
+    p, q = a + da / (da - db) * (b - a), a + da / (da - dc) * (c - a)
+    pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
+    return np.concatenate([corners[~through], pieces[areas(pieces) > 0]])
+
+
+def areas(corners: np.ndarray) -> np.ndarray:
+    """Areas ``(m,)`` of triangles."""
+    return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+
+
+@dataclass(frozen=True)
+class Wall:
+    """Where the points of a surface lie on the wall: ``around (n,)`` and ``along (n,)`` in steps of the file's grid.
+
+    ``around`` counts from angle 0 about the axis; points that are not on the wall have NaN.
+    """
+
+    around: np.ndarray
+    along: np.ndarray
+
+    def moved(self, u: np.ndarray, angle: float) -> np.ndarray:
+        """Displacement ``(n, 3)`` of the points, from the grid's ``(AROUND, ALONG, 3)``, which begins at ``angle``."""
+        on = np.isfinite(self.around)
+        found = np.zeros((len(on), 3))
+        found[on] = between(u, self.around[on] - angle * AROUND / (2 * np.pi), self.along[on])
+        return found
+
+
+def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Values ``(n, c)`` between the places of a grid ``(AROUND, ALONG, c)``, which closes round the axis."""
+    i, j = np.floor(around).astype(int), np.clip(np.floor(along).astype(int), 0, ALONG - 2)
+    s, t = (around - i)[:, None], (along - j)[:, None]
+    i, k = i % AROUND, (i + 1) % AROUND
+    return (1 - s) * ((1 - t) * grid[i, j] + t * grid[i, j + 1]) + s * ((1 - t) * grid[k, j] + t * grid[k, j + 1])
+
+
+def wall_of(shape: Any, points: np.ndarray) -> Wall | None:
+    """Where points ``(n, 3)`` of the surface [m] lie on the wall of a shape; None for shapes without one."""
+    from scipy.spatial import cKDTree
+
+    grid = undeformed(shape, 0.0)
+    if grid is None or not len(points):
+        return None
+    fine = np.meshgrid(np.arange(0, AROUND, 1 / FINER), np.linspace(0, ALONG - 1, FINER * ALONG), indexing="ij")
+    around, along = (f.ravel() for f in fine)
+    distance, nearest = cKDTree(between(grid, around, along)).query(points)
+    off = distance > NEAR
+    return Wall(np.where(off, np.nan, around[nearest]), np.where(off, np.nan, along[nearest]))
+
+
+def undeformed(shape: Any, angle: float) -> np.ndarray | None:
+    """Outer face ``(AROUND, ALONG, 3)`` of a shape before anything presses, at the places that a file stores.
+
+    ``angle`` is finger 1's about the axis [rad]. None for shapes without a wall that can be traced.
+    """
+    from softjaw.study.case.build import outer_surface
+
+    try:
+        surface = outer_surface(shape)[0]
+    except (AttributeError, OSError, ValueError):
+        return None
+    end = surface.wall[1] if shape.open_top else surface.end
+    around = angle + 2 * np.pi * np.arange(AROUND) / AROUND
+    theta, s = np.meshgrid(around, np.linspace(0.0, end, ALONG), indexing="ij")
+    return surface.jets(theta, s)[:, 0].reshape(AROUND, ALONG, 3)
+
+
+def _lid(shape: Any, corners: np.ndarray) -> np.ndarray:
+    """Triangles that close the top of an object that is open there: its surface is that of a solid."""
+    wall = None
+    if getattr(shape, "open_top", False) and shape.shape != "mesh":
+        wall = wall_of(shape, corners.reshape(-1, 3))
+    if wall is None:
+        return np.zeros(len(corners), bool)
+    z = corners[..., 2]
+    return np.isnan(wall.around).reshape(-1, 3).any(axis=1) & (z.mean(axis=1) > 0.5 * (z.min() + z.max()))

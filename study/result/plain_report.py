@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import html
-import re
 import textwrap
 from typing import Any
 
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
 from softjaw.study.show.data import Data
-from softjaw.study.show.report.words import CAVEAT, subtitle, verdict
+from softjaw.study.show.report.verdict import CAVEAT, meaning, subtitle, verdict, warnings
 from softjaw.study.show.tables.show import best
 from softjaw.study.show.tables.show_text import as_text
 
@@ -32,7 +30,8 @@ def plain_report(result: Any, mu: float | None) -> str:
     what = f"{data.title}: {size}" if result.title else size
     table = [as_text(best(dataset(result), top=TOP, whole_lines=True), WIDTH)] if data.best else []
     notes = "\n".join(line for state in (FAILED, DONE) for line in _notes(data, state))
-    parts = [what, plain(verdict(data, mu)), *table, notes, READING, CAVEAT.replace("the scene below", "/study/scene")]
+    said = "\n".join([*verdict(data, mu), *warnings(data), meaning(data)]).replace("\xa0", " ").strip()
+    parts = [what, said, *table, notes, READING, CAVEAT.replace("the scene below", "/study/scene")]
     lines = "\n\n".join(part for part in parts if part).splitlines()
     text = "\n".join(textwrap.fill(line, WIDTH) if len(line) > WIDTH else line for line in lines) + "\n"
     return text.replace("\N{DEGREE SIGN}", " deg").replace("\N{MULTIPLICATION SIGN}", "x")  # h5dump escapes them
@@ -46,9 +45,3 @@ def _notes(data: Data, state: int) -> list[str]:
         lines.append(f"{word} {count} x {text} [{places}{'; ...' * (count > MOST_PLACES)}]")
     return lines
 
-
-def plain(page: str) -> str:
-    """Text of a piece of a page, one paragraph a line."""
-    lines = re.split(r"</?(?:p|div|li|ul|h\d)\b[^>]*>", page)
-    texts = [html.unescape(re.sub(r"<[^>]+>", "", line)).replace("\xa0", " ").strip() for line in lines]
-    return "\n".join(text for text in texts if text)

@@ -7,7 +7,7 @@ are crossed out. Nothing here needs a display.
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -85,24 +85,6 @@ def as_png(drawn: Any) -> bytes:
     return _saved(drawn, "png", dpi=160, facecolor="white", metadata={"Software": None})
 
 
-def as_webp(drawn: Any) -> bytes:
-    """The figure as WebP, for what is shaded or has very many parts: a tenth of the size of SVG or PNG."""
-    return _saved(drawn, "webp", dpi=190, facecolor="white", pil_kwargs={"quality": 82, "method": 4})
-
-
-def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:
-    """Borders of the cells round rising values, halfway between neighbours; one value gets a cell ``alone`` wide.
-
-    >>> edges(np.array([0.0, 1.0, 3.0]))
-    array([-0.5,  0.5,  2. ,  4. ])
-    """
-    values = np.asarray(values, float)
-    if len(values) == 1:
-        return values[0] + 0.5 * alone * np.array([-1.0, 1.0])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
-
-
 def span(values: Any) -> tuple[float, float]:
     """Smallest and largest finite value, widened where they are one; 0 to 1 where there is none."""
     finite = np.asarray(values)[np.isfinite(values)]
@@ -116,43 +98,14 @@ def span(values: Any) -> tuple[float, float]:
 
 
 def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np.ndarray, **look: Any) -> Any:
-    """Cells ``values (len(y), len(x))`` as colours, between borders ``x`` and ``y``.
+    """Cells ``values (len(y) - 1, len(x) - 1)`` as colours, between borders ``x`` and ``y``.
 
-    Failed cells are grey and crossed out; cells without a value are dotted.
+    Failed cells are grey with a cross; cells without a value are grey.
     """
-    many, missing = values.size > RASTER, np.isnan(values) & ~failed
-    crosses, dots = _cells(x, y, failed), _cells(x, y, missing)
-    if len(crosses) > RASTER:  # one ground of crosses that shows through is drawn much faster
-        crosses = _cells(x[[0, -1]], y[[0, -1]], np.ones((1, 1), bool))
-    crossed_out(axes, crosses)
-    dotted(axes, dots)
-    shown = np.ma.masked_invalid(np.where(failed, np.nan, values))
-    seams = {"edgecolors": "none"} if many else {"edgecolors": "face", "linewidth": 0.4}
-    return axes.pcolormesh(x, y, shown, rasterized=many, zorder=1.1, **seams, **look)
-
-
-def _cells(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Chosen cells as rectangles, neighbours in a row as one."""
-    steps = np.diff(chosen.astype(int), axis=1, prepend=0, append=0)
-    rows, first = np.nonzero(steps == 1)
-    last = np.nonzero(steps == -1)[1]
-    box = np.stack([x[first], y[rows], x[last], y[rows + 1]], axis=-1)
-    return box[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
-
-
-def crossed_out(axes: Any, corners: Sequence[Any]) -> None:
-    """Polygons in the way failed cases are drawn everywhere."""
-    from matplotlib.collections import PolyCollection
-
-    if len(corners):
-        look = {"facecolor": EMPTY, "edgecolor": SOFT, "linewidth": 0.3, "hatch": "xxxx"}
-        axes.add_collection(PolyCollection(corners, zorder=0.5, **look), autolim=False)
-
-
-def dotted(axes: Any, corners: Sequence[Any]) -> None:
-    """Polygons in the way cases without a value are drawn everywhere."""
-    for polygon in corners:
-        axes.fill(*np.transpose(polygon), facecolor="white", edgecolor="#c3cad0", linewidth=0, hatch="...", zorder=1)
+    axes.set_facecolor(EMPTY)
+    i, j = np.nonzero(failed)
+    axes.plot(0.5 * (x[j] + x[j + 1]), 0.5 * (y[i] + y[i + 1]), "x", color=SOFT, ms=4)
+    return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), rasterized=True, **look)
 
 
 def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any) -> Any:
@@ -185,61 +138,16 @@ def arrow(axes: Any, tail: np.ndarray, tip: np.ndarray) -> None:
     axes.annotate("", tip, tail, arrowprops={**style, "path_effects": [withStroke(linewidth=4, foreground="white")]})
 
 
-def curves(axes: Any, x: np.ndarray, lines: Mapping[str, np.ndarray], styles: Mapping[str, Any] | None = None) -> None:
-    """Lines over ``x``, each named at its right end; lines without a finite value are left out."""
-    styles = styles or MODEL_STYLE
-    ends: list[tuple[float, float, str, str]] = []
-    for name, y in lines.items():
-        known = np.flatnonzero(np.isfinite(y))
-        if not known.size:
-            continue
-        (drawn,) = axes.plot(x[known], y[known], **{"clip_on": False, "zorder": 3, **styles.get(name, {})})
-        ends.append((float(x[known[-1]]), float(y[known[-1]]), name, drawn.get_color()))
-    _name_ends(axes, ends)
+def placed(axes: Any, image: np.ndarray, title: str) -> None:
+    """Set an image into axes of its own, without frame and ticks."""
+    axes.imshow(image, interpolation="antialiased", interpolation_stage="rgba")
+    axes.set_title(title)
+    axes.set_axis_off()
 
 
-def _name_ends(axes: Any, ends: list[tuple[float, float, str, str]]) -> None:
-    """Write names beside the lines' ends, pushed apart where they would cover each other."""
-    if not ends:
-        return
-    axes.margins(x=0.03, y=0.12)
-    low, high = axes.get_ylim()
-    ends = sorted(ends, key=lambda e: e[1])
-    height = 0.105 * (high - low) * 1.45 / max(_inches(axes), 0.8)
-    places = spread([e[1] for e in ends], height, (low, high))
-    for (x, y, name, colour), place in zip(ends, places, strict=True):
-        axes.annotate(
-            name, (x, y), (6, (place - y) / (high - low) * 72 * _inches(axes)), color=colour, fontsize=8,
-            textcoords="offset points", va="center", annotation_clip=False,
-        )  # fmt: skip
-
-
-def _inches(axes: Any) -> float:
-    grid = axes.get_gridspec()
-    return 0.72 * axes.figure.get_figheight() / (grid.nrows if grid else 1)
-
-
-def spread(places: Sequence[float], least: float, within: tuple[float, float] = (-np.inf, np.inf)) -> list[float]:
-    """Rising places moved apart until neighbours are ``least`` from each other, about their common middle.
-
-    >>> spread([0.0, 0.0, 5.0], 1.0)
-    [-0.5, 0.5, 5.0]
-    >>> spread([0.0, 0.0, 5.0], 1.0, (0.0, 4.0))
-    [0.0, 1.0, 4.0]
-    """
-    groups: list[list[float]] = []
-    for place in places:
-        groups.append([place])
-        while len(groups) > 1 and _too_near(groups[-2], groups[-1], least):
-            groups[-2:] = [groups[-2] + groups[-1]]
-    found = [sum(g) / len(g) + least * (k - (len(g) - 1) / 2) for g in groups for k in range(len(g))]
-    for i in range(len(found)):
-        found[i] = max(found[i], within[0] if i == 0 else found[i - 1] + least)
-    for i in reversed(range(len(found))):
-        found[i] = min(found[i], within[1] if i == len(found) - 1 else found[i + 1] - least)
-    return found
-
-
-def _too_near(below: list[float], above: list[float], least: float) -> bool:
-    apart = sum(above) / len(above) - sum(below) / len(below)
-    return apart < least * (len(below) + len(above)) / 2 * (1 - 1e-12)
+def scale(drawn: Any, axes: Any, label: str, colours: str, limits: tuple[float, float], where: str = "bottom") -> None:
+    """A colour bar of images, beside or below the axes that hold them."""
+    some = np.ravel(axes)
+    mapped = some[0].scatter([], [], c=[], cmap=colours, vmin=limits[0], vmax=limits[1])
+    bar = drawn.colorbar(mapped, ax=list(some), location=where, label=label, shrink=0.6, aspect=30, pad=0.02)
+    bar.outline.set_visible(False)

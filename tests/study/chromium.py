@@ -10,11 +10,13 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-WORDS = "--headless=new --no-sandbox --disable-dev-shm-usage --disable-gpu --remote-debugging-pipe --hide-scrollbars"
+WORDS = "--headless=new --no-sandbox --disable-dev-shm-usage --remote-debugging-pipe --hide-scrollbars"
+WORDS += " --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist"  # WebGL without a graphics card
 KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Escape": 27, "Tab": 9, "End": 35}
 
 
@@ -79,7 +81,7 @@ class Browser:
             self.told.append(("console", str(values["args"])))
         elif event == "Runtime.exceptionThrown":
             self.told.append(("error", str(values["exceptionDetails"])))
-        elif event == "Log.entryAdded":
+        elif event == "Log.entryAdded" and values["entry"]["level"] != "warning":
             self.told.append(("log", values["entry"]["text"]))
         elif event == "Network.requestWillBeSent" and not values["request"]["url"].startswith(("data:", "file:")):
             self.told.append(("request", values["request"]["url"]))
@@ -102,6 +104,14 @@ class Browser:
         answer = self.do("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
+
+    def wait(self, expression: str, seconds: float = 30.0) -> Any:
+        """Value of an expression as soon as it can be had and is true."""
+        end = time.monotonic() + seconds
+        while not (found := self.ask(f"(() => {{ try {{ return {expression} }} catch (e) {{ return null }} }})()")):
+            assert time.monotonic() < end, expression
+            time.sleep(0.1)
+        return found
 
     def point(self, x: float, y: float) -> None:
         """Move the mouse there, in the window."""

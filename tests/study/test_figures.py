@@ -12,9 +12,10 @@ from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data
-from softjaw.study.show.figures import JOBS, fig5, fig6, fig7, fig8, rendering
+from softjaw.study.show.figures import JOBS, fig5, fig6, fig7, fig8
 from softjaw.study.show.figures.command import chosen, draw, targets
 from softjaw.study.show.figures.table import FIGURES, Figure, find
+from softjaw.study.show.view import solids
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 
@@ -109,9 +110,9 @@ def test_the_exact_radius_is_that_of_an_ellipsoid_where_the_body_is_one(axes):
 
 def test_images_lose_their_empty_margins_and_keep_a_little():
     image = np.full((60, 80, 3), 255, np.uint8)
-    assert rendering.trimmed(image).shape == image.shape
+    assert solids.trimmed(image).shape == image.shape
     image[20:30, 40:42] = 0
-    assert rendering.trimmed(image).shape == (10 + 2 * rendering.MARGIN, 2 + 2 * rendering.MARGIN, 3)
+    assert solids.trimmed(image).shape == (10 + 2 * solids.MARGIN, 2 + 2 * solids.MARGIN, 3)
 
 
 # --- the scenes themselves, on coarse meshes ---------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import h5py
 
 from softjaw.study.result.layout import REPORT
-from softjaw.study.result.plain_report import plain, plain_report
+from softjaw.study.result.plain_report import plain_report
 from softjaw.study.result.store import open_result
 from tests.study.sealing import sealed
 from tests.study.view_files import make
@@ -35,6 +35,3 @@ def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
     assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
     assert "failed 11 x no reason was given" in text
 
-
-def test_paragraphs_of_a_page_become_lines():
-    assert plain("<div class='x'><p>a &lt; <b>b</b></p><p> </p>\n<p>c\xa0mm</p></div>") == "a < b\nc mm"

@@ -1,4 +1,4 @@
-"""Limit surfaces in a report: rebuilt from what a file holds, drawn as shadows and in space."""
+"""Limit surfaces in a report: rebuilt from what a file holds, shown as shadows and in space."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from softjaw.study.case.stored_surface import circle, shadow_outline, stored_sur
 from softjaw.study.quantities import MONOMIALS
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
-from softjaw.study.show import pictures
 from softjaw.study.show.data import Data
-from softjaw.study.show.report.surface import misfit_curves, surface_pictures
+from softjaw.study.show.report.contact import limit_surfaces
+from softjaw.study.show.report.curves import fit_error
 from tests.study.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02
@@ -87,27 +87,29 @@ def patch_S():
     return float((patch()["pressure"] * patch()["area"])[0].sum())
 
 
-def test_pictures_tell_what_they_show_and_stay_small(file):
-    with open_result(file) as result, pictures.style():
+def test_figures_show_both_models_with_their_exact_wrenches(file):
+    with open_result(file) as result:
         data = Data(result)
-        shadows, space = surface_pictures(data, (0, 0, 0))
-        curve = misfit_curves(data, 0, (0, 0, 0))
-    assert "0.2 % fitted, 1.3 % from three motions" in shadows.caption
-    assert "exact wrenches" in shadows.caption
-    assert "300 slip motions" in space.caption
-    assert "misfit of the limit surfaces over station" in curve.alt.lower()
-    assert len(shadows.content) + len(space.content) + len(curve.content) < 600_000
+        shown = limit_surfaces(data, (0, 0, 0))["figure"].data
+        curve = fit_error(data, 0, (0, 0, 0))["figure"].data
+    surfaces = [trace for trace in shown if trace.type == "surface"]
+    assert len(surfaces) == 2  # CCM and PCM
+    reach = MU * patch_S() * SEMI * [1, 1, 1e3 * RHO]
+    for trace in surfaces:
+        assert [np.abs(a).max() for a in (trace.x, trace.y, trace.z)] == pytest.approx(reach, rel=1e-6)
+    assert sum(trace.type == "scatter" and trace.mode == "markers" for trace in shown) == 2 * 3
+    assert [line.y for line in curve] == [pytest.approx([0.2] * 2), pytest.approx([1.3] * 2)]
 
 
-def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_picture(tmp_path, file):
+def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_figure(tmp_path, file):
     layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0, patches=False)
     with open_result(file) as result:
         data = Data(result)
         names = ("semi_axes", "rho", "coefficients")
         values = {f"limit_surface/{n}": data.values(f"limit_surface/{n}")[0, 0, 0] for n in names}
         values |= {f"fingers/{n}": data.values(f"fingers/{n}")[0, 0, 0] for n in ("S", "f_x_max")}
-    with open_result(make(tmp_path / "bare.hdf", layout, **values)) as result, pictures.style():
-        (shadows,) = surface_pictures(Data(result), (0, 0, 0))
-        assert "exact" not in shadows.caption
+    with open_result(make(tmp_path / "bare.hdf", layout, **values)) as result:
+        shown = limit_surfaces(Data(result), (0, 0, 0))["figure"].data
+        assert not any(trace.mode == "markers" for trace in shown if trace.type == "scatter")
     with open_result(make(tmp_path / "none.hdf", layout)) as result:
-        assert surface_pictures(Data(result), (0, 0, 0)) == []
+        assert limit_surfaces(Data(result), (0, 0, 0)) is None

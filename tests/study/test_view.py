@@ -6,36 +6,33 @@ import base64
 import json
 import math
 import re
-import shutil
-import subprocess
 import threading
 import urllib.error
 import urllib.request
-from html import unescape
 
 import matplotlib
 import numpy as np
 import pytest
 
-from softjaw.fem.objects.shapes import Box, EllipticCylinder
+from softjaw.fem.objects.shapes import EllipticCylinder
+from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import corners_of
+from softjaw.study.result.grid import NOBODY
+from softjaw.study.result.grid_surface import Cells, Wall, areas, between, coloured, cut
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data
-from softjaw.study.show.view import colours, command, limits
+from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of
-from softjaw.study.show.view.pads import pads
-from softjaw.study.show.view.page import page, payload
+from softjaw.study.show.view.object3d import object_block, payload, view_page
+from softjaw.study.show.view.pads import corners_of, pads
 from softjaw.study.show.view.server import server
-from softjaw.study.show.view.surface import NOBODY, Cells, areas, coloured, crosses, cut, with_normals
-from softjaw.study.show.view.wall import Wall, between
+from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
-CHROMIUM = shutil.which("chromium")
 
 
 @pytest.fixture(scope="module")
@@ -51,40 +48,36 @@ def shown(file):
         yield view_of(Data(result), None, (None, None), None)
 
 
+def corners_on(body):
+    """Triangles ``(m, 3, 3)`` of a body."""
+    points, triangles = body.surface()
+    return np.asarray(points, float)[triangles]
+
+
 # --- the surface -----------------------------------------------------------------------------------------------------
 
 
 def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
-    corners = with_normals(*EllipticCylinder(0.03, 0.02, 0.1).surface())
+    corners = corners_on(EllipticCylinder(0.03, 0.02, 0.1))
     whole = areas(corners).sum()
     for normal, offset in (((0, 0, 1.0), 0.0123), ((0.6, 0.8, 0), 0.004), ((0, 1.0, 0), 0.0)):
         corners = cut(corners, np.array(normal), offset)
-        d = corners[..., :3] @ normal - offset
+        d = corners @ normal - offset
         assert not ((d.min(axis=1) < -1e-9) & (d.max(axis=1) > 1e-9)).any()
     assert areas(corners).sum() == pytest.approx(whole, rel=1e-12)
 
 
 def test_a_cut_through_a_corner_makes_two_triangles():
-    corners = np.zeros((1, 3, 6))
+    corners = np.zeros((1, 3, 3))
     corners[0, :, :2] = (0, 0), (1, 1), (1, -1)
     pieces = cut(corners, np.array([0, 1.0, 0]), 0.0)
     assert len(pieces) == 2
     assert areas(pieces) == pytest.approx(0.5)
 
 
-def test_normals_follow_a_cylinder_and_stay_sharp_at_a_box():
-    corners = with_normals(*EllipticCylinder(0.02, 0.02, 0.1).surface())
-    wall = corners[(np.abs(corners[..., 2]) < 0.0479).all(axis=1)]
-    x, n = wall[..., :3].reshape(-1, 3), wall[..., 3:].reshape(-1, 3)
-    radial = x[:, :2] / np.linalg.norm(x[:, :2], axis=1, keepdims=True)
-    assert np.einsum("ki,ki->k", n[:, :2], radial).min() > 0.999
-    sharp = with_normals(*Box(np.array([0.02, 0.03, 0.04]), 0.0).surface())[..., 3:]
-    assert np.sort(np.abs(sharp), axis=-1)[..., :2].max() < 1e-12
-
-
 def test_each_candidate_owns_its_band_under_both_fingers():
     cells = Cells(np.array([0.03, -0.01, 0.01]), np.radians([0, 90]), 2, 0.05, 0.022)
-    corners, cell = coloured(*EllipticCylinder(0.03, 0.03, 0.2).surface(), cells)
+    corners, cell = coloured(corners_on(EllipticCylinder(0.03, 0.03, 0.2)), cells)
     area = areas(corners)
     ring = 2 * math.pi * 0.03 * 0.02
     for candidate in range(6):
@@ -116,13 +109,11 @@ def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
     assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
 
 
-def test_crosses_lie_outside_the_surface_before_both_fingers():
-    cells = Cells(np.array([0.0]), np.radians([0, 90]), 2, 0.05, 0.022)
-    corners, cell = coloured(*EllipticCylinder(0.03, 0.03, 0.2).surface(), cells)
-    lines = crosses(corners, cell, [1], cells.angles)
-    assert lines.shape == (4, 2, 3)
-    assert np.sort(np.sign(lines[..., 1].mean(axis=1))).tolist() == [-1, -1, 1, 1]
-    assert np.hypot(lines[..., 0], lines[..., 1]).min() >= 0.03 - 1e-9
+def test_a_point_on_the_border_of_two_cells_is_there_for_each(shown):
+    view, _ = shown
+    points, triangles, candidate = view.surface
+    assert (view.owner[triangles] == candidate[:, None]).all()
+    assert areas(points[triangles]).sum() == pytest.approx(areas(corners_on(build_object(view.scene.object))).sum())
 
 
 # --- the wall --------------------------------------------------------------------------------------------------------
@@ -226,7 +217,7 @@ def test_the_words_name_the_case_and_say_why_it_failed(shown):
     assert words[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
     assert f"grasp quality: {quality(index):.3g}" in words
     assert view.words(FAILED, "quality")[-1] == "failed: no </script> convergence"
-    assert view.words((0, 0, 1), "quality")[-1] == "not solved yet"
+    assert view.words((0, 0, 1), "quality")[-1] == "not computed yet"
 
 
 def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
@@ -235,71 +226,71 @@ def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
     )
     with open_result(make(tmp_path / "m.hdf", scene=scene)) as result:
         view, _ = view_of(Data(result), None, (None, None), None)
-        assert not len(view.surface[0])
+        assert not len(view.surface.points)
         assert "thing.stl" in view.note
-
-
-def test_limit_surface_has_the_reach_of_its_ellipsoid(shown):
-    view, index = shown
-    body = limits.limit_body(view.data, index)
-    reach = np.abs(body.points.reshape(-1, 3)).max(axis=0)
-    assert reach == pytest.approx([0.8 * 5, 0.7 * 5, 0.01 * 5e3], rel=1e-12)
-    assert limits.limit_body(view.data, FAILED) is None
-    assert limits.quads().max() == body.points[..., 0].size - 1
-
-
-@pytest.mark.parametrize("name", ["quality", "e_n", "pressure", "dent", "wall_stress"])
-def test_colours_are_those_of_the_report(name):
-    from softjaw.study.show.pictures import COLOURS
-
-    rgb = np.array([[int(h[k : k + 2], 16) for k in (1, 3, 5)] for h in colours.table(name)])
-    assert np.abs(rgb - 255 * matplotlib.colormaps[COLOURS[name]](np.linspace(0, 1, 256))[:, :3]).max() < 12
 
 
 # --- the page --------------------------------------------------------------------------------------------------------
 
 
-def unpacked(told, number, kind):
-    return np.frombuffer(base64.b64decode(told["packs"][number]), kind)
+def unpacked(packed, kind="<f4"):
+    return np.frombuffer(base64.b64decode(packed), kind)
+
+
+def every(view):
+    return [i for k in (1, 0) for i in view.data.order(k)]
 
 
 def test_the_page_holds_every_solved_case(shown):
     view, index = shown
-    told = payload(view, index, "quality", "x")
+    told, left_out = payload(view, index, "quality", every(view), "x", whole=True)
+    assert left_out == 0
     assert set(told["cases"]) == {f"{k} {c}" for k in (0, 1) for c in range(6)} - {"1 5", "1 0"}
-    assert told["remarks"] == {"1 5": "failed: no </script> convergence"}
-    assert told["state"] == [[1] * 6, [0, 1, 1, 1, 1, 2]]
-    assert list(told["surface"]["crosses"]) == [5]
+    assert told["start"] == {"candidate": 2, "force": 1, "quantity": "quality"}
+    assert told["remarks"]["1 5"] == "no &lt;/script&gt; convergence"
+    assert told["words"]["1 5"][-1] == "failed: no </script> convergence"
+    assert told["states"] == [[1] * 6, [0, 1, 1, 1, 1, 2]]
     assert told["quantities"][0]["values"][1][2] == pytest.approx(quality(index))
     assert told["quantities"][0]["values"][1][5] is None
-    pad = told["cases"]["1 2"]["pads"][0]
-    front = unpacked(told, pad["front"]["pack"], "<i2").reshape(5, 5, 3) * pad["front"]["step"]
-    own = pads(view.data, view.gripper, index)[0]
-    assert front == pytest.approx(1e3 * own.own(own.front), abs=1e-3)
-    pressure = unpacked(told, pad["pressure"]["pack"], "<i2") * pad["pressure"]["step"]
-    assert pressure == pytest.approx(1e-3 * own.pressure.ravel(), rel=1e-4)
-    fronts = {case["pads"][f]["front"]["pack"] for case in told["cases"].values() for f in (0, 1)}
-    assert len(fronts) == 1  # equal fronts are packed once
-    cell = unpacked(told, told["surface"]["cell"], "<i4")
-    assert (cell == view.surface[1]).all()
+    points, owner = unpacked(told["points"]).reshape(-1, 3), unpacked(told["owner"], "<i4")
+    assert points == pytest.approx(1e3 * view.surface.points, rel=1e-6)
+    assert (owner == view.owner).all()
+    assert (unpacked(told["triangles"], "<i4").reshape(-1, 3) == view.surface.triangles).all()
+
+
+def test_pads_friction_and_limit_surface_of_a_case_are_where_the_file_says(shown):
+    view, index = shown
+    one = payload(view, index, "quality", [index], "x", whole=True)[0]["cases"]["1 2"]
+    both = pads(view.data, view.gripper, index)
+    faces = (unpacked(one["faces"], "<i2") * one["step"]).reshape(-1, 4, 3)
+    assert len(faces) == 8  # four loaded faces of each pad
+    assert np.abs(faces[:4, :, 0]) == pytest.approx(np.full((4, 4), 25 + 1e3 * both[0].lift), abs=2 * one["step"])
+    assert unpacked(one["pressure"]) == pytest.approx(np.full(8, 5e-3 * PRESSURE))
+    arrows = unpacked(one["arrows"]).reshape(-1, 2, 3)
+    assert np.diff(arrows, axis=1)[:4, 0] == pytest.approx(np.broadcast_to(6.0 * both[0].frame[0], (4, 3)), abs=1e-4)
+    body = unpacked(one["limit"]).reshape(one["rows"], -1, 3)
+    assert np.abs(body).max(axis=(0, 1)) == pytest.approx([0.8 * 5, 0.7 * 5, 0.01 * 5e3], rel=1e-6)
+    assert "limit" not in payload(view, index, "quality", [index], "x", whole=False)[0]["cases"]["1 2"]
 
 
 def test_the_page_is_well_formed_and_needs_nothing(shown):
-    html = page(*shown, "quality", "turn")
-    assert "/*DATA*/" not in html
-    assert "/*SCRIPT*/" not in html
-    assert not re.search(r"""(?:src|href)=["'](?!data:)|https?://""", html)
-    text = re.search(r'id="data">(.*?)</script>', html, re.S)[1]
-    assert json.loads(text)["title"] == "<b>thing</b>"
-    assert json.loads(text)["start"] == {"candidate": 2, "force": 1, "quantity": "quality", "motion": "turn"}
-    assert html.count("</script>") == 2
+    html = view_page(*shown, "quality", "turn")
+    own = re.sub(r"<script>.*?</script>", "", html, flags=re.S)
+    assert not re.search(r"""(?:src|href)=["'](?!data:)|https?://""", own)
+    (text,) = re.findall(r'<script type="application/json">(.*?)</script>', own, re.S)
+    assert not set(text) & set("<>&'")
+    assert json.loads(text)["layout"]["meta"]["object3d"]["start"]["candidate"] == 2
+    assert "<title>&lt;b&gt;thing&lt;/b&gt;</title>" in own
+    assert html.count("</script>") == 3
 
 
 def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeypatch):
-    monkeypatch.setattr("softjaw.study.show.view.page.MOST", 0)
-    told = payload(*shown, "quality", "x")
+    monkeypatch.setattr("softjaw.study.show.view.object3d.MOST", 0)
+    view, index = shown
+    told, left_out = payload(view, index, "quality", [index, *every(view)], "x", whole=False)
     assert list(told["cases"]) == ["1 2"]
-    assert told["notes"] == ["pads of the 9 worst cases are left out, or the page would be too large"]
+    assert left_out == 10
+    assert " 10 worst cases are left out" in object_block(view, index, "quality", "x", [index, *every(view)])["caption"]
 
 
 def test_the_page_is_served_on_loopback_to_its_own_name_only():
@@ -340,7 +331,10 @@ def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsy
 def test_the_command_writes_the_page(file, tmp_path, capsys):
     assert main(["view", str(file), "--station", "20", "--force", "1", "--html", str(tmp_path / "a.html")]) == 0
     assert capsys.readouterr().out == f"written: {tmp_path / 'a.html'}\n"
-    assert '"start":{"candidate":4,"force":0' in (tmp_path / "a.html").read_text()
+    html = (tmp_path / "a.html").read_text()
+    text = re.search(r'<script type="application/json">(.*?)</script>', html, re.S)[1]
+    start = json.loads(text)["layout"]["meta"]["object3d"]["start"]
+    assert start == {"force": 0, "candidate": 4, "quantity": "quality"}
     assert [p.name for p in tmp_path.iterdir()] == ["a.html"]
 
 
@@ -381,11 +375,12 @@ def test_a_picture_without_a_screen_shows_object_pads_and_limit_surface(file, tm
     below = found["best"][450:, 930:], found["failed"][450:, 930:]  # limit surface; a failed case has none
     assert (below[0].min(axis=-1) < 200).mean() > 4 * (below[1].min(axis=-1) < 200).mean()
     changed = (found["best"] != found["turn"]).any(axis=-1)
-    assert 1e-4 < changed[:, :930].mean() < 0.05  # the darts, and nothing else on the left
+    assert 1e-4 < changed[:, :930].mean() < 0.05  # the arrows, and nothing else on the left
 
 
 @pytest.mark.long
 def test_slider_and_click_of_the_window_change_the_case(shown):
+
     from softjaw.study.show.view import window
 
     view, index = shown
@@ -411,48 +406,24 @@ def test_slider_and_click_of_the_window_change_the_case(shown):
         plotter.close()
 
 
-ACTS = """
-<script>
-const told_ = {errors: window.errors_}, eye = () => document.getElementById("scene").toDataURL();
-const before = eye(), force = document.getElementById("force");
-force.value = 0; force.dispatchEvent(new Event("input"));
-told_.slid = eye() !== before; told_.newton = document.getElementById("newton").textContent;
-const box = document.getElementById("scene").getBoundingClientRect();
-state.yaw = 0; state.pitch = 0; state.candidate = 1;
-const at = {clientX: box.left + box.width / 2, clientY: box.top + box.height / 2};
-pick(at); told_.picked = state.candidate;
-state.force = 1; set({candidate: 5}); told_.remark = document.getElementById("remark").textContent;
-told_.hash = location.hash; told_.title = document.title; told_.gl = !!gl && gl.getError();
-const pixel = new Uint8Array(4); paint(); gl.readPixels(2, 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-told_.corner = [...pixel]; told_.rows = document.querySelectorAll("#values tr").length;
-document.body.replaceChildren(); document.body.textContent = "RESULT" + JSON.stringify(told_) + "END";
-</script>
-"""
-
-
 @pytest.mark.long
 @pytest.mark.launches
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+@pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine")
 def test_the_page_works_in_a_browser(file, tmp_path):
+    """Slider, choice and click change what is shown; nothing is asked for from outside."""
     assert main(["view", str(file), "--html", str(tmp_path / "view.html")]) == 0
-    listen = "<script>window.errors_ = []; addEventListener('error', (e) => errors_.push(e.message));</script>"
-    html = (tmp_path / "view.html").read_text().replace("<body>", f"<body>{listen}")
-    html = html.replace("</body>", f"{ACTS}</body>")
-    (tmp_path / "acts.html").write_text(html)
-    words = "--headless=new --no-sandbox --disable-dev-shm-usage --use-gl=angle --use-angle=swiftshader"
-    words += f" --enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir={tmp_path}/profile --dump-dom"
-    done = subprocess.run([CHROMIUM, *words.split(), f"file://{tmp_path}/acts.html"], capture_output=True, text=True,
-                          timeout=120, check=False)  # fmt: skip
-    answer = re.search("RESULT(.*)END", done.stdout)
-    assert answer, done.stderr[-2000:]
-    told = json.loads(unescape(answer[1]))
-    assert "CONSOLE" not in done.stderr, done.stderr
-    assert told["errors"] == []
-    assert told["gl"] == 0
-    assert told["slid"]
-    assert told["newton"] == "1 N"
-    assert told["picked"] == 2  # seen from +x, the middle of the object belongs to station 1, angle 0
-    assert told["remark"] == "failed: no </script> convergence"
-    assert told["hash"] == "#force=1&candidate=5&quantity=quality&motion=x"
-    assert told["corner"] == [255, 255, 255, 255]
-    assert told["rows"] == 0
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(tmp_path / "view.html")
+        said = "document.querySelector('.controls p').textContent.replaceAll('\\u00a0', ' ')"
+        assert "angle 0°, 5 N" in browser.wait(said)
+        assert browser.ask("document.querySelector('.plot').data[0].i.length") > 100
+        whole = browser.ask("document.querySelector('.plot').data[3].i.length")
+        assert whole == 16  # two triangles of each loaded face
+        browser.ask("document.querySelector('input').value = 0")
+        browser.ask("document.querySelector('input').dispatchEvent(new Event('input'))")
+        assert "angle 0°, 1 N" in browser.ask(said)
+        there = "(t) => t.includes('station\\u00a020') && t.includes('angle\\u00a00')"
+        point = f"{{curveNumber: 0, pointNumber: plots[0].data[0].text.findIndex({there})}}"
+        browser.ask(f"plots[0].emit('plotly_click', {{points: [{point}]}})")
+        assert "station 20 mm, angle 0°, 1 N" in browser.ask(said)
+        assert not [kind for kind, _ in browser.told if kind in ("error", "request", "console")]

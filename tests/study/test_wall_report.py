@@ -15,25 +15,22 @@ from softjaw.study.case import model, wall, window
 from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
+from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import dataset
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
-from softjaw.study.show import pictures
 from softjaw.study.show.data import Data
-from softjaw.study.show.outline import read_scene, undeformed
-from softjaw.study.show.report import cases, wall_words, words, writing
-from softjaw.study.show.report.levels import level_picture, rule
-from softjaw.study.show.report.wall_shape import Cut, shape_picture
-from softjaw.study.show.report.window import window_picture
+from softjaw.study.show.outline import read_scene
+from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
 from softjaw.study.show.tables.ranking import borne_level, judged, ranking
 from softjaw.study.show.tables.show import as_csv, as_json, best
 from softjaw.study.show.tables.show_text import as_text
+from softjaw.study.show.view.model import view_of
 from tests.study.sealing import sealed
-from tests.study.test_report import Page
 
 SCENE = """
 [object]
@@ -87,15 +84,6 @@ def solved():
 @pytest.fixture(scope="module")
 def can(tmp_path_factory, solved):
     return write(tmp_path_factory.mktemp("can") / "can.hdf", *solved)
-
-
-@pytest.fixture(scope="module")
-def page(can, solved):
-    """The sections of a page that tell of a wall; the others are drawn slowly and tested elsewhere."""
-    with open_result(can) as result, pictures.style():
-        data, mu = Data(result), solved[0].friction.mu
-        told = words.verdict(data, mu) + words.best_tables(data)
-        return Page(told + writing.wall_section(data, solved[0], data.best) + writing.effects(data, data.best))
 
 
 def changed(path, folder, name, values, index=...):
@@ -197,58 +185,63 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
 
 
-def test_the_report_answers_at_a_force_that_the_wall_bears(page, can):
-    assert page.balanced
-    assert "Best grasp at 1 N per finger" in page.text
-    assert "No grasp is safe above 1 N" in page.text
+def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
+    """3 N dent the can by more than is allowed; at 1 N both stations are safe."""
     with open_result(can) as result:
+        data = Data(result)
         high = result.derived("force_high")[0, 0]
-    assert f"to {high:.3g} N, which its wall bears" in page.text
-    assert "The wall: 0.3 mm PP" in page.text
-    assert RULE in page.text
-    assert "too strong: this force dents the wall" in page.text
-    alts = " ".join(image["alt"] for image in page.tags("img"))
-    assert "Bars of safe forces. 2 of 2 grasps" in alts
-    assert "deformed wall and both pads" in alts
-    assert "depth of the dent and largest stress in the wall over station" in alts
-    assert "Normal force over travel and dent" in alts
-    assert "Level of the object by candidate: nonlinear shell: 2" in alts
+        assert data.forces[data.best[-1]] == 1.0
+        said = " ".join(verdict.verdict(data, 0.8))
+        assert any("No grasp is safe above 1 N" in warning for warning in verdict.warnings(data))
+        assert f"to {high:.3g} N, which its wall bears" in said
+        assert verdict.safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
+        words, limits, *figures = writing.wall(data, solved[0])
+        (bars,) = [t for t in maps.safe_forces(data, data.best)["figure"].data if t.type == "bar"]
+        level = maps.levels(data, data.best)["figure"].data[0]
+        effects = tables.effects(data)
+    assert words["text"].startswith("The wall: 0.3 mm PP")
+    assert len(limits["rows"]) == 2
+    assert len(figures) == 3  # safe forces, sections of the wall, force over dent
+    assert bars.customdata[0] == pytest.approx(high)
+    assert np.add(bars.base, bars.y) == pytest.approx(bars.customdata)
+    assert np.ravel(level.z).tolist() == [2.0, 2.0]  # nonlinear shell
+    assert RULE in effects[1]["text"]
 
 
-def test_undeformed_and_deformed_outlines_are_cut_alike(can, solved):
+def test_sections_and_the_object_show_the_wall_as_it_is_deformed(can, solved):
     """The can's radius is 30 mm; its wall comes nearer to the axis by the dent, but for the motion as a whole."""
     with open_result(can) as result:
-        data = Data(result)
+        data, scene = Data(result), solved[0]
         place = result.read("wall/place")[0, 0, 1].reshape(48, 40, 3)
-        before, dent = undeformed(solved[0], (0, 0, 1), 0.0), data.at("dent", (0, 0, 1))
-        with pictures.style():
-            shown = shape_picture(data, solved[0], data.best)
-    ring = Cut(False, 0.0, 0.03).outline(before)
-    assert np.hypot(*ring.T) == pytest.approx(30.0, abs=0.05)
+        dent = data.at("dent", (0, 0, 1))
+        section = curves.wall_section(data, scene, (0, 0, 1))["figure"].data
+        view, index = view_of(data, 0, (None, None), 3.0)
+    before = undeformed(scene.object, 0.0)
     radius, wall_of = (np.hypot(x[..., 0], x[..., 1]) for x in (before, place))
     assert (radius - wall_of)[:, 20:].max() == pytest.approx(dent, rel=0.1)
-    pressed = Cut(False, 0.0, 0.03).outline(place)
-    assert 30.0 - pressed[0, 1] > 1.0
-    upright = Cut(True, 0.0, 0.03).outline(before)
-    assert (upright[0, 1], upright[-1, 1]) == (pytest.approx(-30.0, abs=1e-6), pytest.approx(30.0, abs=1e-6))
-    assert "the deepest dent of all solved cases" in shown.caption
-    assert len(shown.content) < 200_000
+    lines = [np.stack([line.x, line.y]) for line in section]  # before: along and across the axis; after: the same
+    assert np.hypot(*lines[1]) == pytest.approx(30.0, abs=0.05)
+    assert (lines[0][1, 0], lines[0][1, -1]) == (pytest.approx(-30.0, abs=1e-6), pytest.approx(30.0, abs=1e-6))
+    assert 30.0 - lines[3][1, 0] > 1.0
+    moved = np.hypot(*view.moved(index)[:, :2].T) - np.hypot(*view.surface.points[:, :2].T)
+    assert -moved.min() == pytest.approx(dent, rel=0.2)
 
 
-def test_failed_candidates_are_drawn_as_failed(tmp_path, solved):
+def test_failed_candidates_are_shown_as_failed(tmp_path, solved):
     scene, results = solved
     path = write(tmp_path / "half.hdf", scene, {row: results[row] for row in (0, 1)})
-    with open_result(path) as result, pictures.style():
+    with open_result(path) as result:
         data = Data(result)
-        bars = window_picture(data, data.best)
-        assert "1 of 2 grasps have one" in bars.alt
-        assert "nonlinear shell: 1)" in level_picture(data, data.best).caption
-        assert bars.content.count(b"<pattern") == 1  # the hatch of the station that failed
-        assert wall_words.window_text(data, (1, 0, 0)) == "–"
-        assert "the wall gave way" in cases.failures(data)
+        (bars,) = [t for t in maps.safe_forces(data, data.best)["figure"].data if t.type == "bar"]
+        level = maps.levels(data, data.best)["figure"].data[0]
+        assert np.isfinite(np.array(bars.y, float)).tolist() == [True, False]
+        assert np.ravel(level.z).tolist() == [2.0, None]
+        assert verdict.safe_range(data, (1, 0, 0)) == "–"
+        (table,) = tables.failures(data)
+        assert table["rows"][0][:2] == ["2", "the wall gave way"]
 
 
 def test_forced_levels_are_told_as_the_scene_says(tmp_path, can):
     with open_result(changed(can, tmp_path, "effects/object_reason", 1)) as result:
-        assert "one level of the object for every candidate: nonlinear shell" in rule(Data(result))
+        assert "one level of the object for every candidate: nonlinear shell" in tables.effects(Data(result))[1]["text"]
         assert read_scene(result.scene).object.wall is not None

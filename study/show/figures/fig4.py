@@ -9,10 +9,10 @@ import numpy as np
 
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
-from softjaw.study.show.figures import WIDTH, rendering
+from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene
-from softjaw.study.show.view.colours import FORCE, NEUTRAL, PAD, table
-from softjaw.study.show.view.model import View
+from softjaw.study.show.view import solids
+from softjaw.study.show.view.model import NEUTRAL, View
 from softjaw.study.show.view.pads import Pad, pads
 
 RATIO = 0.6  # b/a of the contact that is drawn
@@ -41,8 +41,8 @@ def contact(data: Data) -> tuple[Any, str]:
          lambda plotter: _close(plotter, pad, top), 0.9 * out + 0.5 * beside + 0.15 * along),
     )  # fmt: skip
     for panel, letter, (title, draw, towards) in zip(axes[0], "ab", parts, strict=True):
-        rendering.placed(panel, rendering.rendered(draw, towards, out, (1500, 900)), f"({letter}) {title}")
-    rendering.scale(drawn, axes, "contact pressure [kPa]", pictures.COLOURS["pressure"], (0, top))
+        pictures.placed(panel, solids.rendered(draw, towards, out, (1500, 900)), f"({letter}) {title}")
+    pictures.scale(drawn, axes, "contact pressure [kPa]", pictures.COLOURS["pressure"], (0, top))
     tilt = np.degrees(np.arccos(np.clip(pad.normal[pad.loaded] @ pad.approach, -1, 1))).max()
     lost = number(100 * data.at("f_y_overestimate", index), 2)
     return drawn, (
@@ -52,18 +52,15 @@ def contact(data: Data) -> tuple[Any, str]:
 
 
 def _whole(plotter: Any, view: View, pad: Pad, top: float) -> None:
-    points, triangles = view.object.surface()
-    rendering.surface(plotter, 1e3 * points, triangles, NEUTRAL)
-    rendering.block(plotter, pad, PAD)
-    rendering.pressures(plotter, pad, table("pressure"), top, show_edges=False)
+    solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
+    solids.block(plotter, pad)
+    solids.pressures(plotter, pad, top)
 
 
 def _close(plotter: Any, pad: Pad, top: float) -> None:
-    free = pad.quads()[~pad.loaded.ravel()]
-    rendering.faces(plotter, 1e3 * free, np.zeros(len(free)), [FREE], 1.0, show_edges=False)
-    rendering.pressures(plotter, pad, table("pressure"), top)
-    places, forces = _fewer(pad).arrows("turn")
-    rendering.arrows(plotter, 1e3 * (places - 2 * pad.lift * pad.approach), forces, LONGEST, FORCE)
+    solids.faces(plotter, 1e3 * pad.quads()[~pad.loaded.ravel()], color=FREE)
+    solids.pressures(plotter, pad, top, show_edges=True)
+    solids.friction(plotter, _fewer(pad), "turn", LONGEST)
 
 
 def _fewer(pad: Pad) -> Pad:

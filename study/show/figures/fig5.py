@@ -9,10 +9,10 @@ import numpy as np
 from softjaw.study.case.stored_surface import StoredSurface, circle, stored_surface
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
-from softjaw.study.show.figures import JOBS, WIDTH, rendering
+from softjaw.study.show.figures import JOBS, WIDTH
 from softjaw.study.show.outline import read_scene, shape_outline
-from softjaw.study.show.view.colours import FORCE, NEUTRAL, PAD, table
-from softjaw.study.show.view.model import View
+from softjaw.study.show.view import solids
+from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad, pads
 
 MAP = "bottle"  # the scene whose candidates are shown
@@ -33,17 +33,16 @@ def candidates(data: Data) -> tuple[Any, str]:
     marks, up = candidate_marks(), np.array([0.0, 0.0, 1.0])
 
     def whole(plotter: Any) -> None:
-        corners = 1e3 * view.surface[0][..., :3]
-        rendering.surface(plotter, corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), NEUTRAL)
-        rendering.dots(plotter, 1e3 * marks, MARK, FORCE)
+        solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
+        solids.dots(plotter, 1e3 * marks, MARK, color=FORCE)
         for one in both:
-            rendering.block(plotter, one, PAD)
-            rendering.pressures(plotter, one, table("pressure"), top, show_edges=False)
+            solids.block(plotter, one)
+            solids.pressures(plotter, one, top)
 
     drawn, axes = pictures.figure(WIDTH, 3.5, 1, 2, width_ratios=[1, 1.7])
     seen = -0.5 * pad.approach + 0.85 * np.cross(up, pad.approach) + 0.2 * up
-    rendering.placed(
-        axes[0, 0], rendering.rendered(whole, seen, up, (1100, 1300)), f"(a) {len(marks) // 2} candidates, one grasp"
+    pictures.placed(
+        axes[0, 0], solids.rendered(whole, seen, up, (1100, 1300)), f"(a) {len(marks) // 2} candidates, one grasp"
     )
     mapped = _front(axes[0, 1], pad, top)
     name = f"station {number(1e3 * data.axes[-3].values[0])} mm, {number(data.forces[index[-1]])} N"

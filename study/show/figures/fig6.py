@@ -10,8 +10,9 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.case.stored_surface import StoredSurface, stored_surface
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
-from softjaw.study.show.figures import WIDTH, rendering
+from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.tables.ranking import nearest
+from softjaw.study.show.view import solids
 
 MOTIONS = 250  # slip motions whose wrenches are drawn, and their opposites
 SUPPORTS = 8000  # planes that bound the exact body
@@ -34,12 +35,12 @@ def fitted_surfaces(data: Data) -> tuple[Any, str]:
     drawn, axes = pictures.figure(WIDTH, 3.9, 1, 2)
     words = []
     for panel, (name, shape), letter in zip(axes[0], shapes.items(), "ab", strict=True):
-        image = rendering.rendered(lambda plotter, n=name, s=shape: _body(plotter, found, s, errors[n], top),
+        image = solids.rendered(lambda plotter, n=name, s=shape: _body(plotter, found, s, errors[n], top),
                                    (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))  # fmt: skip
         mean, most = number(100 * data.at(name, index), 2), number(errors[name].max(), 2)
-        rendering.placed(panel, image, f"({letter}) {FITS[name][0]}: {mean} % off on average")
+        pictures.placed(panel, image, f"({letter}) {FITS[name][0]}: {mean} % off on average")
         words.append(f"{FITS[name][0]}: mean {mean} % over motions, largest {most} %")
-    rendering.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
+    pictures.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
     return drawn, "; ".join(words)
 
 
@@ -67,10 +68,10 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
     grid, e = (u * shape.radius(u * most)[:, None]).reshape(ROWS, COLUMNS, 3), error.reshape(ROWS, COLUMNS)
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     middle = 0.25 * (e[:-1, :-1] + e[1:, :-1] + e[1:, 1:] + e[:-1, 1:])
-    rendering.faces(plotter, corners, middle.ravel(), ERRORS, top, show_edges=False)
-    rendering.dots(plotter, found.samples(MOTIONS) / most, 0.012, "white")
-    rendering.lines(plotter, np.stack([np.eye(3), 1.25 * np.eye(3)], axis=1), pictures.INK, 3)
-    rendering.labels(plotter, 1.33 * np.eye(3), ["f_x", "f_y", "tau_z"])
+    solids.faces(plotter, corners, middle.ravel(), cmap=ERRORS, clim=(0, top))
+    solids.dots(plotter, found.samples(MOTIONS) / most, 0.012, color="white")
+    solids.lines(plotter, np.stack([np.eye(3), 1.25 * np.eye(3)], axis=1), pictures.INK, 3)
+    solids.labels(plotter, 1.33 * np.eye(3), ["f_x", "f_y", "tau_z"])
 
 
 def misfit_along(data: Data) -> tuple[Any, str]:

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.result.grid import NOBODY
 from softjaw.study.show import pictures
 from softjaw.study.show.data import WIDE, Data, number
-from softjaw.study.show.figures import WIDTH, rendering
+from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene, shape_outline
 from softjaw.study.show.tables.ranking import largest
-from softjaw.study.show.view.colours import table
+from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View
-from softjaw.study.show.view.surface import NOBODY
 
 QUANTITIES = {"e_n": "e_n [mm]", "quality": "grasp quality [-]"}
 
@@ -24,24 +24,23 @@ def maps(*objects: Data) -> tuple[Any, str]:
     for data, pair in zip(objects, axes.reshape(len(objects), -1), strict=True):
         for panel, (name, label) in zip(pair, QUANTITIES.items(), strict=True):
             image, limits = _map(data, name)
-            rendering.placed(panel, image, f"{data.title}, {number(data.forces[data.k])} N")
-            rendering.scale(drawn, panel, label, pictures.COLOURS[name], limits)
+            pictures.placed(panel, image, f"{data.title}, {number(data.forces[data.k])} N")
+            pictures.scale(drawn, panel, label, pictures.COLOURS[name], limits)
     return drawn, "; ".join(best_and_widest(data) for data in objects)
 
 
 def _map(data: Data, name: str) -> tuple[np.ndarray, tuple[float, float]]:
     """The deformed object in the colours of a map, and the limits of these [mm for lengths]."""
     view, index = View(data, ()), (0, 0, data.k)
-    corners, cell = view.surface
+    corners, cell = view.surface.triangles, view.surface.candidate
     values = data.units(name)[2] * view.over_candidates(data.map(name), data.k)
     limits = pictures.span(values)
     shown = np.where(cell == NOBODY, np.nan, values[cell])
-    placed = np.concatenate([1e3 * view.moved(index), corners[..., 3:]], axis=-1)
 
     def draw(plotter: Any) -> None:
-        rendering.cells(plotter, placed, shown, table(name), limits)
+        solids.surface(plotter, 1e3 * view.moved(index), corners, shown, cmap=pictures.COLOURS[name], clim=limits)
 
-    return rendering.rendered(draw, (0.8, 0.6, 0.25), (0, 0, 1), (900, 1300)), limits
+    return solids.rendered(draw, (0.8, 0.6, 0.25), (0, 0, 1), (900, 1300)), limits
 
 
 def best_and_widest(data: Data) -> str:

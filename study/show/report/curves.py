@@ -1,96 +1,255 @@
-"""Curves of a report: the three friction models side by side over the force, the stations or a sweep."""
+"""Curves of a report: friction models over force, stations and sweeps; what curvature costs; how a wall gives way."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
-from softjaw.study.show import pictures
-from softjaw.study.show.data import Data, shown
-from softjaw.study.show.report.page import Picture
+from softjaw.study.result.grid_surface import undeformed
+from softjaw.study.result.layout import DONE
+from softjaw.study.show import plots
+from softjaw.study.show.data import Data, number, shown
+from softjaw.study.show.outline import swept_object
+from softjaw.study.show.page import Block, heading, label, plot
+from softjaw.study.show.view.model import View
 
-# map, text of the panel, unit, factor from SI; "F" divides by the normal force
+# map, title, factor from SI; "F" divides by the normal force
 PANELS = (
     ("e_n", "eccentricity parameter e_n [mm]", 1e3),
     ("quality", "grasp quality [-]", 1.0),
+    ("tau_z_max", "max tau_z [N mm]", 1e3),
     ("f_x_max", "max f_x / F, along the pad [-]", "F"),
     ("f_y_max", "max f_y / F, across the pad [-]", "F"),
-    ("tau_z_max", "max tau_z [N mm]", 1e3),
     ("travel", "travel of the pads [mm]", 1e3),
 )
-Limits = dict[str, tuple[float, float]]
+COMPONENTS = {
+    "f_x": ("along, f_x", "#12436d", "circle"),
+    "f_y": ("across, f_y", "#c05a00", "square"),
+    "tau_z": ("torque, tau_z", "#2a8c82", "triangle-up"),
+}
+AGAINST = {"flat": "against PCM, scaled by S", "projected": "against PCM, scaled by F_N"}
+MOST_LINES, FEWEST = 40, 4
 
 
-def _along(data: Data, name: str, model: str, position: int, index: tuple[int, ...], factor: Any) -> np.ndarray | None:
-    found = data.map(name, model)
-    if found is None:
-        return None
-    cut = tuple(slice(None) if i == position else k for i, k in enumerate(index))
-    scale = factor if factor != "F" else 1.0 / (data.forces if position == len(index) - 1 else data.forces[index[-1]])
-    return found[cut] * scale
+def along(position: int, index: tuple[int, ...]) -> tuple[Any, ...]:
+    """Cut through an array over all cases along one axis, the others at ``index``."""
+    return tuple(slice(None) if i == position else k for i, k in enumerate(index))
 
 
-def _lines(data: Data, name: str, position: int, index: tuple[int, ...], factor: Any) -> dict[str, np.ndarray]:
-    models = ("",) if name == "travel" else MODELS
-    found = {model: _along(data, name, model, position, index, factor) for model in models}
-    return {model: line for model, line in found.items() if line is not None}
-
-
-def _bars(data: Data, name: str, position: int, index: tuple[int, ...], factor: Any) -> list[np.ndarray]:
-    """Lower and upper ends of the curved model's error bars; nothing where the file has no errors."""
-    value, error = _along(data, name, "curved", position, index, factor), data.map(f"{name}_error")
-    if value is None or error is None:
-        return []
-    half = value * error[tuple(slice(None) if i == position else k for i, k in enumerate(index))]
-    return [value - half, value + half]
-
-
-def limits(data: Data, position: int, *cases: tuple[int, ...]) -> Limits:
-    """Common range of each panel for several cases, so that their pictures can be compared."""
-    found = {}
-    for name, _, factor in PANELS:
-        lines = [line for index in cases for line in _lines(data, name, position, index, factor).values()]
-        lines += [end for index in cases for end in _bars(data, name, position, index, factor)]
-        low, high = pictures.span(np.concatenate(lines) if lines else np.empty(0))
-        room = 0.08 * (high - low)
-        found[name] = (low - room, high + room)
+def models(data: Data, best: tuple[int, ...], mu: float | None) -> list[Block]:
+    """Curves over the force for the best case and one other, and over every axis that is worth it for the best."""
+    force, (other, why) = len(best) - 1, data.other
+    found = []
+    for index, role in [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]:
+        found += [heading(f"{role}, over the force: {data.place(index)}"), _models(data, force, index, mu)]
+    for position in worth_a_curve(data):
+        name = data.name(data.axes[position])
+        found += [heading(f"Over the {name}, all else as in the best case"), _models(data, position, best, mu)]
     return found
 
 
-def model_curves(data: Data, position: int, index: tuple[int, ...], mu: float | None, common: Limits) -> Picture:
-    """Six quantities over one axis at one case, for the curved, flat and projected model."""
-    axis = data.axes[position]
-    x = axis.values * shown(axis.units)[1]
-    drawn, axes = pictures.figure(10, 5.2, 2, 3, gap=0.16, sharex=True)
-    ruled = ""
-    for panel, (name, text, factor) in zip(axes.flat, PANELS, strict=True):
-        panel.set_title(text)
-        lines = _lines(data, name, position, index, factor)
-        lines = {model: line for model, line in lines.items() if np.isfinite(line).any()}
-        if not lines:
-            panel.text(0.5, 0.5, "no values", transform=panel.transAxes, ha="center", color=pictures.SOFT)
-            continue
-        panel.set_ylim(common[name])
-        styles = {**pictures.MODEL_STYLE, "": {"color": pictures.INK, "marker": "o"}}
-        styles = {m: {**s, "marker": s["marker"] if len(x) <= 16 else ""} for m, s in styles.items()}
-        if bars := _bars(data, name, position, index, factor):
-            colour = pictures.MODEL_STYLE["curved"]["color"]
-            panel.vlines(x, *bars, color=colour, lw=1)
-        if factor == "F" and mu is not None and common[name][0] < mu < common[name][1]:
-            panel.axhline(mu, color=pictures.SOFT, lw=0.8, zorder=1)
-            ruled = f" The grey lines are mu = {mu:g}."
-        pictures.curves(panel, x, lines, styles)
-    for panel in axes[-1]:
-        if texts := data.texts(axis):
-            panel.set_xticks(x, texts)
-        panel.set_xlabel("normal force per finger [N]" if position == len(index) - 1 else data.axis_label(axis))
+def worth_a_curve(data: Data) -> list[int]:
+    """Axes of enough values to be drawn as curves: the sweeps, and stations that lie along an object."""
+    station = len(data.shape) - 3
+    stations = [station] if data.shape[station] >= FEWEST and not data.by_poses else []
+    return [p for p in range(station) if data.shape[p] > 1] + stations
+
+
+def _models(data: Data, position: int, index: tuple[int, ...], mu: float | None) -> Block:
+    """Six quantities in all friction models along one axis."""
+    made = plots.figure(2, 3, [title for _, title, _ in PANELS], vertical_spacing=0.16, horizontal_spacing=0.07)
+    x, settings = abscissa(data, position)
+    cut = along(position, index)
+    forces = data.forces if position == len(index) - 1 else data.forces[index[-1]]
+    for k, (name, _, factor) in enumerate(PANELS):
+        row, column = k // 3 + 1, k % 3 + 1
+        scale = 1 / forces if factor == "F" else factor
+        by_model = {m: found[cut] * scale for m in (MODELS if name != "travel" else ("curved",))
+                    if (found := data.map(name, m)) is not None}  # fmt: skip
+        error = data.map(f"{name}_error")
+        bars = None if error is None or "curved" not in by_model else by_model["curved"] * error[cut]
+        plots.lines(made, x, by_model, row, column, bars)
+        if factor == "F" and mu is not None:
+            made.add_hline(mu, line={"color": plots.SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
+    made.update_xaxes(**settings, row=2)
     bars = " Bars: difference to a mesh half as fine." if data.map("e_n_error") is not None else ""
-    where = data.place(index) if position == len(index) - 1 else data.place(index, force=True)
-    own = (f"{data.name(axis)} ", f"{data.name(axis)}\u00a0")
-    fixed = ", ".join(words for words in where.split(", ") if not words.startswith(own))
-    caption = f"{fixed[:1].upper()}{fixed[1:]}. F is the normal force of one finger.{ruled}{bars}"
-    what = "e_n, quality, largest friction forces, torque and travel"
-    alt = f"Curves of {what} over {data.name(axis)} for three friction models, {fixed}."
-    return Picture(pictures.as_svg(drawn), alt, caption)
+    rule = f" Dashed grey: mu = {mu:g}." if mu is not None else ""
+    place = data.place(index, force=position != len(index) - 1)
+    caption = f"{place[:1].upper()}{place[1:]}; F is the normal force of one finger.{rule}{bars}"
+    alt = f"Six quantities over {data.name(data.axes[position])} for three friction models; {place}."
+    return plot(made, caption, alt, 560)
+
+
+def abscissa(data: Data, position: int) -> tuple[Any, dict[str, Any]]:
+    """Values of an axis, and its settings in a figure."""
+    axis = data.axes[position]
+    title = "normal force per finger [N]" if position == len(data.axes) - 1 else data.axis_label(axis)
+    if texts := data.texts(axis):
+        return [label(t) for t in texts], {"title_text": title, "type": "category"}
+    return axis.values * shown(axis.units)[1], {"title_text": title}
+
+
+def fit_error(data: Data, position: int, index: tuple[int, ...]) -> Block | None:
+    """Fit error of both limit surfaces along one axis; None where it is not stored."""
+    found = {"fitted surface": data.map("misfit"), "ellipsoid from three motions": data.map("misfit_ellipsoid")}
+    lines = {name: 100 * values[along(position, index)] for name, values in found.items() if values is not None}
+    if not any(np.isfinite(line).sum() > 1 for line in lines.values()):
+        return None
+    made = plots.figure()
+    x, settings = abscissa(data, position)
+    for (name, line), dash in zip(lines.items(), ("solid", "dash"), strict=False):
+        made.add_scatter(x=x, y=line, name=name, mode="lines+markers", line={"color": "#12436d", "dash": dash})
+    made.update_xaxes(**settings).update_yaxes(title_text="fit error [%]", rangemode="tozero")
+    caption = (
+        "Mean error of the limit surface's radius, CCM, weaker fit of both fingers, on motions that no surface was"
+        " fitted to."
+    )
+    return plot(made, caption, f"Fit error of the limit surfaces over {data.name(data.axes[position])}", 300)
+
+
+# --- what curvature costs --------------------------------------------------------------------------------------------
+
+
+def differences(data: Data, scene: Any, index: tuple[int, ...]) -> list[Block]:
+    """Share of the planar models' claims that the curved contact cannot carry, along a sweep of the object's shape."""
+    position = shape_axis(data, scene)
+    lines = {} if position is None else overestimates(data, position, index)
+    if position is None or not lines:
+        return []
+    found = abscissas(data, scene, position, index)
+    return [_differences(data, name, x, lines, index) for name, x in found.items() if np.isfinite(x).any()]
+
+
+def shape_axis(data: Data, scene: Any) -> int | None:
+    """The longest axis that sweeps a number of the object; any numbered sweep where the scene cannot be read."""
+    keys = list(scene.sweep) if scene else []
+    known = [p for p in range(len(data.shape) - 3) if data.shape[p] > 1]
+    known = [p for p in known if p >= len(keys) or (keys[p].startswith("object.") and data.axes[p].units)]
+    return max(known, key=lambda p: data.shape[p], default=None)
+
+
+def overestimates(data: Data, position: int, index: tuple[int, ...]) -> dict[tuple[str, str], Any]:
+    """Overestimate of each planar model and component along an axis [-], and its error or None."""
+    found, cut = {}, along(position, index)
+    for model, suffix in (("flat", ""), ("projected", "_projected")):
+        for key in COMPONENTS:
+            values, error = (data.map(f"{key}_overestimate{suffix}{end}") for end in ("", "_error"))
+            if values is not None and np.isfinite(values[cut]).any():
+                found[model, key] = (values[cut], None if error is None else error[cut])
+    return found
+
+
+def abscissas(data: Data, scene: Any, position: int, index: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """What differences are drawn over: shape and curvature of an ellipse, or else the swept value itself."""
+    points = [(*index[:position], i, *index[position + 1 :]) for i in range(data.shape[position])]
+    ellipses = [_ellipse(data, scene, point) for point in points]
+    if all(ellipses):
+        a, b = np.array(ellipses, float).T
+        return {
+            "a / b, semi-axis along the approach over that across it [-]": a / b,
+            "curvature at the apex, a / b² [1/m]": a / b**2,
+        }
+    axis = data.axes[position]
+    return {data.axis_label(axis): axis.values * shown(axis.units)[1]}
+
+
+def _ellipse(data: Data, scene: Any, index: tuple[int, ...]) -> tuple[float, float] | None:
+    """Semi-axes along and across the approach [m] of an elliptic cylinder pressed along one of them."""
+    shape = swept_object(scene, index) if scene else None
+    if getattr(shape, "shape", "") != "elliptic_cylinder" or data.by_poses:
+        return None
+    turns = float(data.axes[-2].values[index[-2]]) / (0.5 * math.pi)
+    if abs(turns - round(turns)) > 1e-6:
+        return None
+    both = (shape.semi_axis_a, shape.semi_axis_b)
+    return both if round(turns) % 2 == 0 else both[::-1]
+
+
+def _differences(data: Data, name: str, x: np.ndarray, lines: dict[Any, Any], index: tuple[int, ...]) -> Block:
+    shown_models = [m for m in AGAINST if any(model == m for model, _ in lines)]
+    made = plots.figure(1, len(shown_models), [AGAINST[m] for m in shown_models])
+    order = np.argsort(x)
+    for (model, key), (values, error) in lines.items():
+        text, colour, symbol = COMPONENTS[key]
+        column = shown_models.index(model) + 1
+        bars = None if error is None else {"array": 100 * np.abs(np.nan_to_num(error))[order], "thickness": 1}
+        made.add_scatter(x=x[order], y=100 * values[order], error_y=bars, name=text, legendgroup=key, row=1, col=column,
+                         mode="lines+markers", line={"color": colour}, marker={"symbol": symbol, "size": 6},
+                         showlegend=column == 1)  # fmt: skip
+    made.update_xaxes(title_text=label(name)).update_yaxes(title_text="1 - CCM / PCM [%]")
+    made.update_layout(legend={"y": -0.25})
+    bars = " Bars: difference to a mesh half as fine." if any(e is not None for _, e in lines.values()) else ""
+    lost = int(np.sum(data.status[..., index[-1]] != DONE))
+    gaps = f" {lost} cases at this force have no value." if lost else ""
+    caption = (
+        f"At {number(data.forces[index[-1]])} N: the share of the planar model's claim that the curved contact cannot"
+        f" carry.{bars}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
+    )
+    ends = {key: [number(100 * f(v), 2) for f in (np.nanmin, np.nanmax)] for key, (v, _) in lines.items()}
+    said = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
+    return plot(made, caption, f"Differences of PCM and CCM over {name}. {said}.", 400)
+
+
+# --- a thin wall -----------------------------------------------------------------------------------------------------
+
+
+def wall_curves(data: Data, index: tuple[int, ...], allowed: float | None) -> Block | None:
+    """Normal force over travel and over the dent of the stations; ``allowed`` is the dent that the scene allows [m]."""
+    travel, dent = data.map("travel"), data.map("dent")
+    if dent is None or travel is None or len(data.forces) < 2:
+        return None
+    cut = (*index[:-3], slice(None), index[-2], slice(None))
+    snapped = (data.flags & Flag.SNAPPED > 0)[cut]
+    made = plots.figure(1, 2, ("travel of the pads [mm]", "dent [mm]"), shared_yaxes=True)
+    others = [i for i in range(data.shape[-3]) if i != index[-3]]
+    for i in (*others[:: -(-len(others) // MOST_LINES) or 1], index[-3]):
+        own = i == index[-3]
+        place = data.place((*index[:-3], i, *index[-2:]))
+        look = {"color": "#12436d" if own else "#aeb6bc", "width": 2.5 if own else 1}
+        symbols = ["circle", *np.where(snapped[i], "diamond-open", "circle")]
+        for column, found in enumerate((travel, dent), start=1):
+            made.add_scatter(x=[0, *1e3 * found[cut][i]], y=[0, *data.forces], mode="lines+markers", line=look,
+                             marker={"symbol": symbols, "size": 6}, name=label(place), showlegend=False,
+                             connectgaps=False, row=1, col=column)  # fmt: skip
+    if allowed is not None:
+        made.add_vline(1e3 * allowed, line={"color": "#c05a00", "dash": "dash"}, row=1, col=2)
+    made.update_yaxes(title_text="normal force [N]", col=1)
+    rule = f" Dashed: the allowed dent, {1e3 * allowed:g} mm." if allowed is not None else ""
+    caption = (
+        f"Dark: {data.place(index)}; grey: other candidates. A wall that softens bends its line to the right; open"
+        f" diamonds: the wall has snapped in on the way there.{rule}"
+    )
+    alt = f"Normal force over travel and dent; {number(1e3 * dent[index])} mm at {data.place(index, force=True)}."
+    return plot(made, caption, alt, 340)
+
+
+def wall_section(data: Data, scene: Any, index: tuple[int, ...]) -> Block | None:
+    """Sections through the outer face of a deformed wall beside the undeformed one; None where none is stored."""
+    found = View(data, index[:-3]).displacement(index)
+    if found is None:
+        return None
+    u, angle = found
+    before = undeformed(swept_object(scene, index), angle)
+    out = np.array([math.cos(angle), math.sin(angle), 0.0])
+    beside = np.array([-out[1], out[0], 0.0])
+    height = data.values("fingers/pose_origin")[index][0][2]
+    j = int(np.abs(before[0, :, 2] - height).argmin())
+    made = plots.figure(1, 2, ("along the axis, through both fingers", f"across it at {1e3 * before[0, j, 2]:.4g} mm"))
+    half = len(before) // 2
+    for place, name, dash in ((before, "undeformed", "dash"), (before + u, "deformed", "solid")):
+        look = {"color": plots.SOFT if dash == "dash" else "#12436d", "dash": dash}
+        upright = np.concatenate([place[half, ::-1], place[0]])
+        ring = np.concatenate([place[:, j], place[:1, j]])
+        for column, (x, y) in enumerate(((upright[:, 2], upright @ out), (ring @ beside, ring @ out)), start=1):
+            made.add_scatter(x=1e3 * x, y=1e3 * y, mode="lines", line=look, name=name, showlegend=column == 1, row=1,
+                             col=column)  # fmt: skip
+    made.update_yaxes(title_text="along the approach [mm]", col=1)
+    made.update_yaxes(scaleanchor="x", row=1, col=1).update_yaxes(scaleanchor="x2", row=1, col=2)
+    made.update_xaxes(title_text="along the axis [mm]", col=1).update_xaxes(title_text="beside it [mm]", col=2)
+    dent = number(1e3 * data.at("dent", index))
+    caption = f"{data.place(index, force=True)}: dent {dent} mm. True to scale, nothing is exaggerated."
+    return plot(made, caption, f"Sections through the deformed wall; dent {dent} mm.", 420)

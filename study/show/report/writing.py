@@ -1,8 +1,7 @@
 """One self-contained page about a result file, and a picture of its maps or curves: for mails, slides, printing.
 
-The page answers in the order of a reader's questions: where to grasp and how sure that is, the object and its maps,
-what failed and why, the best case in detail, then how it was computed. It needs no network, and its one script only
-tells the values of the maps' cells.
+The page answers in the order of a reader's questions: where to grasp, how wide and how hard, and how sure that is; the
+object and its maps; what failed and why; the best case in detail; then how it was computed. It needs no network.
 """
 
 from __future__ import annotations
@@ -11,35 +10,20 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.result.grid_surface import edges
+from softjaw.study.result.layout import FAILED
 from softjaw.study.result.store import open_result
 from softjaw.study.show import pictures
-from softjaw.study.show.data import Data
-from softjaw.study.show.outline import read_scene
-from softjaw.study.show.report import (
-    background,
-    cases,
-    cost,
-    curvature,
-    curves,
-    levels,
-    object_view,
-    wall_curves,
-    wall_shape,
-    wall_words,
-    window,
-    words,
-)
-from softjaw.study.show.report import maps as report_maps
-from softjaw.study.show.report import patch as report_patch
-from softjaw.study.show.report import side as report_side
-from softjaw.study.show.report import surface as report_surface
-from softjaw.study.show.report.angle_maps import angle_maps
-from softjaw.study.show.report.page import Picture, heading, page, paragraph, picture
-from softjaw.study.show.view.model import view_of
+from softjaw.study.show.data import Data, number, shown
+from softjaw.study.show.outline import read_scene, swept_object
+from softjaw.study.show.page import Block, Section, box, heading, page, text
+from softjaw.study.show.page import answer as answer_block
+from softjaw.study.show.report import curves, maps, tables, verdict
 from softjaw.study.writing import write_file
 
-Sections = list[tuple[str, str, str]]
 Place = tuple[float | None, float | None]
 
 
@@ -58,123 +42,155 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
     picture_path = out.with_suffix(".png")
     if file.resolve() in (out.resolve(), picture_path.resolve()) or out == picture_path:
         raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
-    with open_result(file) as result, pictures.style():
+    with open_result(file) as result:
         html, png = build(result, candidate, place)
     return [write_file(out, html), write_file(picture_path, png)]
 
 
 def build(result: Any, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
     """The page and the picture of an open result file."""
+    from softjaw.study.show.view.model import view_of
+
     data, scene = Data(result), read_scene(result.scene)
     if candidate is not None or place != (None, None):
         data.chosen = view_of(data, candidate, place, None)[1]
-    mu = scene.friction.mu if scene else None
     best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
-    maps, png = report_maps.force_maps(data, best)
-    sections: Sections = [
-        ("verdict", "", words.verdict(data, mu) + words.chosen(data) + words.best_tables(data)),
-        ("object", "The object", object_view.object_section(data, best) + _side(data, scene, best)),
-        ("maps", "Maps", maps_section(data, best, maps)),
-    ]
-    if data.best is not None and data.map("dent") is not None:
-        sections.append(("wall", "What the wall bears", wall_section(data, scene, data.best)))
-    if differences := curvature.difference_pictures(data, scene, best):
-        sections.append(("curvature", "What curvature costs", _pictures(shown for shown, _ in differences)))
-        png = differences[0][1]  # what a sweep of the shape was made for
-    if data.best is not None:
-        sections += case_sections(data, data.best, mu)
-    sections += [
-        ("effects", "What was simulated", effects(data, best)),
-        ("cost", "Convergence and cost", cost_section(data, best)),
-        ("definitions", "Definitions", background.definitions(data)),
-        ("provenance", "Provenance", background.provenance(data)),
-        ("scene", "Scene in effect", background.scene_text(data)),
-    ]
+    sections: list[Section] = [
+        ("verdict", "", answer(data, scene)),
+        ("object", "The object", the_object(data, best)),
+        ("maps", "Maps", (maps.maps(data, best) if data.status.size > 1 else []) + tables.failures(data)),
+        ("wall", "What the wall bears", wall(data, scene)),
+        ("curvature", "What curvature costs", curves.differences(data, scene, best)),
+        *(cases(data, scene, data.best) if data.best is not None else []),
+        ("effects", "What was simulated",
+         [*tables.effects(data), *_there(maps.levels(data, best)), text(verdict.CAVEAT, "note")]),
+        ("cost", "Convergence and cost",
+         [*tables.states(data), tables.checks(data), *_there(maps.effort(data, best)), *tables.time_split(data)]),
+        ("cases", "All cases", tables.every_case(data)),
+        ("definitions", "Definitions", tables.definitions(data)),
+        ("provenance", "Provenance", tables.provenance(data)),
+        ("scene", "Scene in effect", tables.scene(data)),
+    ]  # fmt: skip
     title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
-    return page(title, words.subtitle(data), [s for s in sections if s[2]]), png
+    return page(title, verdict.subtitle(data), sections), picture(data, scene, best)
 
 
-def _side(data: Data, scene: Any, best: tuple[int, ...]) -> str:
-    return _pictures([report_side.side_view(data, scene, best)])
+def _there(*blocks: Block | None) -> Iterable[Block]:
+    return (block for block in blocks if block is not None)
 
 
-def maps_section(data: Data, best: tuple[int, ...], maps: Picture) -> str:
-    """Maps over force and angle, why cases failed, and every case."""
-    if data.status.size == 1:
-        return cases.failures(data)
-    how = paragraph(report_maps.POINT, "note screen") if cases.listed(data) else ""
-    html = how + picture(maps) + angle_maps(data, best)
-    return html + cases.failures(data) + cases.every_case(data)
+def answer(data: Data, scene: Any) -> list[Block]:
+    """The best grasp at a glance, in sentences, what stands against it, and the tables of the best grasps."""
+    found = [answer_block(verdict.key_values(data))] if data.best is not None else []
+    found.append(box(verdict.verdict(data, scene.friction.mu if scene else None), "verdict"))
+    if warnings := verdict.warnings(data):
+        found.append(box(warnings, "warn"))
+    if said := verdict.chosen(data):
+        found.append(box([said], "verdict"))
+    if meaning := verdict.meaning(data):
+        found.append(text(meaning, "note"))
+    return found + tables.best_grasps(data)
 
 
-def case_sections(data: Data, best: tuple[int, ...], mu: float | None) -> Sections:
+def the_object(data: Data, best: tuple[int, ...]) -> list[Block]:
+    """The object in three dimensions with the pads of the best and of the chosen grasp at every force."""
+    from softjaw.study.show.view.model import View
+    from softjaw.study.show.view.object3d import object_block
+
+    view = View(data, best[:-3])
+    cases = [(*i[:-1], k) for i in (best, data.chosen) if i and i[:-3] == best[:-3] for k in range(len(data.forces))]
+    if block := object_block(view, best, data.score, "x", list(dict.fromkeys(cases))):
+        return [block]
+    return [text(f"{view.note[:1].upper()}{view.note[1:]}.", "note")] * bool(view.note)
+
+
+def wall(data: Data, scene: Any) -> list[Block]:
+    """Limits, safe forces, shape and force curves of a thin wall; empty without one."""
+    best = data.best
+    if best is None or data.map("dent") is None:
+        return []
+    shape = swept_object(scene, best) if scene else None
+    allowed = getattr(shape, "allowed_dent", None)
+    shown_blocks = _there(maps.safe_forces(data, best), curves.wall_section(data, scene, best),
+                          curves.wall_curves(data, best, allowed))  # fmt: skip
+    return [*tables.wall(data, shape), *shown_blocks]
+
+
+def cases(data: Data, scene: Any, best: tuple[int, ...]) -> list[Section]:
     """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
-    found: Sections = [("models", "Friction models compared", _models(data, best, mu))]
+    from softjaw.study.show.report import contact
+    from softjaw.study.show.view.model import View
+
     roles = [("Best case", best)]
     if data.chosen is not None and data.other[0] == data.chosen:
         roles.append(("Chosen candidate", data.chosen))
     which = "of the best case" if len(roles) == 1 else "of both cases"
-    patches = [(role, report_patch.patch_picture(data, index)) for role, index in roles]
-    surfaces = [(role, report_surface.surface_pictures(data, index)) for role, index in roles]
-    head = heading if len(roles) > 1 else lambda _: ""
-    if any(shown for _, shown in patches):
-        html = "".join(head(role) + _pictures([shown]) for role, shown in patches if shown)
-        found.append(("patch", f"Contact patch {which}", html))
-    html = "".join(head(role) + _pictures(shown) for role, shown in surfaces if shown) + _misfit(data, best)
-    return [*found, ("surface", f"Limit surface {which}", html)] if html else found
+    mu = scene.friction.mu if scene else None
+    patches = [(role, contact.patch(data, View(data, index[:-3]).gripper, index)) for role, index in roles]
+    surfaces = [(role, contact.limit_surfaces(data, index)) for role, index in roles]
+    over = next((p for p in [*reversed(curves.worth_a_curve(data)), len(best) - 1] if data.shape[p] > 1), None)
+    fit = [] if over is None else _there(curves.fit_error(data, over, best))
+    return [
+        ("models", "Friction models compared", curves.models(data, best, mu)),
+        ("patch", f"Contact patch {which}", _headed(patches)),
+        ("surface", f"Limit surface {which}", [*_headed(surfaces), *fit]),
+    ]
 
 
-def cost_section(data: Data, best: tuple[int, ...]) -> str:
-    """States, checks, effort and time."""
-    shown = _pictures([cost.cost_picture(data, best)])
-    return cases.states(data) + cases.checks(data) + shown + background.time_split(data)
+def _headed(found: list[tuple[str, Block | None]]) -> list[Block]:
+    known = [(role, block) for role, block in found if block is not None]
+    return [part for role, block in known for part in ([heading(role), block] if len(found) > 1 else [block])]
 
 
-def _pictures(shown: Iterable[Picture | None]) -> str:
-    return "".join(picture(p) for p in shown if p)
+def picture(data: Data, scene: Any, index: tuple[int, ...]) -> bytes:
+    """PNG for mails and slides: maps of quality and e_n over the force, or differences over a sweep of the shape."""
+    with pictures.style():
+        position = curves.shape_axis(data, scene)
+        lines = {} if position is None else curves.overestimates(data, position, index)
+        if position is not None and lines:
+            name, x = next(iter(curves.abscissas(data, scene, position, index).items()))
+            drawn = _differences(name, x, lines)
+        else:
+            drawn = _maps(data, index)
+        drawn.suptitle(f"{data.title}, {number(data.forces[index[-1]])} N", fontsize=10, x=0.01, ha="left")
+        return pictures.as_png(drawn)
 
 
-def wall_section(data: Data, scene: Any, best: tuple[int, ...]) -> str:
-    """Limits, window of forces, shape, maps and force curves of a thin wall."""
-    several = data.status[..., 0].size > 1
-    maps = report_maps.force_maps(data, best, report_maps.OF_WALL)[0] if several else None
-    windows = window.window_picture(data, best) if several else None
-    allowed = getattr(scene.object, "allowed_dent", None) if scene else None
-    shown = [windows, wall_shape.shape_picture(data, scene, best), maps]
-    return wall_words.wall(data, scene, best) + _pictures([*shown, wall_curves.force_curves(data, best, allowed)])
+def _differences(name: str, x: np.ndarray, lines: dict[Any, Any]) -> Any:
+    known = [m for m in curves.AGAINST if any(model == m for model, _ in lines)]
+    drawn, axes = pictures.figure(10, 3.7, 1, len(known), sharey=True)
+    order = np.argsort(x)
+    for (model, key), (values, error) in lines.items():
+        label, colour, _ = curves.COMPONENTS[key]
+        bars = None if error is None else 100 * np.abs(error)[order]
+        panel = axes[0, known.index(model)]
+        panel.errorbar(x[order], 100 * values[order], bars, color=colour, marker="o", capsize=2, label=label)
+        panel.set(title=curves.AGAINST[model], xlabel=name, ylabel="1 - CCM / PCM [%]")
+    axes[0, 0].legend(frameon=False)
+    return drawn
 
 
-def effects(data: Data, best: tuple[int, ...]) -> str:
-    """Levels of all effects, and where and why the wall's were taken."""
-    shown = levels.level_picture(data, best)
-    html = background.effects(data) + levels.rule(data) + _pictures([shown])
-    return html + paragraph(words.CAVEAT, "note")
-
-
-def _models(data: Data, best: tuple[int, ...], mu: float | None) -> str:
-    """Force curves of the best case and one other, and curves over the stations and every sweep."""
-    force, html = len(best) - 1, ""
-    other, why = data.other
-    roles = [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]
-    common = curves.limits(data, force, *(index for index, _ in roles))
-    for index, role in roles:
-        html += heading(f"{role}, over the force: {data.place(index)}")
-        html += picture(curves.model_curves(data, force, index, mu, common))
-    for position in _worth_a_curve(data):
-        own = curves.limits(data, position, best)
-        html += heading(f"Over the {data.name(data.axes[position])}, all else as in the best case")
-        html += picture(curves.model_curves(data, position, best, mu, own))
-    return html
-
-
-def _misfit(data: Data, best: tuple[int, ...]) -> str:
-    """How well limit surfaces fit along an axis of several values."""
-    over = next((p for p in [*reversed(_worth_a_curve(data)), len(best) - 1] if data.shape[p] > 1), None)
-    return "" if over is None else _pictures([report_surface.misfit_curves(data, over, best)])
-
-
-def _worth_a_curve(data: Data) -> list[int]:
-    """Axes of enough values to be drawn as curves: the sweeps, and stations that lie along an object."""
-    station = len(data.shape) - 3
-    stations = [station] if data.shape[station] >= 4 and not data.by_poses else []
-    return [p for p in range(station) if data.shape[p] > 1] + stations
+def _maps(data: Data, index: tuple[int, ...]) -> Any:
+    """Quality and e_n over the main axis and the force, one row for each angle."""
+    x, y, angle = maps.main_axis(data), len(data.shape) - 1, len(data.shape) - 2
+    rows = maps.some(maps.different_angles(data), index[angle])
+    drawn, axes = pictures.figure(10, 2.4 * len(rows) + 0.6, len(rows), 2, sharex=True, sharey=True)
+    factor = shown(data.axes[x].units)[1]
+    values = data.axes[x].values * factor
+    for column, name in enumerate(maps.FIRST):
+        words, unit, scale = data.units(name)
+        found = data.map(name)
+        z = np.full(data.shape, np.nan) if found is None else scale * found
+        low, high = pictures.span(z)
+        for row, j in enumerate(rows):
+            here, panel = (*index[:angle], j, index[-1]), axes[row, column]
+            failed = maps.plane(data.status == FAILED, x, y, here)
+            mapped = pictures.heat(panel, edges(values), np.arange(data.shape[y] + 1) - 0.5,
+                                   maps.plane(z, x, y, here), failed, cmap=pictures.COLOURS[name], vmin=low,
+                                   vmax=high)  # fmt: skip
+            panel.set_yticks(range(len(data.forces)), [number(f) for f in data.forces])
+            panel.set_title(f"angle {number(np.degrees(data.axes[angle].values[j]))}°" * (data.shape[angle] > 1))
+        pictures.colour_bar(drawn, mapped, list(axes[:, column]), f"{words} [{unit or '-'}]")
+        axes[-1, column].set_xlabel(data.axis_label(data.axes[x]))
+    axes[0, 0].set_ylabel("force per finger [N]")
+    return drawn

@@ -72,9 +72,9 @@ def view(options: Namespace) -> None:
 
             show_window(found, index, quantity, options.motion)
             return
-        from softjaw.study.show.view.page import page
+        from softjaw.study.show.view.object3d import view_page
 
-        html = page(found, index, quantity, options.motion)
+        html = view_page(found, index, quantity, options.motion)
     from softjaw.study.show.view.server import serve
 
     serve(html, options.port or 0)
@@ -107,6 +107,6 @@ def _write(name: str, path: Path, found: View, index: tuple[int, ...], quantity:
         with beside(path) as part:
             save_picture(found, index, part, quantity, motion)
         return [path]
-    from softjaw.study.show.view.page import page
+    from softjaw.study.show.view.object3d import view_page
 
-    return [write_file(path, page(found, index, quantity, motion))]
+    return [write_file(path, view_page(found, index, quantity, motion))]

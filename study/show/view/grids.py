@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.vtkhdf import write_grid
 from softjaw.study.show.view.model import View
 from softjaw.study.show.view.pads import Pad, pads
-from softjaw.study.show.view.surface import NOBODY
 
 
 def write_grids(view: View, index: tuple[int, ...], path: Path) -> list[Path]:
@@ -44,10 +44,9 @@ def _stored(view: View, index: tuple[int, ...]) -> bool:
 
 
 def _write_object(view: View, index: tuple[int, ...], path: Path) -> None:
-    corners, cell = view.surface
+    x, corners, cell = view.surface
     if not len(corners):
         raise StudyError(OTHER_FILE, f"{view.data.result.path}: {view.note or 'there is no object to write'}")
-    x, inverse = np.unique(np.round(corners[..., :3].reshape(-1, 3), 9), axis=0, return_inverse=True)
     on_cells: dict[str, np.ndarray] = {"candidate": cell}
     for k, force in enumerate(view.data.forces):
         state = view.state(k)
@@ -59,11 +58,10 @@ def _write_object(view: View, index: tuple[int, ...], path: Path) -> None:
                 on_cells[f"{q.name}, {force:g} N"] = _spread(values, cell)
     on_points = {}
     if view.displacement(index) is not None:
-        u = np.zeros_like(x)
-        u[inverse.ravel()] = (view.moved(index) - corners[..., :3]).reshape(-1, 3)
-        on_points[f"displacement, candidate {view.candidate(index)}, {view.data.forces[index[-1]]:g} N"] = u
+        name = f"displacement, candidate {view.candidate(index)}, {view.data.forces[index[-1]]:g} N"
+        on_points[name] = view.moved(index) - x
     about = f"{view.data.title}; cell data: maps of the curved model in SI units, status 0 missing, 1 done, 2 failed"
-    write_grid(path, x, inverse.reshape(-1, 3), on_cells, on_points, about=about)
+    write_grid(path, x, corners, on_cells, on_points, about=about)
 
 
 def _spread(values: np.ndarray, cell: np.ndarray) -> np.ndarray:

@@ -9,35 +9,27 @@ import numpy as np
 
 from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.grid import NOBODY, Surface
+from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.show.data import Data, number
-from softjaw.study.show.outline import read_scene, swept_object
+from softjaw.study.show.outline import read_scene
 from softjaw.study.show.tables.ranking import nearest
-from softjaw.study.show.view.surface import NOBODY, Cells, coloured, with_normals
-from softjaw.study.show.view.wall import Wall, displacement, wall_of
 
-POSE_MARK = 0.004  # radius of the balls that stand for explicit poses [m]
+NEUTRAL, OPEN, CROSSED = "#dfe3e6", "#b6bfc6", "#6d6570"  # no candidate, not computed, failed
+PAD, FORCE = "#8a9199", "#00a5bf"
 
 
 class View:
     """A result file at one point of its sweep; candidates are counted over stations and angles."""
 
     def __init__(self, data: Data, point: tuple[int, ...]) -> None:
-        self.data, self.point, self.scene = data, point, read_scene(data.result.scene)
+        self.data, self.point = data, point
+        scene = read_scene(data.result.scene)
+        self.scene = None if scene is None else scene_at(scene, point)
+        self.gripper = getattr(self.scene, "gripper", None)
         self.note = ""
-
-    @cached_property
-    def gripper(self) -> Any:
-        """The gripper at this point of the sweep; None where it cannot be told."""
-        from softjaw.study.scene.problems import SceneError
-
-        if self.scene is None or any(isinstance(v, str) for values in self.scene.sweep.values() for v in values):
-            return getattr(self.scene, "gripper", None)
-        values = {key: found[i] for (key, found), i in zip(self.scene.sweep.items(), self.point, strict=False)}
-        try:
-            return self.scene.with_values(values).gripper
-        except SceneError:
-            return None
 
     @property
     def candidates(self) -> int:
@@ -62,94 +54,72 @@ class View:
         return self.over_candidates(self.data.status, force)
 
     @cached_property
-    def object(self) -> Any:
-        """The object of this point of the sweep, as `fem` knows it; None with a note where it cannot be had."""
-        from softjaw.study.case.build import build_object
-
-        shape = swept_object(self.scene, (*self.point, 0, 0, 0)) if self.scene else None
-        if shape is None:
+    def surface(self) -> Surface:
+        """The object's surface; a point on the border of two candidates' cells is there twice. Empty with a `note`."""
+        nothing = Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
+        if self.scene is None:
             self.note = "the object is not drawn: this version cannot read the scene in the file"
-            return None
+            return nothing
         try:
-            return build_object(shape)
+            points, corners, candidate = surface_of(self.scene, self.data.axes)
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
-            return None
+            return nothing
+        pairs = np.column_stack([corners.ravel(), np.repeat(candidate, 3)])
+        found, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        return Surface(points[found[:, 0]], inverse.reshape(-1, 3), candidate)
 
     @cached_property
-    def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners ``(m, 3, 6)`` [m] of the object's surface, and the candidate of every triangle, -1 for none."""
-        if self.object is None or self.gripper is None:
-            return self._marks() if self.data.by_poses else (np.empty((0, 3, 6)), np.empty(0, int))
-        points, triangles = self.object.surface()
-        if self.data.by_poses:
-            corners, cell = self._marks()
-            plain = with_normals(points, triangles)
-            return np.concatenate([plain, corners]), np.concatenate([np.full(len(plain), NOBODY), cell])
-        corners, cell = coloured(points, triangles, self.cells)
-        kept = ~self._lid(corners)
-        return corners[kept], cell[kept]
-
-    def _lid(self, corners: np.ndarray) -> np.ndarray:
-        """Triangles that close the top of an object that is open there: its shape is that of a solid."""
-        shape = swept_object(self.scene, (*self.point, 0, 0, 0))
-        if not self.data.walled or not getattr(shape, "open_top", False) or shape.shape == "mesh":
-            return np.zeros(len(corners), bool)
-        wall = wall_of(self.scene, (*self.point, 0, 0, 0), corners[..., :3].reshape(-1, 3))
-        if wall is None:
-            return np.zeros(len(corners), bool)
-        high = corners[..., 2].mean(axis=1) > 0.5 * (corners[..., 2].min() + corners[..., 2].max())
-        return np.isnan(wall.around).reshape(-1, 3).any(axis=1) & high
+    def owner(self) -> np.ndarray:
+        """Candidate of every point of `surface` ``(n,)``, -1 for none."""
+        found = np.full(len(self.surface.points), NOBODY)
+        found[self.surface.triangles] = self.surface.candidate[:, None]
+        return found
 
     @cached_property
-    def cells(self) -> Cells:
-        """The candidates as cells on the surface."""
-        length, width = self.gripper.pad_size[:2]
-        c, s = abs(np.cos(self.scene.candidates.roll)), abs(np.sin(self.scene.candidates.roll))
-        stations, angles = (self.data.axes[k].values for k in (-3, -2))
-        return Cells(stations, angles, self.object.axis_symmetry, c * length + s * width, c * width + s * length)
-
-    def _marks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Balls where the fingers of explicit poses first touch, for candidates with a solved case."""
-        ball = _ball(POSE_MARK)
-        origin = self.data.values("fingers/pose_origin")
-        found, cell = [np.empty((0, 3, 6))], [np.empty(0, int)]
+    def marks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where the fingers of explicit poses first touch ``(k, 3)`` [m], and the candidate of each ``(k,)``."""
+        origin = self.data.values("fingers/pose_origin") if self.data.by_poses else None
+        found, of = [np.empty((0, 3))], []
         for candidate in range(self.candidates if origin is not None else 0):
             known = origin[self.index(candidate, 0)[:-1]]
             solved = np.flatnonzero(np.isfinite(known).all(axis=(1, 2)))
-            for place in known[solved[0]] if solved.size else ():
-                found.append(ball + np.concatenate([place, np.zeros(3)]))
-                cell.append(np.full(len(ball), candidate))
-        return np.concatenate(found), np.concatenate(cell)
+            if solved.size:
+                found.append(known[solved[0]])
+                of += [candidate] * len(known[solved[0]])
+        return np.concatenate(found), np.array(of, int)
 
     @cached_property
     def wall(self) -> Wall | None:
-        """Where the surface's corners lie on the wall, in the order of `surface`."""
-        if not self.data.walled:
-            return None
-        return wall_of(self.scene, (*self.point, 0, 0, 0), self.surface[0][..., :3].reshape(-1, 3))
+        """Where the surface's points lie on the wall."""
+        return wall_of(self.scene.object, self.surface.points) if self.data.walled and self.scene else None
 
     def displacement(self, index: tuple[int, ...]) -> tuple[np.ndarray, float] | None:
-        """Displacement of the wall's places in a case, and the angle they begin at."""
-        return displacement(self.data, self.scene, index)
+        """Displacement of the wall's places ``(AROUND, ALONG, 3)`` [m] and the angle they begin at, if stored."""
+        rotation = self.data.values("fingers/pose_rotation")
+        places = self.data.values("wall/place") if self.data.walled and self.scene else None
+        if places is None or rotation is None or not np.isfinite(places[index]).all():
+            return None
+        approach = rotation[index][0][:, 2]
+        angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
+        before = undeformed(self.scene.object, angle)
+        return None if before is None else (places[index].reshape(AROUND, ALONG, 3) - before, angle)
 
     def moved(self, index: tuple[int, ...]) -> np.ndarray:
-        """The surface's corners ``(m, 3, 3)`` [m], moved with the wall of a case where the file has it."""
-        x = self.surface[0][..., :3]
+        """The surface's points ``(n, 3)`` [m], moved with the wall of a case where the file has it."""
         found = self.displacement(index) if self.wall is not None else None
-        if found is None or self.wall is None:
-            return x
-        return x + self.wall.moved(*found).reshape(x.shape)
+        x = self.surface.points
+        return x if found is None or self.wall is None else x + self.wall.moved(*found)
 
     def words(self, index: tuple[int, ...], quantity: str) -> list[str]:
-        """What is to be said of a case, line by line."""
+        """What there is to say of a case, line by line."""
         data = self.data
         number_ = int(np.ravel_multi_index(index[:-1], data.shape[:-1]))
         lines = [f"candidate {number_}: {data.place(index, force=True)}"]
         if data.status[index] == FAILED:
-            return [*lines, f"failed: {data.result.messages[index]}"]
+            return [*lines, f"failed: {data.result.messages[index] or 'no reason was given'}"]
         if data.status[index] != DONE:
-            return [*lines, "not solved yet"]
+            return [*lines, "not computed yet"]
         names = dict.fromkeys((quantity, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "dent"))
         for name in names:
             if (found := data.map(name)) is not None:
@@ -157,18 +127,6 @@ class View:
                 lines.append(f"{label}: {number(found[index] * factor)} {unit}".rstrip())
         flags = flag_words(int(data.flags[index]))
         return [*lines, f"flags: {flags}"] if flags else lines
-
-
-def _ball(radius: float) -> np.ndarray:
-    """Triangles ``(128, 3, 6)`` of a ball about the origin: an octahedron, divided twice."""
-    e = np.eye(3)
-    x = np.array([[a * e[0], b * e[1], c * e[2]][:: int(a * b * c)] for a in (1, -1) for b in (1, -1) for c in (1, -1)])
-    for _ in range(2):
-        a, b, c = x[:, 0], x[:, 1], x[:, 2]
-        ab, bc, ca = a + b, b + c, c + a
-        x = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-        x /= np.linalg.norm(x, axis=-1, keepdims=True)
-    return np.concatenate([radius * x, x], axis=-1)
 
 
 def view_of(data: Data, candidate: int | None, place: tuple[float | None, float | None], force: float | None) -> Any:

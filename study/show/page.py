@@ -1,0 +1,109 @@
+"""A self-contained page from blocks of plain text, tables and plotly figures: for reports, views and cost studies.
+
+Whoever builds a page hands over plain data; the template alone makes HTML of it, and escapes it. Text that plotly draws
+itself goes through `label`, because plotly reads a few tags in it.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+Block = dict[str, Any]
+Section = tuple[str, str, list[Block]]
+FOLDER = "softjaw.study.show.templates"
+
+
+def text(words: str, look: str = "") -> Block:
+    """One paragraph; ``look`` is a class of the style, as ``note``."""
+    return {"kind": "text", "text": words, "look": look}
+
+
+def heading(words: str) -> Block:
+    """Heading of a part of a section."""
+    return {"kind": "heading", "text": words}
+
+
+def box(texts: Iterable[str], look: str) -> Block:
+    """Paragraphs that stand out, as ``verdict`` or ``warn``."""
+    return {"kind": "box", "texts": list(texts), "look": look}
+
+
+def answer(pairs: Iterable[tuple[str, str]]) -> Block:
+    """Few large values with their names."""
+    return {"kind": "answer", "pairs": list(pairs)}
+
+
+def bullets(texts: Iterable[str]) -> Block:
+    """A list."""
+    return {"kind": "bullets", "texts": list(texts)}
+
+
+def verbatim(words: str) -> Block:
+    """A text as it stands in a file."""
+    return {"kind": "pre", "text": words}
+
+
+def details(summary: str, blocks: Sequence[Block]) -> Block:
+    """Parts of a page that are folded away until a reader asks for them."""
+    return {"kind": "details", "summary": summary, "blocks": list(blocks)}
+
+
+def table(
+    caption: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    texts: Sequence[int] = (),
+    wide: Sequence[int] = (),
+    first: bool = False,
+) -> Block:
+    """A table with row headers; columns but ``texts`` and ``wide`` ones hold numbers. ``first`` marks the first row."""
+    looks = ["wide" if j in wide else "text" if j in texts else "n" for j in range(len(head))]
+    return {"kind": "table", "caption": caption, "head": head, "rows": rows, "looks": looks, "first": first}
+
+
+def plot(figure: Any, caption: str, alt: str, height: int = 360) -> Block:
+    """A plotly figure: what it shows (``alt``, for those who cannot see it) and how to read it (``caption``)."""
+    return {"kind": "plot", "figure": figure, "caption": caption, "alt": alt, "height": height}
+
+
+def image(content: bytes, caption: str, alt: str, type_: str = "svg+xml") -> Block:
+    """An embedded picture; ``type_`` is its media type below ``image``."""
+    data = base64.b64encode(content).decode()
+    return {"kind": "image", "data": data, "type": type_, "caption": caption, "alt": alt}
+
+
+def label(words: str) -> str:
+    """Text of a file as plotly has to get it, so that it shows the text and reads no tags in it.
+
+    >>> label("<b>left</b>")
+    '&lt;b&gt;left&lt;/b&gt;'
+    """
+    return escape(words, quote=False)
+
+
+def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
+    """The page of sections ``(anchor, heading, blocks)``, the first without a heading; empty ones are left out."""
+    import jinja2
+    from plotly.offline import get_plotlyjs
+
+    made = jinja2.Environment(loader=jinja2.PackageLoader(*FOLDER.rsplit(".", 1)), autoescape=True)
+    made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
+    shown = [dict(zip(("anchor", "heading", "blocks"), s, strict=True)) for s in sections if s[2]]
+    own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")]
+    drawn = any(block["kind"] == "plot" for s in shown for block in s["blocks"])
+    scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if drawn else []
+    return made.get_template("page.html").render(
+        title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)
+    )
+
+
+def policy(scripts: Sequence[str]) -> str:
+    """What the page may do: show what it holds and run these scripts; plotly draws in three dimensions by ``eval``."""
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    return f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed} 'unsafe-eval'"

@@ -1,0 +1,105 @@
+"""The only door to plotly: figures with one look, and the habits that all of them share.
+
+Every figure can be read without colour: maps grow evenly in lightness, friction models differ by line and marker, and
+failed cases have crosses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.colors import get_colorscale
+from plotly.subplots import make_subplots
+
+from softjaw.study.show.pictures import span as span  # one range for plotly and matplotlib
+
+INK, SOFT, GRID, EMPTY = "#1d2429", "#6b747b", "#e3e6e8", "#eceef0"
+MODELS = {  # name, colour, line, marker
+    "curved": ("CCM", "#12436d", "solid", "circle"),
+    "flat": ("PCM", "#c05a00", "dash", "square"),
+    "projected": ("PCM scaled by F_N", "#2a8c82", "dot", "triangle-up"),
+}
+COLOURS = {"e_n": "Cividis", "pressure": "Magma_r", "dent": "Plasma_r", "wall_stress": "Inferno_r"}
+MARGIN = {"l": 60, "r": 20, "t": 58, "b": 50}
+
+
+def colours(quantity: str) -> list[list[Any]]:
+    """Colour scale of a map as stops, which plotly's script needs for the names that it does not know."""
+    return [list(stop) for stop in get_colorscale(COLOURS.get(quantity, "Viridis"))]
+
+
+def figure(rows: int = 1, columns: int = 1, titles: Sequence[str] = (), **layout: Any) -> go.Figure:
+    """An empty figure of panels; ``layout`` goes to `plotly.subplots.make_subplots`."""
+    made = make_subplots(rows, columns, subplot_titles=list(titles) or None, **layout)
+    made.update_layout(template="none", font={"size": 12, "color": INK}, margin=MARGIN, hovermode="closest",
+                       legend={"orientation": "h", "y": -0.12, "yanchor": "top"})  # fmt: skip
+    made.update_annotations(font_size=13)
+    made.update_xaxes(gridcolor=GRID, zeroline=False, linecolor=SOFT, ticks="outside", title_standoff=6)
+    made.update_yaxes(gridcolor=GRID, zeroline=False, linecolor=SOFT, ticks="outside", title_standoff=6)
+    return made
+
+
+def lines(
+    made: go.Figure, x: Any, by_model: Mapping[str, np.ndarray], row: int, column: int, errors: Any = None
+) -> None:
+    """One line for each friction model, with error bars on that of the CCM; lines without a finite value are left out.
+
+    Parameters
+    ----------
+    made : Figure
+        The figure that gets the lines.
+    x : (k,) array
+        Abscissas.
+    by_model : dict of (k,) arrays
+        Values of each model; NaN where there is none.
+    row, column : int
+        Panel, from 1.
+    errors : (k,) array, optional
+        Half lengths of the error bars.
+    """
+    for model, y in by_model.items():
+        if not np.isfinite(y).any():
+            continue
+        name, colour, dash, symbol = MODELS[model]
+        bars = None if errors is None or model != "curved" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
+        made.add_scatter(
+            x=x, y=y, name=name, legendgroup=model, mode="lines+markers", error_y=bars, row=row, col=column,
+            line={"color": colour, "dash": dash}, marker={"symbol": symbol, "size": 6},
+            showlegend=not any(t.legendgroup == model for t in made.data),
+        )  # fmt: skip
+
+
+def triangles(quads: np.ndarray) -> np.ndarray:
+    """Two triangles ``(2 k, 3)`` for each of the quadrilaterals ``(k, 4)``."""
+    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+
+
+def mesh(points: np.ndarray, corners: np.ndarray, **look: Any) -> go.Mesh3d:
+    """Triangles ``corners (m, 3)`` among ``points (n, 3)``."""
+    x, y, z = np.asarray(points, np.float32).T
+    i, j, k = np.asarray(corners, np.int32).T
+    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **look)
+
+
+def segments(ends: np.ndarray, **look: Any) -> go.Scatter3d:
+    """Lines between pairs of points ``(k, 2, 3)``."""
+    gaps = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+    x, y, z = gaps.astype(np.float32).T
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", hoverinfo="skip", showlegend=False, **look)
+
+
+def points(places: np.ndarray, colour: str, size: float, text: Any = None) -> go.Scatter3d:
+    """Dots at places ``(n, 3)``, with words beside them if there are any."""
+    x, y, z = places.astype(np.float32).T
+    return go.Scatter3d(x=x, y=y, z=z, mode="markers+text" if text else "markers", text=text, hoverinfo="skip",
+                        marker={"color": colour, "size": size}, showlegend=False)  # fmt: skip
+
+
+def scene(unit: str = "mm", names: Sequence[str] = ("x", "y", "z"), **more: Any) -> dict[str, Any]:
+    """Settings of a panel in three dimensions, seen without perspective so that lengths can be compared."""
+    titles = {a: {"text": f"{name} [{unit}]" if unit else name} for a, name in zip("xyz", names, strict=True)}
+    axes = {f"{a}axis": {"title": t, "gridcolor": GRID, "backgroundcolor": "white"} for a, t in titles.items()}
+    return {"aspectmode": "data", "camera": {"projection": {"type": "orthographic"}}, **axes, **more}
