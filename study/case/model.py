@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.problem import Gap
-from softjaw.fem.objects.gap import GapFunction, GapObject
-from softjaw.fem.objects.pose import Pose
-from softjaw.fem.objects.touch import first_touch
+from softjaw.fem.objects.gap import GapFunction, GapObject, Pose, first_touch
 from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case.build import pad_material, pad_shape, sheet
 from softjaw.study.scene import Scene

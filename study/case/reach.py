@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softjaw.fem.objects.gap import Gap, GapObject
-from softjaw.fem.objects.pose import Pose
-from softjaw.fem.objects.touch import NoContactError
+from softjaw.fem.objects.gap import Gap, GapObject, NoContactError, Pose
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import candidates
