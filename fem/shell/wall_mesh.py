@@ -8,12 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
+from skfem import ElementQuad1
 
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
 
 SAMPLES = 4000  # of the wanted element size along a line
 TURN = np.radians(25.0)  # largest turn of the outline within one element
+SQUARE = ElementQuad1()
 THICKEST = 1.0 - 1e-6  # of the outline's radius: a wall that reaches its centre of curvature has no inner face
 
 
@@ -179,10 +181,9 @@ class BodyMesh(ShellMesh):
         j = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
         h, k = self.theta[i + 1] - self.theta[i], self.s[j + 1] - self.s[j]
         u, v = (theta - self.theta[i]) / h, (s - self.s[j]) / k
-        N = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-        dN = np.stack([
-            np.stack([v - 1, 1 - v, v, -v], axis=1) / h[:, None], np.stack([u - 1, -u, u, 1 - u], axis=1) / k[:, None]
-        ], axis=1)  # fmt: skip
+        basis = [SQUARE.lbasis(np.stack([u, v]), corner) for corner in range(4)]
+        N = np.stack([value for value, _ in basis], axis=1)
+        dN = np.stack([slope for _, slope in basis]).transpose(2, 1, 0) / np.stack([h, k], axis=1)[:, :, None]
         nodes = np.stack(
             [self.number[i, j], self.number[i + 1, j], self.number[i + 1, j + 1], self.number[i, j + 1]], 1
         )
