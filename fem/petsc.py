@@ -4,12 +4,18 @@
 ``-contact_snes_type vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every
 linear system is factorised by MUMPS; its symbolic analysis is kept as long as the pattern is. Steps that older factors
 are good enough for do without a factorisation of their own, see `NonlinearSolver`.
+
+The BLAS libraries of this process take their work memory here, while there is room for it: OpenBLAS takes its own, 32
+or 128 MiB of addresses, at its first larger operation. Where a limit (``ulimit -v``, a batch system, ``run.memory_gb``)
+leaves less, older versions ask for ever and newer ones end the process, both without a word. So every library makes a
+first operation when the solver is loaded, after a look whether there is room.
 """
 
 from __future__ import annotations
 
 import ctypes
 import importlib.util
+import mmap
 import re
 import sys
 import time
@@ -20,13 +26,32 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
-from softjaw.fem.blas_buffers import take_buffers
 from softjaw.fem.contact.pattern import Pattern, add_up
 from softjaw.fem.errors import ConvergenceError
 
 FloatArray = NDArray[np.float64]
+ROOM = 160 * 2**20  # bytes that are free before a library is let loose: the largest work memory and what goes with it
+
+
+def take_buffers(*others: Callable[[], object]) -> None:
+    """Let numpy's and scipy's BLAS take their work memory, then those that the operations ``others`` reach.
+
+    Raises
+    ------
+    MemoryError
+        Where addresses are too few for one of them.
+    """
+    one = np.eye(2)
+    for operation in (lambda: np.linalg.solve(one, one), lambda: scipy.linalg.lu_factor(one), *others):
+        try:
+            mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
+        except OSError as error:
+            text = f"a library of linear algebra takes {ROOM / 1e6:.0f} MB of addresses at once, and they are not there"
+            raise MemoryError(text) from error
+        operation()
 
 
 def _find_petsc4py() -> None:
@@ -60,8 +85,6 @@ def _dense_factors() -> None:
 take_buffers(_dense_factors)
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
-
-
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 NEAR, FAST = 1e5, 0.05  # see NonlinearSolver
 RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors

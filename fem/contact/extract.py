@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.press import Pressed
-from softjaw.fem.pad.mesh import Pad, lagrange
+from softjaw.fem.pad.mesh import Pad, along_side
 from softjaw.friction.patch import ContactPatch
 
 FloatArray = NDArray[np.float64]
@@ -88,7 +88,7 @@ def _subdivide(grid: FloatArray, axis: int, weights: FloatArray) -> FloatArray:
     grid = np.moveaxis(grid, axis, 0)
     parts = len(weights)
     order = parts - 1  # of the shape functions along a side
-    fine = np.stack([lagrange(parts, s) for s in np.cumsum(weights) - weights])
+    fine = along_side(parts, np.cumsum(weights) - weights)
     elements = np.stack([grid[k : len(grid) - order + k : order] for k in range(parts)], axis=1)
     inside = np.einsum("sk,nk...->ns...", fine, elements).reshape(-1, *grid.shape[1:])
     return np.moveaxis(np.concatenate([inside, grid[-1:]]), 0, axis)

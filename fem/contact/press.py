@@ -18,15 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.checks import Checks, check
-from softjaw.fem.contact.following import Following
-from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
-from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap
-from softjaw.fem.contact.reasons import explained, refuse_fall
+from softjaw.fem.contact.checks import Checks, check, explained, refuse_fall
+from softjaw.fem.contact.load_stepping import Following, Settings, Stepping, Work
+from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap, SpringBed
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.spring_bed import SpringBed
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]

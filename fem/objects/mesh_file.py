@@ -21,8 +21,7 @@ from softjaw.fem.errors import MeshError
 if TYPE_CHECKING:
     import trimesh
 
-    from softjaw.fem.objects.gap import IntArray
-    from softjaw.fem.objects.pose import FloatArray
+    from softjaw.fem.objects.gap import FloatArray, IntArray
 
 # Each unit is ``times / over`` metres, so that converting rounds once.
 LENGTHS = {"mm": (1, 1000), "cm": (1, 100), "m": (1, 1), "inch": (0.0254, 1)}

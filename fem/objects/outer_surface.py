@@ -5,6 +5,9 @@ rigid and a thin-walled bottle of one profile have the same outside. It gives he
 ratio ``b / a``, the exponent and the sideways shift of the sections follow the height by monotone cubics. The points of
 a section are found by their polar angle: ``shift + a f (cos theta, sin theta)`` with
 ``f = (|cos theta|^n + |sin theta / (b/a)|^n)^(-1/n)``.
+
+`Jet` holds functions of two parameters with their exact derivatives; `Turned` is a surface seen from a frame that is
+turned about its axis.
 """
 
 from __future__ import annotations
@@ -17,12 +20,57 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
 
-from softjaw.fem.objects.jet import Jet, log_of_size
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.profile import Curve, through
 from softjaw.fem.objects.revolution import Revolution
 
+TINY = 1e-100  # stands for zero below a logarithm
 AT_LINE = 1e-12  # heights this close to a sample of the outline are at it [m]
+RIGHT_ANGLE = 1e-9  # how close to a multiple of 90 degrees keeps planes of symmetry [rad]
+
+
+class Jet:
+    """Function of (theta, s) with its derivatives up to the second: rows ``f, f_t, f_s, f_tt, f_ts, f_ss`` (6, n)."""
+
+    def __init__(self, rows: ArrayLike) -> None:
+        self.rows = np.asarray(rows, dtype=float)
+
+    def __add__(self, other: Jet) -> Jet:
+        return Jet(self.rows + other.rows)
+
+    def __mul__(self, other: Jet) -> Jet:
+        (f, ft, fs, ftt, fts, fss), (g, gt, gs, gtt, gts, gss) = self.rows, other.rows
+        return Jet([
+            f * g, ft * g + f * gt, fs * g + f * gs,
+            ftt * g + 2 * ft * gt + f * gtt, fts * g + ft * gs + fs * gt + f * gts, fss * g + 2 * fs * gs + f * gss,
+        ])  # fmt: skip
+
+    def through(self, h: FloatArray, h1: FloatArray, h2: FloatArray) -> Jet:
+        """``h(f)`` from the values of ``h`` and its two derivatives at ``f``."""
+        _, t, s, tt, ts, ss = self.rows
+        return Jet([h, h1 * t, h1 * s, h1 * tt + h2 * t * t, h1 * ts + h2 * t * s, h1 * ss + h2 * s * s])
+
+    def exp(self) -> Jet:
+        """``exp(f)``."""
+        e = np.exp(self.rows[0])
+        return self.through(e, e, e)
+
+    def log(self) -> Jet:
+        """``ln(f)``."""
+        f = self.rows[0]
+        return self.through(np.log(f), 1 / f, -1 / f**2)
+
+    def scaled(self, factor: float) -> Jet:
+        """``factor * f``."""
+        return Jet(factor * self.rows)
+
+
+def log_of_size(jet: Jet) -> Jet:
+    """``ln |f|``, finite where f vanishes."""
+    rows = jet.rows.copy()
+    rows[0] = np.where(np.abs(rows[0]) < TINY, TINY, rows[0])
+    f = rows[0]
+    return Jet(rows).through(np.log(np.abs(f)), 1 / f, -1 / f**2)
 
 
 @dataclass(frozen=True)
@@ -206,3 +254,59 @@ def _slopes(z: FloatArray, values: FloatArray) -> FloatArray:
     slope, same = np.zeros(len(z)), np.flatnonzero(d[:-1] * d[1:] > 0)
     slope[same + 1] = (left + right)[same] / (left[same] / d[same] + right[same] / d[same + 1])
     return slope
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """Surface whose angle 0 is the original's ``angle`` [rad]; offers what ``wall_mesh`` asks of it."""
+
+    original: OuterSurface
+    angle: float
+    round: bool
+
+    @property
+    def curve(self) -> Curve:
+        """Outline, by the same places s."""
+        return self.original.curve
+
+    @property
+    def wall(self) -> tuple[float, float]:
+        """Part of s between the first and the last section."""
+        return self.original.wall
+
+    @property
+    def flat(self) -> tuple[float, float]:
+        """Ends of the flat lids."""
+        return self.original.flat
+
+    @property
+    def end(self) -> float:
+        """Largest s [m]."""
+        return self.original.end
+
+    @property
+    def symmetric(self) -> tuple[bool, bool]:
+        """Whether x = 0 and y = 0 of the turned frame are planes of symmetry."""
+        if self.round:
+            return True, True
+        quarters = self.angle / (0.5 * np.pi)
+        if abs(quarters - round(quarters)) * 0.5 * np.pi > RIGHT_ANGLE:
+            return False, False
+        return self.original.symmetric[:: -1 if round(quarters) % 2 else 1]
+
+    def station(self, z: float) -> float:
+        """Place s on the wall at the height z [m]."""
+        return self.original.station(z)
+
+    def jets(self, theta: ArrayLike, s: ArrayLike) -> FloatArray:
+        """Position and derivatives in the turned frame, as the original's."""
+        return self.original.jets(np.asarray(theta, float) + self.angle, s) @ self._rotation
+
+    def normals(self, theta: ArrayLike, s: ArrayLike) -> FloatArray:
+        """Outward unit normals ``(n, 3)`` in the turned frame."""
+        return self.original.normals(np.asarray(theta, float) + self.angle, s) @ self._rotation
+
+    @property
+    def _rotation(self) -> FloatArray:
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

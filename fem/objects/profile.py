@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import FloatArray
 
 COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step, are on it
 ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely

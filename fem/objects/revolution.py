@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from softjaw.fem.objects.gap import Analytic, Gap, Surface, grid_triangles
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, straight_runs, through
 
 BLOCK = 8  # segments of the polyline that share one bounding circle

@@ -10,8 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softjaw.fem.objects.gap import Analytic, Gap, GapFunction, GapObject, Surface, grid_triangles, in_plane, radial
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import (
+    Analytic,
+    FloatArray,
+    Gap,
+    GapFunction,
+    GapObject,
+    Surface,
+    grid_triangles,
+    in_plane,
+    radial,
+)
 from softjaw.fem.objects.revolution import Revolution
 
 __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revolution", "Sphere"]

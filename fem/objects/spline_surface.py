@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import Gap, GapFunction, Surface, grid_triangles
+from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, grid_triangles
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.objects.pose import FloatArray, Pose
 
 if TYPE_CHECKING:  # numba and scipy, which a scene that is only checked does not need
     from softjaw.fem.objects.mesh_object import MeshObject

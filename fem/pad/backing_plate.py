@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from softjaw.fem.shell.linear import LinearShell
-from softjaw.fem.shell.mesh import patch
-from softjaw.fem.shell.model import Shell
+from softjaw.fem.shell.element import Shell, patch
+from softjaw.fem.shell.wall_model import LinearShell
 
 FloatArray = NDArray[np.float64]
 CLOSE = 1e-9  # of the outline, within which a node is on the patch's rim

@@ -1,15 +1,248 @@
-"""Forces and stiffness of the foam of one pad, element by element, and of the elastic sheet behind it, if there is."""
+"""Compiled loops over elements and face points: where the assembly time goes.
+
+Element arrays keep the node index last and contiguous, so that the innermost loop over the nodes of an element becomes
+vector instructions; local unknowns are therefore ordered component first, ``(3, nodes)``.
+Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether code was compiled now or loaded from the
+cache, and a study would not be the same to the bit; these loops gain nothing from them.
+"""
 
 from __future__ import annotations
 
+import hashlib
+from pathlib import Path
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from softjaw.fem.pad import hexahedra as kernel
+from softjaw.fem import materials
+from softjaw.fem.materials import stress
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
 SMALLEST_DET = 0.05  # a Newton step is shortened before an element is squeezed further than this
+
+
+@njit(cache=True)
+def _gradient(u, dN, nodes, F, B):
+    """Deformation gradient and its inverse at one point; returns ``det F``."""
+    for i in range(3):
+        for j in range(3):
+            value = 1.0 if i == j else 0.0
+            for a in range(nodes):
+                value += u[i, a] * dN[j, a]
+            F[i, j] = value
+    B[0, 0] = F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]
+    B[0, 1] = F[0, 2] * F[2, 1] - F[0, 1] * F[2, 2]
+    B[0, 2] = F[0, 1] * F[1, 2] - F[0, 2] * F[1, 1]
+    B[1, 0] = F[1, 2] * F[2, 0] - F[1, 0] * F[2, 2]
+    B[1, 1] = F[0, 0] * F[2, 2] - F[0, 2] * F[2, 0]
+    B[1, 2] = F[0, 2] * F[1, 0] - F[0, 0] * F[1, 2]
+    B[2, 0] = F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]
+    B[2, 1] = F[0, 1] * F[2, 0] - F[0, 0] * F[2, 1]
+    B[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+    J = F[0, 0] * B[0, 0] + F[0, 1] * B[1, 0] + F[0, 2] * B[2, 0]
+    for i in range(3):
+        for j in range(3):
+            B[i, j] /= J
+    return J
+
+
+@njit(cache=True)
+def smallest_det(u, dN):
+    """Smallest ``det F`` over all points of all elements [-]."""
+    F, B = np.empty((3, 3)), np.empty((3, 3))
+    smallest = np.inf
+    for e in range(dN.shape[0]):
+        for q in range(dN.shape[1]):
+            smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
+    return smallest
+
+
+@njit(cache=True)
+def extreme_eigenvalues(M):
+    """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
+    mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
+    a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
+    d, e, f = M[0, 1], M[0, 2], M[1, 2]
+    radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    if radius <= 1e-12 * abs(mean):
+        return mean, mean
+    half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
+    angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
+    return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
+
+
+@njit(cache=True, inline="always")
+def _elements(law, par, u, dN, w, nodes, r, K):
+    """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
+    tangent = K.size > 0
+    F, B, P, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, nodes))
+    A = np.empty((3, 3, 3, 3)) if tangent else np.empty((0, 0, 0, 0))
+    smallest = np.inf
+    for e in range(w.shape[0]):
+        for i in range(3):
+            for a in range(nodes):
+                r[e, i, a] = 0.0
+        if tangent:
+            for i in range(3):
+                for a in range(nodes):
+                    for k in range(3):
+                        for b in range(nodes):
+                            K[e, i, a, k, b] = 0.0
+        for q in range(w.shape[1]):
+            g = dN[e, q]
+            J = _gradient(u[e], g, nodes, F, B)
+            smallest = min(smallest, J)
+            stress(law, F, B, J, par, P, A)
+            dv = w[e, q]
+            for i in range(3):
+                p0, p1, p2 = dv * P[i, 0], dv * P[i, 1], dv * P[i, 2]
+                for a in range(nodes):
+                    r[e, i, a] += p0 * g[0, a] + p1 * g[1, a] + p2 * g[2, a]
+            if not tangent:
+                continue
+            for i in range(3):
+                for k in range(i, 3):  # the tangent is symmetric: blocks below the diagonal follow
+                    for j in range(3):
+                        a0, a1, a2 = dv * A[i, j, k, 0], dv * A[i, j, k, 1], dv * A[i, j, k, 2]
+                        for b in range(nodes):
+                            T[j, b] = a0 * g[0, b] + a1 * g[1, b] + a2 * g[2, b]
+                    for a in range(nodes):
+                        g0, g1, g2 = g[0, a], g[1, a], g[2, a]
+                        for b in range(nodes):
+                            K[e, i, a, k, b] += g0 * T[0, b] + g1 * T[1, b] + g2 * T[2, b]
+        if tangent:
+            for i in range(3):
+                for k in range(i):
+                    for a in range(nodes):
+                        for b in range(nodes):
+                            K[e, i, a, k, b] = K[e, k, b, i, a]
+    return smallest
+
+
+def _bound_to(laws):
+    """Loops that call the material laws, compiled anew whenever the laws' source ``laws`` is another.
+
+    numba's cache looks at the file of a function alone, and at its closure; without this the laws of an older version
+    would go on being used.
+    """
+
+    @njit(cache=True)
+    def elements(law, par, u, dN, w, r, K):
+        """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
+
+        Parameters
+        ----------
+        law, par : int, (k,) array
+            Material number and parameters (``fem.materials``).
+        u : (n, 3, nodes) array
+            Nodal displacements of each element [m].
+        dN : (n, points, 3, nodes) array
+            Reference gradients of the shape functions [1/m].
+        w : (n, points) array
+            Reference volume of each point [m^3].
+        r : (n, 3, nodes) array, out
+            Nodal forces [N].
+        K : (n, 3, nodes, 3, nodes) array, out
+            Stiffness [N/m]; with size 0 only ``r`` is computed.
+        """
+        if len(laws) == 0:  # read here, so that it enters the key of the cache
+            return np.nan
+        # constant node counts let the compiler unroll
+        if u.shape[2] == 8:
+            return _elements(law, par, u, dN, w, 8, r, K)
+        return _elements(law, par, u, dN, w, 27, r, K)
+
+    @njit(cache=True)
+    def strain_measures(law, par, shear_modulus, u, dN, directions):
+        """Largest ``|principal stretch - 1|`` of all points, and smallest eigenvalue of the acoustic tensor.
+
+        The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the
+        given unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no
+        localisation).
+        """
+        F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
+        C, Q = np.empty((3, 3)), np.empty((3, 3))
+        strain, acoustic = 0.0, np.inf if len(laws) > 0 else np.nan
+        for e in range(dN.shape[0]):
+            for q in range(dN.shape[1]):
+                J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
+                for i in range(3):
+                    for k in range(3):
+                        C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
+                low, high = extreme_eigenvalues(C)
+                strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
+                if q > 0:
+                    continue
+                stress(law, F, B, J, par, P, A)
+                for m in directions:
+                    for i in range(3):
+                        for k in range(3):
+                            value = 0.0
+                            for j in range(3):
+                                value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
+                            Q[i, k] = value
+                    acoustic = min(acoustic, extreme_eigenvalues(Q)[0])
+        return strain, acoustic / shear_modulus
+
+    return elements, strain_measures
+
+
+elements, strain_measures = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
+
+
+@njit(cache=True)
+def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
+    """Weighted gaps, nodal forces and tangent blocks of the contact face.
+
+    ``G_i = int N_i g dA`` and its derivative ``N_i N_a n``; the pressure ``p = sum N_i lam_i`` acts on node ``a`` with
+    ``-int N_a p n dA``, whose derivative is ``-int N_a N_b p Hess(g) dA``.  Nodal collocation is the same with the
+    quadrature points on the nodes.
+
+    Parameters
+    ----------
+    N : (points, nodes) array
+        Shape functions of a face at its quadrature points.
+    w : (n, points) array
+        Reference area of each point [m^2].
+    lam : (n, nodes) array
+        Nodal pressures of each face [Pa].
+    gap, normal, hessian : (n, points), (n, points, 3), (n, points, 3, 3) arrays
+        Of the object at the deformed points [m], [-], [1/m].
+    weighted_gap, force : (n, nodes), (n, 3, nodes) arrays, out
+        [m^3], [N].
+    K_uu, K_ul : (n, 3, nodes, 3, nodes), (n, nodes, 3, nodes) arrays, out
+        ``dforce/du`` [N/m] and ``dG/du`` [m^2]; with size 0 they are not computed.
+    """
+    nodes = N.shape[1]
+    tangent = K_uu.size > 0
+    for f in range(w.shape[0]):
+        weighted_gap[f] = 0.0
+        force[f] = 0.0
+        if tangent:
+            K_uu[f] = 0.0
+            K_ul[f] = 0.0
+        for q in range(w.shape[1]):
+            p = 0.0
+            for a in range(nodes):
+                p += N[q, a] * lam[f, a]
+            dA = w[f, q]
+            for a in range(nodes):
+                weighted_gap[f, a] += dA * N[q, a] * gap[f, q]
+                for i in range(3):
+                    force[f, i, a] -= dA * N[q, a] * p * normal[f, q, i]
+            if not tangent:
+                continue
+            for a in range(nodes):
+                for i in range(3):
+                    for b in range(nodes):
+                        K_ul[f, a, i, b] += dA * N[q, a] * N[q, b] * normal[f, q, i]
+                    if p != 0.0:
+                        for k in range(3):
+                            h = dA * N[q, a] * p * hessian[f, q, i, k]
+                            for b in range(nodes):
+                                K_uu[f, i, a, k, b] -= h * N[q, b]
 
 
 class Foam:
@@ -60,7 +293,7 @@ class Foam:
         """Factor that keeps the change of travel below ``longest`` [m] and the squeezing of elements within reason."""
         factor = min(1.0, longest / max(abs(step[self.pad.travel_dof]), 1e-300))
         for _ in range(12):
-            if kernel.smallest_det(self._displacements(x - factor * step), self.pad.dN) > SMALLEST_DET:
+            if smallest_det(self._displacements(x - factor * step), self.pad.dN) > SMALLEST_DET:
                 break
             factor *= 0.5
         return factor
@@ -68,12 +301,12 @@ class Foam:
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""
         u, dN, law = self._displacements(x), self.pad.dN, self.pad.material
-        strain, acoustic = kernel.strain_measures(law.number, law.parameters, law.shear_modulus, u, dN, directions)
-        return kernel.smallest_det(u, dN), strain, acoustic
+        strain, acoustic = strain_measures(law.number, law.parameters, law.shear_modulus, u, dN, directions)
+        return smallest_det(u, dN), strain, acoustic
 
     def _evaluate(self, x: FloatArray, K: FloatArray) -> float:
         law, pad = self.pad.material, self.pad
-        return kernel.elements(law.number, law.parameters, self._displacements(x), pad.dN, pad.volume, self._r, K)
+        return elements(law.number, law.parameters, self._displacements(x), pad.dN, pad.volume, self._r, K)
 
     def _displacements(self, x: FloatArray) -> FloatArray:
         return np.ascontiguousarray(self.pad.displacement(x)[self.pad.element_nodes].transpose(0, 2, 1))

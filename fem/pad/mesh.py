@@ -8,19 +8,84 @@ finger holds do; the others are free, and the sheet connects them to the travel.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from skfem import Basis, ElementHex1, ElementHex2, MeshHex
+from skfem import Basis, ElementHex1, ElementHex2, ElementLineP1, ElementLineP2, MeshHex
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefLine
 
 from softjaw.fem.materials import Material
 from softjaw.fem.pad.backing_plate import BackStiffness, Sheet, back_stiffness
-from softjaw.fem.pad.shape import PadShape
 
 FloatArray = NDArray[np.float64]
+PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
 IntArray = NDArray[np.int32]
 BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
+SIDES = {2: (ElementLineP1(), [0, 1]), 3: (ElementLineP2(), [0, 2, 1])}  # element along a side, its nodes in order
+
+
+@dataclass(frozen=True)
+class PadShape:
+    """Dimensions and mesh of a pad.
+
+    Parameters
+    ----------
+    size : tuple of 3 floats
+        Length (x), width (y), thickness (z) [m].
+    elements : tuple of 3 ints
+        Of the whole pad along x, y, z.
+    grading : tuple of 3 floats
+        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the front [-].
+    element : str
+        ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
+    """
+
+    size: tuple[float, float, float]
+    elements: tuple[int, int, int]
+    grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    element: str = "hex8"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meshed."""
+        if min(self.size) <= 0 or not np.all(np.isfinite(self.size)):
+            raise ValueError(f"pad size must be positive, found {self.size} m")
+        if min(self.elements) < 1:
+            raise ValueError(f"a pad needs at least one element in every direction, found {self.elements}")
+        if self.element not in PER_SIDE:
+            raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(PER_SIDE)}")
+
+    @property
+    def per_side(self) -> int:
+        """Nodes along a side of an element, and quadrature points along a side of its face."""
+        return PER_SIDE[self.element]
+
+    @property
+    def patch_faces(self) -> tuple[int, int]:
+        """Faces of a contact patch along length and width: one for each quadrature point of the front."""
+        return self.per_side * self.elements[0], self.per_side * self.elements[1]
+
+    def halved(self) -> PadShape:
+        """The same pad with half as many elements in every direction, rounded up."""
+        return PadShape(self.size, tuple(-(-n // 2) for n in self.elements), self.grading, self.element)
+
+    def lines(self, axis: int, half: bool) -> FloatArray:
+        """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
+        n, length, ratio = self.elements[axis], self.size[axis], self.grading[axis]
+        if axis == 2:
+            return -length * _graded(n, ratio)[::-1]
+        if n % 2:
+            return np.linspace(-length / 2, length / 2, n + 1)
+        positive = length / 2 * _graded(n // 2, ratio)
+        return positive if half else np.concatenate([-positive[:0:-1], positive])
+
+
+def _graded(n: int, ratio: float) -> FloatArray:
+    """Lines ``0..1`` whose intervals grow geometrically so that the last is ``ratio`` times the first."""
+    steps = ratio ** np.linspace(0.0, 1.0, n) if n > 1 else np.ones(1)
+    return np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
 
 
 class Pad:
@@ -78,29 +143,31 @@ class Pad:
         gradients = np.stack([np.broadcast_to(b[0].grad, (3, *basis.dx.shape)) for b in basis.basis])
         self.dN = np.ascontiguousarray(gradients.transpose(2, 3, 1, 0))
         self.volume = np.ascontiguousarray(basis.dx)
-        self._number_unknowns()
+        self._number_unknowns(basis)
         self._describe_front(lines, contact)
 
-    def _number_unknowns(self) -> None:
+    def _number_unknowns(self, basis: Basis) -> None:
         """Number free displacements, then the travel, then one pressure per node of the front."""
-        x, y, z = self.nodes.T
-        tol = 1e-9 * max(self.shape.size)
-        back = np.abs(z + self.shape.size[2]) < tol
-        front = np.abs(z) < tol
-        self.front_nodes, self.front_grid = _as_grid(self.nodes, front, tol)
-        back_nodes, _ = _as_grid(self.nodes, back, tol)
-        free = np.ones((len(x), 3), dtype=bool)
+        tol, count = 1e-9 * max(self.shape.size), len(self.nodes)
+
+        def on_plane(axis: int, place: float) -> NDArray[np.int64]:
+            """Nodes of the facets there."""
+            return basis.get_dofs(lambda x: np.abs(x[axis] - place) < tol).flatten()
+
+        self.front_nodes, self.front_grid = _as_grid(self.nodes, on_plane(2, 0.0), tol)
+        back_nodes, _ = _as_grid(self.nodes, on_plane(2, -self.shape.size[2]), tol)
+        free = np.ones((count, 3), dtype=bool)
         self.back = self._on_sheet(back_nodes)
         free[back_nodes] = self.back.free.reshape(-1, 3) if self.back else False
-        for axis, value in enumerate((x, y)):
+        for axis in range(2):
             if self.symmetry[axis]:
-                free[np.abs(value) < tol, axis] = False
+                free[on_plane(axis, 0.0), axis] = False
         self.travel_dof = int(free.sum())
-        self.dofs = np.full((len(x), 3), -1, dtype=np.int32)
+        self.dofs = np.full((count, 3), -1, dtype=np.int32)
         self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
-        self.dofs[back & ~free[:, 2], 2] = self.travel_dof
+        self.dofs[back_nodes[~free[back_nodes, 2]], 2] = self.travel_dof
         self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.travel_dof))
-        self.pressure_index = np.full(len(x), -1, dtype=np.int32)
+        self.pressure_index = np.full(count, -1, dtype=np.int32)
         self.pressure_index[self.front_nodes] = np.arange(len(self.front_nodes), dtype=np.int32)
         self.size = self.travel_dof + 1 + len(self.front_nodes)
 
@@ -156,11 +223,11 @@ class Pad:
         return u
 
 
-def _as_grid(nodes: FloatArray, chosen: NDArray[np.bool_], tol: float) -> tuple[IntArray, tuple[int, int]]:
+def _as_grid(nodes: FloatArray, chosen: NDArray[np.int64], tol: float) -> tuple[IntArray, tuple[int, int]]:
     """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
     column, row = (_lines(nodes[chosen, axis], tol) for axis in (0, 1))
     order = np.lexsort((row, column))
-    return np.flatnonzero(chosen)[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
+    return chosen[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
 
 
 def _lines(x: FloatArray, tol: float) -> IntArray:
@@ -174,19 +241,18 @@ def _lines(x: FloatArray, tol: float) -> IntArray:
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
     if contact == "weighted":
-        points, weights = np.polynomial.legendre.leggauss(per_side)
-        points, weights = 0.5 * (points + 1.0), 0.5 * weights
+        (points,), weights = get_quadrature(RefLine, 2 * per_side - 1)
     elif contact == "nodal":
         points = np.linspace(0.0, 1.0, per_side)
         weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
     else:
         raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
-    one = np.stack([lagrange(per_side, s) for s in points])  # (points, nodes) along one side
+    one = along_side(per_side, points)
     N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
     return N, weights
 
 
-def lagrange(n: int, s: float) -> FloatArray:
-    """Lagrange polynomials with ``n`` equidistant nodes on ``[0, 1]``."""
-    t = np.linspace(0.0, 1.0, n)
-    return np.array([np.prod([(s - t[j]) / (t[i] - t[j]) for j in range(n) if j != i]) for i in range(n)])
+def along_side(per_side: int, s: FloatArray) -> FloatArray:
+    """Shape functions ``(points, nodes)`` along a side of an element, from end to end, at places ``s`` in [0, 1]."""
+    element, order = SIDES[per_side]
+    return np.stack([element.lbasis(s[None], i)[0] for i in order], axis=1)

@@ -10,7 +10,7 @@ their shears sampled at the centre, the transverse shears at the middles of the 
 Num. Meth. Eng. 21, 1985, which removes shear locking), and the thickness strain at the nodes, which has no Poisson
 coupling with the others (so no thickness locking, and no inner unknowns). Terms of order thickness/radius are left out.
 
-Arithmetic is strict IEEE, as in ``fem.pad.hexahedra``.
+Arithmetic is strict IEEE, as in ``fem.pad.foam``.
 """
 
 from __future__ import annotations
@@ -25,6 +25,62 @@ from softjaw.fem.shell.element_kernel import A_0, A_G, B_0, B_G, GAUSS, N_G, STR
 
 IntArray = NDArray[np.int32]
 SHEAR_CORRECTION = 5.0 / 6.0
+NO_STEP = np.empty((0, 6))
+
+
+@dataclass(frozen=True)
+class ShellMesh:
+    """Mesh of the middle surface.
+
+    Parameters
+    ----------
+    X, D : (k, 3) arrays
+        Nodes on the middle surface and their directors, half the wall thickness times the outward unit normal [m]; the
+        outer face is ``X + D``.
+    elements : (n, 4) array
+        Node numbers, counter-clockwise seen from outside; two neighbours may be the same node.
+    """
+
+    X: FloatArray
+    D: FloatArray
+    elements: IntArray
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not fit together."""
+        if self.X.shape != self.D.shape or self.X.ndim != 2 or self.X.shape[1] != 3:
+            raise ValueError(f"X and D must both be (k, 3), found {self.X.shape} and {self.D.shape}")
+        if self.elements.ndim != 2 or self.elements.shape[1] != 4:
+            raise ValueError(f"elements must be (n, 4), found {self.elements.shape}")
+        if self.elements.min() < 0 or self.elements.max() >= len(self.X):
+            raise ValueError(f"elements name node {self.elements.max()}, but there are {len(self.X)} nodes")
+
+    @property
+    def outer(self) -> FloatArray:
+        """Nodes of the outer face ``(k, 3)`` [m]."""
+        return self.X + self.D
+
+    @property
+    def thickness(self) -> FloatArray:
+        """Wall thickness at every node ``(k,)`` [m]."""
+        return 2.0 * np.linalg.norm(self.D, axis=1)
+
+
+def grid_elements(number: IntArray) -> IntArray:
+    """Elements ``(n, 4)`` over a grid of node numbers ``(rows, columns)``; first direction along the rows' index.
+
+    An element all of whose corners fall on fewer than three nodes is left out.
+    """
+    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    elements = np.stack([corner.ravel() for corner in corners], axis=1).astype(np.int32)
+    distinct = 1 + (np.diff(np.sort(elements, axis=1), axis=1) != 0).sum(axis=1)
+    return elements[distinct >= 3]
+
+
+def patch(X: FloatArray, normal: FloatArray, thickness: float) -> ShellMesh:
+    """Mesh of a grid of places ``X (rows, columns, 3)`` with unit normals; node ``row * columns + column``."""
+    number = np.arange(X.shape[0] * X.shape[1], dtype=np.int32).reshape(X.shape[:2])
+    D = 0.5 * thickness * np.broadcast_to(normal, X.shape)
+    return ShellMesh(X.reshape(-1, 3), np.ascontiguousarray(D.reshape(-1, 3)), grid_elements(number))
 
 
 @dataclass(frozen=True)
@@ -152,3 +208,97 @@ def _side_mixing() -> FloatArray:
     mix[:, 0, 0], mix[:, 0, 1] = 0.5 * (1 - GAUSS[:, 1]), 0.5 * (1 + GAUSS[:, 1])
     mix[:, 1, 2], mix[:, 1, 3] = 0.5 * (1 - GAUSS[:, 0]), 0.5 * (1 + GAUSS[:, 0])
     return mix
+
+
+class Shell:
+    """Thin-walled object.
+
+    Parameters
+    ----------
+    mesh : ShellMesh
+    young_modulus, poisson_ratio : float
+        [Pa], [-].
+    springs : (6 k,) array, optional
+        Stiffness to ground of every number [N/m]; the weak springs of a freely held object, for example.
+
+    Attributes
+    ----------
+    size : int
+        ``6 k``.
+    start, column : (6 k + 1,), (nnz,) arrays
+        Compressed-row pattern of the tangent, columns ascending.
+    node_area : (k,) array
+        Reference area that belongs to each node [m^2].
+    """
+
+    def __init__(
+        self, mesh: ShellMesh, young_modulus: float, poisson_ratio: float, springs: FloatArray | None = None
+    ) -> None:
+        self.mesh, self.young_modulus, self.poisson_ratio = mesh, float(young_modulus), float(poisson_ratio)
+        self.elements = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
+        self.size = 6 * len(mesh.X)
+        self.springs = np.zeros(self.size) if springs is None else springs
+        self._reference = np.hstack([mesh.X, mesh.D])
+        self.node_area = np.bincount(
+            mesh.elements.ravel(), (self.elements.area @ kernel.N_G).ravel(), minlength=len(mesh.X)
+        )
+        self._build_pattern()
+
+    def _build_pattern(self) -> None:
+        """Blocks of 6 x 6 between nodes that share an element."""
+        nodes, n = self.elements.nodes, len(self.mesh.X)
+        keys = (nodes[:, :, None].astype(np.int64) * n + nodes[:, None, :]).ravel()
+        loose = np.arange(n, dtype=np.int64) * (n + 1)
+        blocks, position = np.unique(np.concatenate([keys, loose]), return_inverse=True)
+        row, neighbour = blocks // n, blocks % n
+        first = np.searchsorted(row, np.arange(n + 1))
+        count = np.diff(first)
+        self._width = (6 * count).astype(np.int32)
+        place = 36 * first[row] + 6 * (np.arange(len(blocks)) - first[row])
+        self._place = place[position[: keys.size]].reshape(-1, 4, 4).astype(np.int32)
+        self.start = np.concatenate([[0], np.cumsum(np.repeat(6 * count, 6))]).astype(np.int32)
+        self.column = np.empty(self.start[-1], dtype=np.int32)
+        for k in range(6):
+            for m in range(6):
+                self.column[place + k * 6 * count[row] + m] = 6 * neighbour + m
+        where = np.repeat(np.arange(self.size), np.diff(self.start)) == self.column
+        self._diagonal = np.flatnonzero(where)
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes ``k``."""
+        return len(self.mesh.X)
+
+    def residual(self, q: FloatArray) -> FloatArray:
+        """Inner forces of the state ``q (6 k,)``, springs included: ``(6 k,)`` [N]."""
+        out = (self.springs * q).reshape(-1, 6)
+        kernel.residual(*self.elements.loops, self._reference + q.reshape(-1, 6), out)
+        return out.ravel()
+
+    def tangent(self, q: FloatArray, before: FloatArray | None = None) -> FloatArray:
+        """Values ``(nnz,)`` of the tangent [N/m] in ``q (6 k,)``, at ``start`` and ``column``.
+
+        Parameters
+        ----------
+        q : (6 k,) array
+        before : (6 k,) array, optional
+            State at the previous tangent of the same Newton solve. With it the tangent is that of mixed integration
+            points (Magisano, Leonetti, Garcea, Int. J. Num. Meth. Eng. 109, 2017): its geometric part uses the stresses
+            that the last linear step predicted. The residual, and so the solution, is untouched; thin shells get
+            there in far fewer iterations. Leave it out in the first iteration, also after every cut step.
+        """
+        values = np.zeros(self.start[-1])
+        values[self._diagonal] = self.springs
+        q = q.reshape(-1, 6)
+        step = NO_STEP if before is None else q - before.reshape(-1, 6)
+        kernel.tangent(*self.elements.loops, self._reference + q, step, self._place, self._width, values)
+        return values
+
+    def entries(self, unknown: IntArray) -> tuple[IntArray, IntArray]:
+        """Row and column ``(nnz,)`` of every value; ``unknown (6 k,)`` numbers the shell's numbers, -1 where fixed."""
+        return np.repeat(unknown, np.diff(self.start)), unknown[self.column]
+
+    def displacement(self, q: FloatArray) -> FloatArray:
+        """Displacement ``u + w`` of the outer face's nodes, ``(k, 3)`` [m]."""
+        parts = q.reshape(-1, 6)
+        return parts[:, :3] + parts[:, 3:]

@@ -1,7 +1,7 @@
 """Compiled loops over shell elements: strains, forces and tangent (the element is described in ``fem.shell.element``).
 
 A node's six numbers are ``x = (phi, d)`` or ``(u, w)``; inside an element the four places come first, then the four
-directors. Arithmetic is strict IEEE, as in ``fem.pad.hexahedra``.
+directors. Arithmetic is strict IEEE, as in ``fem.pad.foam``.
 """
 
 from __future__ import annotations

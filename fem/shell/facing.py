@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from softjaw.fem.objects.pose import FloatArray
+from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.spline_surface import SplineSurface, evaluate
 
 IntArray = NDArray[np.int32]

@@ -14,17 +14,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from softjaw.fem.contact.load_stepping import Settings, Stepping, Work, falls
 from softjaw.fem.contact.press import Pressed, pressed, since
-from softjaw.fem.contact.problem import Gap
+from softjaw.fem.contact.problem import Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.objects.pose import FloatArray
-from softjaw.fem.pad.spring_bed import SpringBed
+from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.petsc import NonlinearSolver, Seconds
-from softjaw.fem.shell.collapse import Opening
 from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.wall_mesh import BodyMesh
 
+SIDES = 0.3  # of the largest distance from the plane between the fingers on a ring: nodes nearer to it are left out
 LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
 JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
@@ -35,6 +36,62 @@ GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which 
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
+class Opening:
+    """How far the two halves of a wall still are apart along the approach, as a part of their undeformed distance.
+
+    The grasp frame's x axis is the approach, so a node is compared with the one that it looks at along x: its own image
+    where x = 0 is a plane of symmetry, else the nearest across from it. A dent turns back at its deepest place, where
+    it is level; so the node that lies nearest there is good enough.
+
+    Parameters
+    ----------
+    mesh : BodyMesh
+
+    Attributes
+    ----------
+    last : (float, float)
+        Opening and force [N] of the last state that was watched.
+    """
+
+    def __init__(self, mesh: BodyMesh) -> None:
+        self._inner = mesh.X - mesh.D
+        x = self._inner[mesh.number, 0]
+        bound = np.maximum(SIDES * np.abs(x).max(axis=0), 1e-6)
+        self._front = np.unique(mesh.number[x > bound])
+        back = np.unique(mesh.number[x < -bound])
+        self._back = None if mesh.symmetry[0] else back
+        if self._back is not None:
+            self._back = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._front, 1:])[1]]
+        self._whole = 1.0
+        self._whole = self._distances(np.zeros(mesh.X.size * 2))
+        self.last = 1.0, 0.0
+
+    def __call__(self, q: FloatArray) -> float:
+        """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
+        return float(self._distances(q).min())
+
+    def _distances(self, q: FloatArray) -> FloatArray:
+        parts = q.reshape(-1, 6)
+        x = self._inner[:, 0] + parts[:, 0] - parts[:, 3]
+        return (x[self._front] - (-x[self._front] if self._back is None else x[self._back])) / self._whole
+
+    def watch(self, q: FloatArray, force: float) -> None:
+        """Note the state at a force [N] of the fingers.
+
+        Raises
+        ------
+        CheckError
+            If the walls have met on the way here.
+        """
+        opening = self(q)
+        if opening > 0.0:
+            self.last = opening, force
+            return
+        before, at = self.last
+        meets = at + (force - at) * before / (before - opening)
+        raise CheckError(f"the wall collapsed: its opposite sides meet at {meets:.3g} N")
+
+
 @dataclass(frozen=True)
 class WallState:
     """The wall at one force.
@@ -42,7 +99,7 @@ class WallState:
     Parameters
     ----------
     q : (6 k,) array
-        State, see ``fem.shell.model`` [m].
+        State, see ``fem.shell.element`` [m].
     load : (k, 3) array
         Contact forces on the shell's nodes [N].
     reaction : (3,) array
@@ -50,7 +107,7 @@ class WallState:
     snapped : bool
         Whether the wall has snapped in on the way here: the force fell while the fingers closed, or it hardly grew.
     opening : float
-        Of the wall's inner faces towards each other, see ``fem.shell.collapse``: 1 undeformed, 0 where they would meet.
+        Of the wall's inner faces towards each other, see ``fem.shell.grip``: 1 undeformed, 0 where they would meet.
     """
 
     q: FloatArray

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.contact.pattern import Pattern, add_up
 from softjaw.fem.contact.problem import ContactPoints, Control, borne
-from softjaw.fem.objects.pose import FloatArray, Pose
+from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.foam import Foam, gather
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Facing, Wall, face

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softjaw.fem.objects.outer_surface import OuterSurface
     from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport
     from softjaw.fem.pad.backing_plate import Sheet
-    from softjaw.fem.pad.shape import PadShape
+    from softjaw.fem.pad.mesh import PadShape
     from softjaw.study.scene import Scene
     from softjaw.study.scene.objects import Shape, Walled
     from softjaw.study.scene.sections import Gripper
@@ -130,8 +130,7 @@ def _check_wall(shape: Walled) -> None:
     """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely."""
     import numpy as np
 
-    from softjaw.fem.shell.body import body_mesh
-    from softjaw.fem.shell.grid import MeshSize
+    from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 
     surface, _ = outer_surface(shape)
     lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
@@ -200,7 +199,7 @@ def sheet(gripper: Gripper) -> Sheet:
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
     """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
-    from softjaw.fem.pad.shape import PadShape
+    from softjaw.fem.pad.mesh import PadShape
 
     shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)
     return shape.halved() if coarser else shape

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import GraspPose
 

@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.torque import pure_torque

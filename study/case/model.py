@@ -12,9 +12,7 @@ from softjaw.fem.contact.friction_coupling import CoupledProblem, way
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
-from softjaw.fem.objects.gap import GapFunction, GapObject
-from softjaw.fem.objects.pose import Pose
-from softjaw.fem.objects.touch import NoContactError, first_touch
+from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
 from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case.build import build_object, pad_material, pad_shape, sheet
 from softjaw.study.case.candidates import candidates

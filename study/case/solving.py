@@ -13,8 +13,8 @@ import numpy as np
 
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
 from softjaw.fem.contact.press import Pressed
+from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError
-from softjaw.fem.pad.spring_bed import SpringBed
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between

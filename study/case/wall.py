@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.errors import CheckError
+from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.grip import Gripped
-from softjaw.fem.shell.model import Shell
-from softjaw.fem.shell.stress import faces
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
-from softjaw.fem.shell.wall_material import wall_material
+from softjaw.fem.shell.wall_material import faces, wall_material
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.margin import MARGIN, surely_below
 from softjaw.study.flags import Flag

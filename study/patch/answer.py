@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import FrameFlag
 from softjaw.friction.orientation import behind, wound
 from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError

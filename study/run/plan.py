@@ -258,8 +258,8 @@ class WallSize:
 
 def wall_size(scene: Any) -> WallSize | None:
     """Unknowns of a candidate in the middle of the scene's stations; None where the wall has no outline to divide."""
-    from softjaw.fem.objects.turned import Turned
-    from softjaw.fem.shell.grid import MeshSize, along, around
+    from softjaw.fem.objects.outer_surface import Turned
+    from softjaw.fem.shell.wall_mesh import MeshSize, along, around
 
     try:
         surface, is_round = outer_surface(scene.object)

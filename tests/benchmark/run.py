@@ -19,9 +19,9 @@ import numpy as np
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad import hexahedra as element_kernel
+from softjaw.fem.pad import foam as element_kernel
 from softjaw.fem.pad.mesh import Pad, PadShape
 from softjaw.study.case.model import approach
 from softjaw.study.environment import launch_environment, mpirun

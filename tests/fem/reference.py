@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softjaw.fem.shell.mesh import patch
-from softjaw.fem.shell.model import Shell
+from softjaw.fem.shell.element import Shell, patch
 
 UX, UY, UZ = np.eye(6)[:3]  # a force on a node
 

@@ -8,11 +8,10 @@ import pytest
 from softjaw.fem.contact import friction_coupling as coupling
 from softjaw.fem.contact.friction_coupling import CoupledProblem, way
 from softjaw.fem.contact.press import Press
-from softjaw.fem.contact.problem import Control
+from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad, PadShape
-from softjaw.fem.pad.spring_bed import SpringBed
 from tests.fem import reference
 
 SIZE = (0.050, 0.022, 0.015)

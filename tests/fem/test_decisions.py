@@ -14,32 +14,26 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from softjaw.fem.contact.checks import refuse_fall
 from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, way
 from softjaw.fem.contact.load_stepping import falls
-from softjaw.fem.contact.reasons import refuse_fall
 from softjaw.fem.errors import CheckError
-from softjaw.fem.objects.crossing import crossing_pairs
-from softjaw.fem.objects.mesh_check import MeshError, sound_mesh
+from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
+from softjaw.fem.objects.mesh_check import MeshError, crossing_pairs, sound_mesh
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import Section, _by_height, of_sections
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.outer_surface import Section, Turned, _by_height, of_sections
 from softjaw.fem.objects.profile import _corner, straight_runs
 from softjaw.fem.objects.revolution import Revolution, _check_line
-from softjaw.fem.objects.section_rays import Rays, cast, centroids
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Sphere
 from softjaw.fem.objects.spline_surface import spline_surface
 from softjaw.fem.objects.stacked import Stacked, wall_surface
-from softjaw.fem.objects.touch import NoContactError, first_touch
-from softjaw.fem.objects.traced_outline import _centre_line, folded
-from softjaw.fem.objects.traced_radii import _symmetric
-from softjaw.fem.objects.turned import Turned
+from softjaw.fem.objects.traced_outline import Rays, _centre_line, cast, centroids, folded
+from softjaw.fem.objects.traced_surface import _symmetric
 from softjaw.fem.pad.backing_plate import Sheet, _plate
 from softjaw.fem.pad.mesh import _as_grid, _lines
-from softjaw.fem.shell.body import _planes, _steps, _wall
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.grid import MeshSize, along, divided
-from softjaw.fem.shell.support import _clamped
-from softjaw.fem.shell.thin_walled import ThinWalled, grasp
+from softjaw.fem.shell.thin_walled import ThinWalled, _clamped, grasp
+from softjaw.fem.shell.wall_mesh import MeshSize, _planes, _steps, _wall, along, divided
 
 EPS = np.finfo(float).eps
 ULPS = EPS * np.arange(-8, 9)

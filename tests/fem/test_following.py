@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.contact.following import Following
-from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import Following, Settings, Stepping, Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError

@@ -7,13 +7,12 @@ import pytest
 
 from softjaw.fem.contact.extract import extract, half_turned
 from softjaw.fem.errors import CheckError
-from softjaw.fem.objects.pose import Pose
-from softjaw.fem.shell.body import body_mesh
-from softjaw.fem.shell.collapse import Opening
+from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.grid import MeshSize
+from softjaw.fem.shell.grip import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
+from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from tests.fem.grips import grip, pose, thin
 from tests.fem.test_grip import e_n
 

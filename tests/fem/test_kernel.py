@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.materials import material
-from softjaw.fem.pad import hexahedra as kernel
+from softjaw.fem.pad import foam as kernel
 from softjaw.fem.pad.mesh import Pad, PadShape
 
 G = 0.020e6

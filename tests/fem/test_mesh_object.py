@@ -9,13 +9,11 @@ import pyvista as pv
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.closest import ellipse_gap
-from softjaw.fem.objects.crossing import crossing_pairs
-from softjaw.fem.objects.mesh_check import sound_mesh, winding_number
+from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
+from softjaw.fem.objects.mesh_check import crossing_pairs, sound_mesh, winding_number
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.pose import Pose
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.fem.objects.touch import NoContactError, first_touch
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
@@ -77,7 +75,7 @@ def test_region_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_
 
 def test_spline_alone_is_of_fourth_order():
     """Samples of a sphere's distance, without triangles: orders 4, 3, 2 for the value and its derivatives."""
-    from softjaw.fem.objects.tricubic import coefficients, evaluate
+    from softjaw.fem.objects.mesh_object import coefficients, evaluate
 
     x, errors = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)), []
     for n in (21, 41, 81):

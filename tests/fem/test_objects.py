@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Plane, Revolution, Sphere
-from softjaw.fem.objects.touch import NoContactError, first_touch
 
 MM = 1e-3
 BOTTLE = MM * np.array(

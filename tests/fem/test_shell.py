@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.shell.linear import LinearShell
-from softjaw.fem.shell.mesh import ShellMesh, grid_elements, patch
-from softjaw.fem.shell.model import Shell
-from softjaw.fem.shell.stress import faces
+from softjaw.fem.shell.element import Shell, ShellMesh, grid_elements, patch
+from softjaw.fem.shell.wall_material import faces
+from softjaw.fem.shell.wall_model import LinearShell
 
 E, NU, THICKNESS = 2e9, 0.38, 0.02
 RNG = np.random.default_rng(7)

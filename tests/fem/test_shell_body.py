@@ -6,13 +6,11 @@ import pytest
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.fem.shell.body import body_mesh
-from softjaw.fem.shell.grid import MeshSize, divided, limited
-from softjaw.fem.shell.linear import LinearShell
 from softjaw.fem.shell.solve import ShellProblem, load_steps
-from softjaw.fem.shell.stress import faces, largest
-from softjaw.fem.shell.support import supported
-from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.thin_walled import supported
+from softjaw.fem.shell.wall_material import WallMaterial, faces, largest, wall_material
+from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
+from softjaw.fem.shell.wall_model import LinearShell
 
 FLASK = Revolution(
     np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3

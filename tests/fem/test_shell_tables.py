@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.errors import ConvergenceError
-from softjaw.fem.shell.arc_length import follow
-from softjaw.fem.shell.linear import LinearShell
-from softjaw.fem.shell.solve import ShellProblem, load_steps
+from softjaw.fem.shell.solve import ShellProblem, follow, load_steps
+from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem import shell_problems
 
 TABLES = json.loads((Path(__file__).parents[1] / "data" / "shell_tables.json").read_text(encoding="utf-8"))

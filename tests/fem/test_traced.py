@@ -9,19 +9,15 @@ import pytest
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import Section, of_sections
+from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.fem.objects.section_rays import cast, centroids
-from softjaw.fem.objects.smoothing import smooth_rings, smooth_spline
 from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.traced_outline import cast, centroids, smooth_rings, smooth_spline
 from softjaw.fem.objects.traced_surface import traced
-from softjaw.fem.objects.turned import Turned
-from softjaw.fem.shell.body import body_mesh
-from softjaw.fem.shell.grid import MeshSize
-from softjaw.fem.shell.linear import LinearShell
-from softjaw.fem.shell.support import supported
-from softjaw.fem.shell.thin_walled import ThinWalled
+from softjaw.fem.shell.thin_walled import ThinWalled, supported
 from softjaw.fem.shell.wall_material import wall_material
+from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
+from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem.grips import can, grip, thin
 from tests.fem.test_grip import e_n
 

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softjaw.fem.contact.reasons import explained, refuse_fall
+from softjaw.fem.contact.checks import explained, refuse_fall
+from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.fem.pad.mesh import Pad, PadShape
-from softjaw.fem.pad.spring_bed import SpringBed
 from tests.fem import reference
 
 STUCK = ConvergenceError("stuck at 3 N")

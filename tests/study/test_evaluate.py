@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, mesh_errors, quality
 from softjaw.study.flags import Flag

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softjaw.fem.blas_buffers import take_buffers
-from softjaw.fem.petsc import NonlinearSolver
+from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study import messages
 from softjaw.study.environment import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError

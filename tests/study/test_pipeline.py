@@ -347,7 +347,7 @@ PRESSED_FLAT = """
 import numpy as np
 from softjaw.fem.materials import material
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.pad.mesh import PadShape
 from softjaw.fem.contact.press import Press
 
 def plane(x):
@@ -416,7 +416,7 @@ def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
 
 def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):
     jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
-    monkeypatch.setattr("softjaw.fem.contact.following.Following._leaves", jumps)
+    monkeypatch.setattr("softjaw.fem.contact.load_stepping.Following._leaves", jumps)
     found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
     for _, ladder in found:
         assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in ladder] == [False, True, True]

@@ -173,7 +173,7 @@ def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
 
 
 def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
-    from softjaw.fem.shell.collapse import Opening
+    from softjaw.fem.shell.grip import Opening
 
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
     ladder = [r for _, r in pipeline.solve_unit(units_of(CUP, forces="[0.2, 3, 4]")[0])]

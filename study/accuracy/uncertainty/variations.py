@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.scene import Scene
 
