@@ -34,7 +34,7 @@ NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures effects test test-blas test-long bench lint doctor
+.PHONY: help setup map figures effects test test-blas test-long bench hard-cases lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
@@ -44,6 +44,7 @@ help:
 	@echo 'make test-blas  the numerical tests with each kernel of OpenBLAS that this CPU can run (OPENBLAS_CORETYPE)'
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
+	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
 	@echo 'make lint       ruff'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
 	@echo 'make setup      only what each of the above does first: packages and .venv'
@@ -84,6 +85,9 @@ test-blas: setup
 test-long: setup
 	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10
 	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
+
+hard-cases: setup
+	$(BIN)/python -m pytest -q -n 2 tests/hard_cases -m "" --table docs/hard-cases.md
 
 bench: setup
 	$(BIN)/python -m tests.benchmark.run $(PARTS)

@@ -11,3 +11,7 @@ class NotReachedError(ConvergenceError):
 
 class CheckError(RuntimeError):
     """A solve converged to a state that breaks a law of contact or of the material."""
+
+
+class MeshError(ValueError):
+    """A mesh that cannot serve as an object; the message says why and what to do."""

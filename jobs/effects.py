@@ -17,18 +17,17 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.pad.linear_pad import departure
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.polytope import polytope_volume
-from softjaw.study.case import effects, model, pad_level, wall
-from softjaw.study.case.build import build_object, pad_material
+from softjaw.study.case import effects, model, wall
+from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
 from softjaw.study.case.solving import Solver, solver
 from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
-from softjaw.study.scene.score_sections import LimitSurface
+from softjaw.study.scene.sections import LimitSurface
 from softjaw.study.show import pictures
 
 TARGET = 0.02  # relative error of e_n that a skip may have
@@ -66,7 +65,6 @@ SHELLS = "object: linear or nonlinear shell"
 PANELS = {  # of an effect: threshold, and what the axis says
     "object: rigid or shell": (wall.STIFF, "dent / travel"),
     SHELLS: (wall.SMALL_DENT, "dent / wall thickness"),
-    "pad": (pad_level.NEARLY_LINEAR, "departure from a linear law"),
     "sheet": (effects.STIFF_SHEET, "compliance over that of the pad"),
     "friction": (TARGET, "1 - F_N / S"),
     "friction-pressure coupling": (effects.SMALL_TRACTION, "traction left out / pressure"),
@@ -147,19 +145,15 @@ def rigid_scenes() -> Iterator[tuple[str, Scene]]:
 def rigid_rows() -> Iterator[Row]:
     """Every effect but the object's."""
     for label, scene in rigid_scenes():
-        compliance, law = effects.sheet_level(scene).compliance, pad_material(scene.gripper)
-        plain = {"pad": "hyperelastic", "sheet": "rigid"}
-        foam = climb(scene, **plain)
-        linear, plate = climb(scene, pad="linear", sheet="rigid"), climb(scene, pad="hyperelastic", sheet="elastic")
+        compliance = effects.sheet_level(scene).compliance
+        plain = {"sheet": "rigid"}
+        foam, plate = climb(scene, **plain), climb(scene, sheet="elastic")
         coupled = climb(scene, **plain, friction_pressure_coupling="tangential")
         coarse = scene.with_values({"gripper.elements": [12, 6, 4]})
         part, whole = climb(coarse, **plain), climb(coarse, **plain, model_size="full")
         for key, contacts in foam.items():
             name = f"{label}, place {key[0]}, {key[1]:g} N"
             yield from of_patch(name, contacts)
-            if key in linear:
-                strain = max(c.state.checks.max_strain for c in linear[key])
-                yield "pad", name, departure(law, strain), off(e_n(linear[key]), e_n(contacts))
             if key in plate:
                 yield "sheet", name, compliance, off(e_n(contacts), e_n(plate[key]))
             if key in coupled:

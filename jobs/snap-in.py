@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.quantities import EFFECTS
 from softjaw.study.result.store import open_result
 from softjaw.study.show import pictures
 

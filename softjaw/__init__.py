@@ -18,6 +18,9 @@ _HOMES = {
     "score": "scoring.score",
     "Scene": "study.scene",
     "load_scene": "study.scene",
+    "open": "study.result.read",
+    "read_patch": "study.result.read",
+    "read_field": "study.result.read",
     "GraspMap": "study.lookup",
 }
 __all__ = sorted(_HOMES)

@@ -1,33 +1,77 @@
-"""The command line: words to options, and errors to exit codes."""
+"""The command line: words to options, one screen of help in the order of use, and errors to exit codes."""
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import errno
 import math
 import os
+import shutil
 import sys
+import textwrap
 import traceback
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import IO, Any
 
 from softjaw.study import commands
 from softjaw.study.accuracy.cost.command import add_options as add_cost_options
-from softjaw.study.completion import add_options as add_completion_options
 from softjaw.study.environment import keep_compiled_loops, pin_threads
-from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, USAGE, StudyError
-from softjaw.study.file_options import add_repair_options, add_scale_options
-from softjaw.study.help import Formatter, Parser, Program
+from softjaw.study.exits import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError
 from softjaw.study.patch.command import add_options as add_patch_options
 from softjaw.study.run.memory import is_out_of_memory, no_room
-from softjaw.study.scene.start import add_options as add_init_options
 from softjaw.study.show.figures.command import add_options as add_figure_options
 from softjaw.study.show.tables.watch import add_options as add_watch_options
 from softjaw.study.show.view.command import add_choice
 from softjaw.study.show.view.command import add_options as add_view_options
-from softjaw.study.speaking import complain
+from softjaw.study.speaking import complain, first_rank
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
+KINDS = {
+    "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
+    "cup": "a thin-walled cup: dents, and the window of forces that hold it without spilling",
+    "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
+    "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
+}
+SHELLS = ("bash", "zsh", "fish")
+COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words
+    "prepare": (
+        ("init", "write a commented scene and a batch script to start from", "init bottle"),
+        ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml"),
+        ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16"),
+        ("cost", "what accuracy costs in time: errors and seconds of every setting",
+         "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf"),
+    ),
+    "solve": (
+        ("run", "solve a scene into a result file; run again to resume",
+         "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor"),
+        ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5"),
+        ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf"),
+        ("scale", "replay the times of a finished file on many ranks",
+         "scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"),
+    ),
+    "look at results": (
+        ("show", "the best grasps as a table", "show results/bottle-rigid.hdf --force 4 --top 3 --json"),
+        ("report", "one self-contained page: maps, definitions, provenance",
+         "report results/bottle-rigid.hdf -o results/bottle-rigid.html"),
+        ("view", "the map on the object in 3-D: window, page, picture",
+         "view results/bottle-rigid.hdf --force 4 --screenshot view.png"),
+        ("figure", "a figure of the paper, from its scene to the picture", "figure 4c"),
+        ("compare", "two maps side by side: settings and cases that differ",
+         "compare results/soft.hdf results/stiff.hdf --quantity e_n"),
+    ),
+    "use the numbers": (
+        ("export", "every case for planners: maps, frames, limit surfaces",
+         "export results/smoke.hdf --csv -o results/smoke.csv"),
+        ("patch", "judge a pressure field from elsewhere: friction, score",
+         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60"),
+    ),
+    "this program": (
+        ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json"),
+        ("doctor", "does this machine have what softjaw needs", "doctor"),
+        ("completion", "a script by which the shell completes words", "completion bash > softjaw.bash"),
+    ),
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,6 +118,69 @@ def _unforeseen(options: argparse.Namespace, error: Exception) -> int:
     return BUG
 
 
+class Parser(argparse.ArgumentParser):
+    """Speaks on the first rank only, whatever started the ranks, and suggests what an unknown word may have meant."""
+
+    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+        if first_rank():
+            super()._print_message(message, file)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            meant = _meant(value, list(action.choices))
+            self.error(f"unknown command '{value}'{meant} '{self.prog} --help' lists all")
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            text = f"found '{value}', expected {', '.join(known)}{_meant(str(value), known)}"
+            raise argparse.ArgumentError(action, text.rstrip(";"))
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Refuse what is left over here, where the options that exist are known."""
+        found, rest = super().parse_known_args(args, namespace)
+        if rest:
+            slip = next((word for word in rest if word.startswith("-")), rest[0])
+            name = slip.partition("=")[0]
+            kind = "option" if slip.startswith("-") else "word"
+            known = list(self._option_string_actions) if kind == "option" else []
+            self.error(f"unknown {kind} '{name}'{_meant(name, known)} '{self.prog} --help' lists all")
+        return found, rest
+
+
+def _meant(word: str, known: Sequence[str]) -> str:
+    """A suggestion, or only the punctuation where no word is alike.
+
+    >>> _meant("shwo", ["show", "run"]), _meant("x", ["show", "run"])
+    ("; did you mean 'show'?", ';')
+    """
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f"; did you mean '{near[0]}'?" if near else ";"
+
+
+class Formatter(argparse.HelpFormatter):
+    """Breaks descriptions between words, and leaves examples as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if "\n" in text else super()._fill_text(text, width, indent)
+
+
+class Program(Parser):
+    """The parser of the whole program: its help lists the commands by what they are for."""
+
+    def format_help(self) -> str:
+        """Commands by group, an example, exit codes."""
+        width = min(shutil.get_terminal_size().columns, 100) - 2
+        lines = [f"usage: {self.prog} COMMAND ...", "", *textwrap.wrap(self.description or "", width)]
+        for title, listed in COMMANDS.items():
+            entries = [
+                textwrap.fill(text, width, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14)
+                for name, text, _ in listed
+            ]
+            lines += ["", f"{title}:", *entries]
+        codes = "; ".join(f"{code} {text}" for code, text in MEANING.items())
+        lines += ["", *textwrap.wrap(f"exit codes: {codes}", width, subsequent_indent="  "), "", self.epilog or ""]
+        return "\n".join(lines) + "\n"
+
+
 def program() -> Program:
     """The parser of the whole command line."""
     parser = Program(
@@ -83,94 +190,109 @@ def program() -> Program:
         epilog="example:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
     )
     listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
-
-    def add(name: str, command: Any, text: str, example: str) -> argparse.ArgumentParser:
-        made = listed.add_parser(
-            name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=f"example:\n  {example}",
-            formatter_class=Formatter,
+    made = {}
+    for name, text, example in (command for group in COMMANDS.values() for command in group):
+        ranks = "mpirun -n 8 " if name == "run" else ""
+        made[name] = listed.add_parser(
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", formatter_class=Formatter,
+            epilog=f"example:\n  {ranks}softjaw {example}",
         )  # fmt: skip
-        made.set_defaults(command=command)
-        return made
-
-    add_init_options(add("init", commands.init, "write a commented scene and a batch script to start from",
-                         "softjaw init bottle"))  # fmt: skip
-    check = add("check", commands.check, "find every error of a scene, or say what would be run",
-                "softjaw check jobs/bottle-rigid.toml")  # fmt: skip
-    plan = add("plan", commands.plan, "cases, units, disk, memory and time, before anything is spent",
-               "softjaw plan jobs/bottle-rigid.toml -n 16")  # fmt: skip
-    run = add("run", commands.run, "solve a scene into a result file; again: go on where it was",
-              "mpirun -n 8 softjaw run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor")  # fmt: skip
-    for made in (check, plan, run):
-        made.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-        made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
-                          help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
-    plan.add_argument("-n", type=_positive, default=1, metavar="RANKS", dest="ranks", help="ranks (default 1)")
-    for made in (plan, run):
-        made.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
-    run.add_argument("--retry-failed", action="store_true", help="solve failed cases again")
-    status = add("status", commands.status, "what a result file holds so far, also while it grows",
-                 "softjaw status results/bottle-rigid.hdf")  # fmt: skip
-    add_watch_options(add("watch", commands.watch, "live view of a run, in another terminal",
-                          "softjaw watch results/bottle-rigid.hdf --every 5"))  # fmt: skip
-    add_repair_options(add("repair", commands.repair, "what of a damaged file is good; make it usable again",
-                           "softjaw repair results/bottle-rigid.hdf --write"))  # fmt: skip
-    add_scale_options(add("scale", commands.scale, "replay the times of a finished file on many ranks",
-                          "softjaw scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"))  # fmt: skip
-    show = add("show", commands.show, "the best grasps as a table",
-               "softjaw show results/bottle-rigid.hdf --force 4 --top 3 --json")  # fmt: skip
-    report = add("report", commands.report, "one self-contained page: maps, definitions, provenance",
-                 "softjaw report results/bottle-rigid.hdf -o results/bottle-rigid.html")  # fmt: skip
-    for made in (status, show, report):
-        made.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    show.add_argument("--force", type=_force, metavar="N", help="force level nearest to N [N] (default: the highest, "
-                      "or the highest that some grasp holds and its wall bears)")  # fmt: skip
-    show.add_argument("--top", type=_count, default=10, metavar="K", help="how many grasps, 0: all (default 10)")
-    compare = add("compare", commands.compare, "two maps side by side: settings and cases that differ",
-                  "softjaw compare results/soft.hdf results/stiff.hdf --quantity e_n")  # fmt: skip
-    compare.add_argument("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b")
-    compare.add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)")
-    compare.add_argument("--top", type=_count, default=10, metavar="K", help="largest differences, 0: all (default 10)")
-    export = add("export", commands.export, "every case for planners: maps, frames, limit surfaces",
-                 "softjaw export results/smoke.hdf --csv -o results/smoke.csv")  # fmt: skip
-    export.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    export.add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
-    for made in (compare, export):
-        made.add_argument("--model", choices=("curved", "flat", "projected"), default="curved",
-                          help="friction model (default curved)")  # fmt: skip
-    for made in (status, show, compare, export):
-        form = made.add_mutually_exclusive_group(required=made is export)
-        form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
-        form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
-    add_choice(report)
-    report.add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
-    add_patch_options(add("patch", commands.patch, "judge a pressure field from elsewhere: friction, score",
-                          "softjaw patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60"))  # fmt: skip
-    add_view_options(add("view", commands.view, "the map on the object in 3-D: window, page, picture",
-                         "softjaw view results/bottle-rigid.hdf --force 4 --screenshot view.png"))  # fmt: skip
-    add_figure_options(add("figure", commands.figure, "a figure of the paper, from its scene to the picture",
-                           "softjaw figure 4c"))  # fmt: skip
-    add_completion_options(add("completion", commands.completion, "a script by which the shell completes words",
-                               "softjaw completion bash > softjaw.bash"))  # fmt: skip
-    add_cost_options(add("cost", commands.cost, "what accuracy costs in time: errors and seconds of every setting",
-                         "softjaw cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf"))  # fmt: skip
-    add("schema", commands.schema, "JSON schema of a scene, for editors", "softjaw schema > scene.schema.json")
-    add("doctor", commands.doctor, "does this machine have what softjaw needs", "softjaw doctor")
+        made[name].set_defaults(command=getattr(commands, name))
+    for name, add_options in (("init", _add_init_options), ("cost", add_cost_options), ("watch", add_watch_options),
+                              ("view", add_view_options), ("figure", add_figure_options), ("patch", add_patch_options),
+                              ("scale", _add_scale_options)):  # fmt: skip
+        add_options(made[name])
+    _add_scene_options(made)
+    _add_result_options(made)
+    made["completion"].add_argument("shell", choices=SHELLS, help="the shell that is to learn softjaw's words")
     return parser
 
 
-def _positive(text: str) -> int:
-    if (value := int(text)) < 1:
-        raise argparse.ArgumentTypeError(f"found {text}, expected at least 1")
-    return value
+def _add_init_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    kinds = "kinds:\n" + "\n".join(f"  {name:<9} {text}" for name, text in KINDS.items())
+    add("kind", choices=tuple(KINDS), help="what to start from")
+    add("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the kind, or the "
+        "name of the mesh)")  # fmt: skip
+    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
+    add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
+    add("--axis", choices=("x", "y", "z"), default="z", help="axis of the mesh along which grasps are spread "
+        "(default z)")  # fmt: skip
+    add("--force", action="store_true", help="replace files that are there")
+    add("--list", action="version", version=kinds, help="list the kinds and leave")
+    more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"
+    parser.epilog = f"{parser.epilog}\n  {more}\n\n{kinds}"
 
 
-def _force(text: str) -> float:
+def _add_scene_options(made: dict[str, Any]) -> None:
+    """What ``check``, ``plan`` and ``run`` take."""
+    for parser in (made["check"], made["plan"], made["run"]):
+        parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+        parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
+                            help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
+    made["plan"].add_argument("-n", type=_whole(1), default=1, metavar="RANKS", dest="ranks", help="ranks (default 1)")
+    for parser in (made["plan"], made["run"]):
+        parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
+    made["run"].add_argument("--retry-failed", action="store_true", help="solve failed cases again")
+
+
+def _add_result_options(made: dict[str, Any]) -> None:
+    """What the commands take that look at result files."""
+    for name in ("status", "show", "report", "export"):
+        made[name].add_argument("file", metavar="FILE", help="result file (.hdf)")
+    made["compare"].add_argument("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b")
+    for name in ("status", "show", "compare", "export"):
+        form = made[name].add_mutually_exclusive_group(required=name == "export")
+        form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
+        form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
+    made["show"].add_argument("--force", type=_positive, metavar="N", help="force level nearest to N [N] (default: the "
+                              "highest, or the highest that some grasp holds and its wall bears)")  # fmt: skip
+    made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
+                                 "(default e_n)")  # fmt: skip
+    for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
+        made[name].add_argument("--top", type=_whole(0), default=10, metavar="K", help=f"{listed}, 0: all (default 10)")
+    for name in ("compare", "export"):
+        made[name].add_argument("--model", choices=("curved", "flat", "projected"), default="curved",
+                                help="friction model (default curved)")  # fmt: skip
+    made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    add_choice(made["report"])
+    made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+
+
+def _add_scale_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("file", metavar="FILE", help="result file (.hdf) whose cases were timed")
+    add("-n", type=_counts, default=(1, 4, 16, 64, 256, 1024, 4096), metavar="RANKS", dest="ranks",
+        help="numbers of ranks (default 1,4,16,64,256,1024,4096)")  # fmt: skip
+    add("--repeat", type=_whole(1), default=1, metavar="K", help="take a study of K times as many candidates "
+        "(default 1)")  # fmt: skip
+    add("--per-node", type=_whole(1), default=64, metavar="R", help="ranks that share a node and its counter "
+        "(default 64)")  # fmt: skip
+    add("--claim-us", type=_positive, default=20.0, metavar="US", help="time of one look at the counter (default 20)")
+    add("--write-ms", type=_positive, default=0.015, metavar="MS", help="time of one write (default 0.015, as to a "
+        "local disk; 1 is a busy network folder)")  # fmt: skip
+    add("--writes-per-s", type=_positive, default=5e4, metavar="N", help="writes that the file system takes from all "
+        "ranks together (default 50000)")  # fmt: skip
+    add("--mb-per-s", type=_positive, default=1e3, metavar="MB", help="what the file system takes from all "
+        "(default 1000)")  # fmt: skip
+
+
+def _whole(least: int) -> Callable[[str], int]:
+    """A type of whole numbers from ``least`` to a million."""
+
+    def count(text: str) -> int:
+        if not least <= (value := int(text)) <= 10**6:
+            raise argparse.ArgumentTypeError(f"found {text}, expected {least} to 1000000")
+        return value
+
+    return count
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    return tuple(map(_whole(1), text.split(",")))
+
+
+def _positive(text: str) -> float:
     if not 0 < (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a force > 0 in N")
-    return value
-
-
-def _count(text: str) -> int:
-    if (value := int(text)) < 0:
-        raise argparse.ArgumentTypeError(f"found {text}, expected 0 or more")
+        raise argparse.ArgumentTypeError(f"found {text}, expected a number above 0")
     return value

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import traceback
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace, _SubParsersAction
 from pathlib import Path
 from typing import Any
 
 from softjaw.study.exits import BUG, DONE, OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.preparation import prepare, scene_of, target, with_target_met, work
 from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
-from softjaw.study.run.running import prepare, scene_of, target, with_target_met, work
 from softjaw.study.speaking import complain, say
 from softjaw.study.writing import write_file
+
+FILES = ("SCENE", "FILE", "HTML", "PNG", "PICTURE", "VTKHDF")  # metavars of words that are files
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
     """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):
@@ -32,7 +35,7 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
             return found
         if torn:
             text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
-            return StudyError(OTHER_FILE, f"{text}; 'softjaw repair {file}' says what is good")
+            return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
         if isinstance(error, SceneError):
             text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
             return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")
@@ -43,27 +46,29 @@ def init(options: Namespace) -> int:
     """Write a scene and a batch script to start from."""
     from softjaw.study.scene.start import init
 
-    print(init(options))
+    print(init(options, _mesh_size))
     return DONE
 
 
-def _catalogue(options: Namespace) -> bool:
-    from softjaw.study.catalogue.model import is_catalogue
+def _mesh_size(options: Namespace) -> list[float]:
+    """Extents across and along the axis [mm] of a mesh that a study can take."""
+    from softjaw.study.case.build import build_object
+    from softjaw.study.scene.objects import Mesh
 
-    return is_catalogue(Path(options.scene))
+    shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)
+    try:
+        bounds: Any = build_object(shape).bounds
+    except (ValueError, OSError) as error:
+        raise StudyError(USAGE, f"--mesh: {error}") from error
+    return [1e3 * float(high - low) for low, high in zip(*bounds, strict=True)]
 
 
 def check(options: Namespace) -> int:
-    """Find every error of a scene or of a catalogue, or say what would be run."""
+    """Find every error of a scene, or say what would be run."""
     from softjaw.study.case.build import check_object
     from softjaw.study.show.tables.columns import hanging, terminal_width
     from softjaw.study.show.tables.overview import scene_text
 
-    if _catalogue(options):
-        from softjaw.study.catalogue.run import check_text
-
-        say(check_text(Path(options.scene), options.overrides))
-        return DONE
     scene = scene_of(options)
     check_object(scene)
     say(hanging(scene_text(scene, options.scene), terminal_width()))
@@ -76,9 +81,6 @@ def plan(options: Namespace) -> int:
     from softjaw.study.run.plan import make_plan, plan_text
     from softjaw.study.show.tables.columns import hanging, terminal_width
 
-    if _catalogue(options):
-        text = "is a catalogue of scenes; 'check' and 'run' take it, 'plan' does not"
-        raise StudyError(USAGE, f"{options.scene}: {text}")
     scene = scene_of(options)
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
@@ -106,14 +108,6 @@ def watch(options: Namespace) -> int:
     from softjaw.study.show.tables.watch import watch
 
     return watch(Path(options.file), options.every)
-
-
-def repair(options: Namespace) -> int:
-    """Say what of a damaged file is good, and make it usable."""
-    from softjaw.study.result.repair import repair
-
-    say(repair(Path(options.file), options.write, options.in_place))
-    return DONE
 
 
 def scale(options: Namespace) -> int:
@@ -202,11 +196,17 @@ def figure(options: Namespace) -> int:
 
 
 def completion(options: Namespace) -> int:
-    """Print a script that lets a shell complete the words of this program."""
-    from softjaw.study.cli import program
-    from softjaw.study.completion import script
+    """Print a script that lets a shell complete the words of this program, files among them."""
+    import shtab
 
-    print(script(program(), options.shell))
+    from softjaw.study.cli import program
+
+    parser: ArgumentParser = program()
+    commands = next(a for a in parser._actions if isinstance(a, _SubParsersAction)).choices.values()
+    for action in (action for made in commands for action in made._actions):
+        if action.metavar in FILES:
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(parser, options.shell))
     return DONE
 
 
@@ -221,8 +221,6 @@ def cost(options: Namespace) -> int:
 
 def schema(_options: Namespace) -> int:
     """Print the JSON schema of a scene."""
-    import json
-
     from softjaw.study.scene import Scene
 
     print(json.dumps(Scene.model_json_schema(), indent=2))
@@ -263,12 +261,7 @@ def run(options: Namespace) -> int:
 
 
 def _run_on(comm: Any, options: Namespace) -> int:
-    from softjaw.study.run.run import on_rank0, run_study
-
-    if on_rank0(comm, _catalogue, options):
-        from softjaw.study.catalogue.run import run_catalogue
-
-        return run_catalogue(options, comm)
+    from softjaw.study.run.session import on_rank0, run_study
 
     def read() -> tuple[Any, Path]:
         scene = scene_of(options)

@@ -56,8 +56,8 @@ class Flag(IntFlag):
     YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the dent stays"
     NO_FIT = 1 << 16, "no fit", "a limit surface could not be fitted, the ellipsoid from three motions stands in"
     UNSTABLE = 1 << 17, "unstable", "the foam lost ellipticity, strains may localise"
-    JUMPED = 1 << 18, "jumped", "the pad jumped on the way to this force, the state depends on the load path", (
-        "its path of equilibria ends, folds or forks there"
+    JUMPED = 1 << 18, "jumped", (
+        "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"
     )  # fmt: skip
     # of no file: derived where a file tells the window of forces
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's weight"

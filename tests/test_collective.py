@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 SHARED = {"shared_path", "folder", "small_disk"}  # fixtures that give all ranks the same folder
 WRITERS = {
     "write_text", "write_bytes", "mkdir", "touch", "unlink", "rename", "replace", "rmtree", "copy", "copyfile",
-    "truncate", "make", "create", "File", "ResultWriter", "open", "savefig", "dump", "sealed", "repair", "save",
+    "truncate", "make", "create", "File", "ResultWriter", "open", "savefig", "dump", "sealed", "save",
     "write_report", "launch", "study", "run", "Popen",
 }  # fmt: skip
 CASES = [path for path in sorted(HERE.rglob("*.py")) if "shared_path" in path.read_text() and path != Path(__file__)]

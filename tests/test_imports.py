@@ -18,8 +18,21 @@ ALLOWED = {
     "friction": {"softjaw.friction"} | NUMERICS,
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
-    "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "vtkmodules"} | NUMERICS,
-    "study": {"pydantic", "matplotlib", "jinja2", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules"} | NUMERICS,
+    "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
+    "study": {
+        "pydantic",
+        "jinja2",
+        "plotly",
+        "rich",
+        "matplotlib",
+        "shtab",
+        "mpi4py",
+        "h5py",
+        "pyvista",
+        "vtkmodules",
+        "xarray",
+    }
+    | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
@@ -31,7 +44,7 @@ PICTURES = {
 }
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
-    "shtab": {"study/completion.py"},
+    "shtab": {"study/commands.py"},
     "h5py": {
         "study/result/store.py",
         "study/result/skeleton.py",
@@ -109,10 +122,10 @@ def test_only_study_talks_to_the_session_it_runs_in():
         ("fem/contact/press.py", "import softjaw.study.scene", "softjaw.study"),
         ("fem/contact/press.py", "def f():\n    from mpi4py import MPI", "mpi4py"),
         ("fem/contact/problem.py", "from petsc4py import PETSc", "petsc4py"),
-        ("study/run/run.py", "import h5py", "h5py"),
+        ("study/run/session.py", "import h5py", "h5py"),
         ("study/report.py", "if TYPE_CHECKING:\n    import pyvista as pv", "pyvista"),
-        ("study/run/run.py", "import importlib\nimportlib.import_module('petsc4py.PETSc')", "petsc4py"),
-        ("study/run/run.py", "__import__(name)", "(computed)"),
+        ("study/run/session.py", "import importlib\nimportlib.import_module('petsc4py.PETSc')", "petsc4py"),
+        ("study/run/session.py", "__import__(name)", "(computed)"),
         ("friction/frame.py", "from ..fem import pose", "(relative)"),
         ("lsfit/ellipsoid.py", "import cvxpy", "cvxpy"),
     ],

@@ -8,9 +8,10 @@ too; where it grows while the force hardly does (`FOLDING`, `FOLDS`), the foam f
 further than `STRAINED` may buckle: there a stable state has to lead to a stable one, whose tangent on the free
 displacements, the nodes in contact held to the object, is positive definite.
 
-Where even a step of `SHORTEST` leaves the path, the pad jumps: the path ends at a limit, folds or forks. With weighted
-gaps this is an error, because nodal gaps often know of no jump; else the state beyond is taken and ``jumped`` is set:
-this state and those that follow depend on the way to them.
+Where even a step of `SHORTEST` leads from a stable state to an unstable one, the path forks: its states go on and are
+taken, but a pad that is disturbed may leave them. Where such a step leaves the path, the pad jumps: the path ends at a
+limit or folds. With weighted gaps this is an error, because nodal gaps often know of no jump; else the state beyond is
+taken. In both cases ``jumped`` is set: this state and those that follow depend on the way to them.
 """
 
 from __future__ import annotations
@@ -78,13 +79,14 @@ class Following(Stepping):
                     return self._walked(here, force, work)
                 continue
             ahead = self._place(x, target, None)
-            leaves = self._leaves(here, ahead)
-            if leaves or ahead.strain - here.strain > FOLD:
+            leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
+            if leaves or forks or ahead.strain - here.strain > FOLD:
                 if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST:
                     cut, work.cuts = 0.5 * cut, work.cuts + 1
                     continue
                 if leaves:
                     self._jump(target, walk)
+                self.jumped |= forks
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
             here = replace(ahead, tangent=self._tangent(x)) if done < 1.0 else ahead
@@ -133,8 +135,7 @@ class Following(Stepping):
             if np.abs(off).max() > STRAY * self.thickness:
                 return True
         grown = ahead.strain - here.strain
-        folds = grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
-        return folds or (here.stable and not ahead.stable)
+        return grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
 
     def _jump(self, force: float, walk: bool) -> None:
         """Note that the path was left on the way to a force [N], or refuse it where there is another way."""

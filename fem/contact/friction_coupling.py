@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap
+from softjaw.fem.contact.problem import IDLE, ContactPoints, ContactProblem, Gap
 from softjaw.fem.pad.foam import gather
 from softjaw.fem.pad.mesh import Pad
 
@@ -51,7 +51,8 @@ class CoupledProblem(ContactProblem):
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
         self._contact(x, tangent=False)
         self._before = self._traction(x)[0]
-        self._at, self._closed = self._points.copy(), self._pressure(x) > 0.0
+        pressure = self._pressure(x)
+        self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""

@@ -103,8 +103,6 @@ class Press:
     fallback : Pad, optional
         The same pad with nodal gaps, for forces at which ``pad`` has no solution.
     settings : Settings
-    solver_of : callable
-        Problem and options to its solver.
     problem_of : callable
         Pad and gap to the problem.
     way : callable
@@ -118,7 +116,6 @@ class Press:
     options: dict[str, Any] = field(default_factory=dict)
     fallback: Pad | None = None
     settings: Settings = field(default_factory=Settings)
-    solver_of: Callable[[ContactProblem, dict[str, Any]], Any] = NonlinearSolver
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
     way: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
     stepping: type[Stepping] = Following
@@ -130,7 +127,7 @@ class Press:
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
         self.problem = self.problem_of(self.pad, self.gap)
-        self.solver = self.solver_of(self.problem, self.options)
+        self.solver = NonlinearSolver(self.problem, self.options)
         self._stepping = self.stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
             self._bed.force_scale, self.pad.rounding, watch=self._remember,

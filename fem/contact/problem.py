@@ -241,20 +241,6 @@ class ContactProblem:
         """
         return self._by_force == (self.control.force is not None) and np.array_equal(self._pressing, self._held)
 
-    def front(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What the front alone contributes at ``x``: valid until the next call.
-
-        Returns
-        -------
-        weighted_gap : (n,) array
-            ``G_i`` of every node of the front [m^3].
-        force : (faces, 3, k) array
-            Contact's part of ``R_q``, node by node of each face [N].
-        K_uu, K_ul : (faces, 3, k, 3, k), (faces, k, 3, k) arrays
-            ``dforce/du`` [N/m]; ``dG/du`` [m^2], which is also ``-dforce/dp``.
-        """
-        return self._contact(x, tangent=True), self._force, self._K_uu, self._K_ul
-
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of travel and the squeezing of every element within reason."""
         return self.foam.shorten(x, step, self.travel_step)

@@ -9,10 +9,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.crossing import crossing_pairs
-from softjaw.fem.objects.file_limits import MOST_TRIANGLES
 from softjaw.fem.objects.gap import IntArray
-from softjaw.fem.objects.length_units import LENGTHS
+from softjaw.fem.objects.mesh_file import LENGTHS, MOST_TRIANGLES
 from softjaw.fem.objects.pose import FloatArray
 
 MOST_PIECES = 50
@@ -24,10 +24,6 @@ FLAT = 1e-6  # volume of a piece over its area and size, below which it has no i
 SURE = 1e-3  # winding numbers this close to 0 and 1 are those of points outside and inside; others lie on the surface
 MOST_ASKED = 100  # corners of a piece that are asked whether they lie in another
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
-
-
-class MeshError(ValueError):
-    """A mesh that cannot serve as an object; the message says why and what to do."""
 
 
 def sound_mesh(
@@ -58,8 +54,7 @@ def sound_mesh(
         raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     _check_numbers(points, triangles)
     points, triangles, notes = _merged(points, triangles)
-    if not _every_edge_twice(triangles):  # corners that rounding moved apart are only looked for where there is need
-        points, triangles, notes = _merged(_snapped(points), triangles, notes)
+    points, triangles, notes = _merged(_snapped(points), triangles, notes)
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
     neighbours = _closed(triangles)
@@ -103,11 +98,6 @@ def _check_size(extent: float, unit: str) -> None:
     advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
     raise MeshError(f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
                     f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
-
-
-def _every_edge_twice(triangles: IntArray) -> bool:
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _snapped(points: FloatArray) -> FloatArray:
@@ -235,4 +225,7 @@ def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> fl
     A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
     lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
-    return float(np.arctan2(dot(a, np.cross(b, c)), lower).sum() / (2 * np.pi))
+    # a triangle on which x lies up to rounding is seen under half a turn or its negative: it counts as neither
+    side, noise = dot(a, np.cross(b, c)), ROUNDED * np.abs(points).max() * (A * B + B * C + C * A)
+    on = (np.abs(side) <= noise) & (lower <= SURE * A * B * C + noise)
+    return float(np.where(on, 0.0, np.arctan2(side, lower)).sum() / (2 * np.pi))

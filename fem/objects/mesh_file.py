@@ -1,57 +1,82 @@
-"""Mesh files: their bytes, of a size that can be a mesh, and the reader that fits their ending.
+"""Mesh files: what they may be and how large, and their triangles, which trimesh reads.
 
-The readers are our own: those of VTK trust what a file says of itself, and a damaged one ended the program. These read
-nothing that is not there, and every number and index is checked.
+A file is judged before trimesh sees it (what it is, how large, how many faces it declares) and after (how many faces
+came out): a damaged file is refused with one sentence, never half read. Nothing is merged, dropped or turned here;
+`fem.objects.mesh_check` does that. numpy and trimesh are loaded when a mesh is read: `check` needs the limits alone.
+
+glTF is not read: its nodes may turn and scale what they hold, which rounds, and its buffers may be other files.
 """
 
 from __future__ import annotations
 
+import io
+import math
+import re
+import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+from softjaw.fem.errors import MeshError
 
-from softjaw.fem.objects.file_limits import (
-    ENDINGS,
-    LARGEST_FILE,
-    LONGEST_LINE,
-    LONGEST_NUMBER,
-    MOST_CORNERS,
-    MOST_LINES,
-    MOST_POINTS,
-    MOST_TRIANGLES,
-)
-from softjaw.fem.objects.gap import IntArray
-from softjaw.fem.objects.mesh_check import MeshError
-from softjaw.fem.objects.pose import FloatArray
+if TYPE_CHECKING:
+    import trimesh
 
-Polygons = tuple[FloatArray, IntArray, IntArray]  # points (k, 3), number of corners of each face (m,), all corners
+    from softjaw.fem.objects.gap import IntArray
+    from softjaw.fem.objects.pose import FloatArray
+
+# Each unit is ``times / over`` metres, so that converting rounds once.
+LENGTHS = {"mm": (1, 1000), "cm": (1, 100), "m": (1, 1), "inch": (0.0254, 1)}
+ENDINGS = (".stl", ".obj", ".ply", ".off")
+LARGEST_FILE = 200 * 2**20  # bytes
+MOST_TRIANGLES = 500_000
+MOST_POINTS = 3 * MOST_TRIANGLES  # as many as an STL file has, where every triangle has its own
+STL_HEAD, STL_FACET = 84, 50  # bytes of a binary STL file
+FOLDED = math.pi - 1e-3  # angle between the normals of two triangles that lie on each other
+# Points and faces that a text declares, by its lines or in its head.
+DECLARED = {
+    ".obj": (rb"^v[ \t]", rb"^f[ \t]"),
+    ".ply": (rb"^element[ \t]+vertex[ \t]+(\S+)", rb"^element[ \t]+face[ \t]+(\S+)"),
+    ".off": (rb"^C?OFF\s+(?:#.*\s+)*(\d+)\s", rb"^C?OFF\s+(?:#.*\s+)*\d+\s+(\d+)"),
+}
 
 
-def read_polygons(path: Path) -> Polygons:
-    """Points ``(k, 3)`` in the file's own unit, corners of each face ``(m,)``, and all corners, one face after another.
+def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
+    """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of a mesh file.
+
+    Faces of more corners are cut into triangles where they are convex.
 
     Raises
     ------
     MeshError
         The file cannot be read, is no mesh, too large or damaged.
     """
-    from softjaw.fem.objects.obj_file import obj_polygons
-    from softjaw.fem.objects.ply_file import ply_polygons
-    from softjaw.fem.objects.stl_file import stl_polygons
+    import numpy as np
 
-    data = checked_bytes(path)
-    readers = {".stl": stl_polygons, ".obj": obj_polygons, ".ply": ply_polygons}
-    try:
-        points, sizes, corners = readers[path.suffix.lower()](data)
-    except MeshError as problem:
-        raise MeshError(f"{path}: {problem}") from problem
-    if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
-        astray = corners[(corners < 0) | (corners >= len(points))][0]
+    kind, data = path.suffix.lower(), checked_bytes(path)
+    if kind == ".stl" and not _is_text(data):
+        data = _whole_binary_stl(path, data)
+    if kind == ".obj":
+        data = _plain_obj(path, data)
+    points, faces = _declared(kind, data)
+    if points > MOST_POINTS or faces > MOST_TRIANGLES:
         raise MeshError(
-            f"{path}: a face refers to point {astray}, but there are only {len(points)} (counted from 0); "
-            "the file is damaged, export it again"
+            f"{path}: the mesh has {points} points and {faces} faces, more than {MOST_POINTS} and {MOST_TRIANGLES}; "
+            "decimate it, to about a tenth of the pad's element size nothing is lost"
         )
-    return points, sizes, corners
+    if not faces:
+        raise MeshError(f"{path}: the mesh is empty: it holds no triangles; export it as a surface mesh")
+    mesh = _loaded(path, data)
+    if len(mesh.faces) < faces:
+        raise MeshError(
+            f"{path}: is cut short or damaged: it declares {faces} faces, {len(mesh.faces)} triangles could be read; "
+            "export it again"
+        )
+    if len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
+        raise MeshError(
+            f"{path}: has faces of more than three corners that are not convex, expected triangles; triangulate the "
+            "mesh when you export it"
+        )
+    return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
 
 
 def checked_bytes(path: Path) -> bytes:
@@ -72,55 +97,70 @@ def checked_bytes(path: Path) -> bytes:
     return data
 
 
-def check_counts(points: int, faces: int) -> None:
-    """Refuse more points or faces than a mesh may have, before they are read."""
-    if points > MOST_POINTS or faces > MOST_TRIANGLES:
+def _is_text(data: bytes) -> bool:
+    """Whether an STL file is text; binary ones may begin with "solid" too, but then have no facets near."""
+    return data[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
+
+
+def _whole_binary_stl(path: Path, data: bytes) -> bytes:
+    """The bytes that a binary STL file's head calls for; some programs write more."""
+    count = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little") if len(data) >= STL_HEAD else -1
+    need = STL_HEAD + STL_FACET * max(count, 0)
+    if count < 0 or len(data) < need:
         raise MeshError(
-            f"the mesh has {points} points and {faces} faces, more than {MOST_POINTS} and {MOST_TRIANGLES}; decimate "
-            "it, to about a tenth of the pad's element size nothing is lost"
+            f"{path}: is cut short or no STL file: {len(data)} bytes, expected at least {need}; copy or export it again"
         )
+    return data[:need]
 
 
-def check_corners(count: int, total: int) -> None:
-    """Refuse a face of ``count`` corners, or so many corners altogether, that no mesh of triangles is made of them."""
-    if count > MOST_CORNERS or total > 4 * MOST_TRIANGLES:
+def _plain_obj(path: Path, data: bytes) -> bytes:
+    """An OBJ file whose faces hold nothing but points: trimesh takes all faces to be written like the first."""
+    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    data = re.sub(rb"^f[ \t].*$", lambda face: re.sub(rb"/\S*", b"", face[0]), data, flags=re.MULTILINE)
+    if re.search(rb"^f(?:.*[ \t])?0(?:\s|$)", data, re.MULTILINE):
+        raise MeshError(f"{path}: is damaged: a face refers to point 0, but OBJ files count from 1; export it again")
+    back = re.search(rb"^f.*[ \t]-", data, re.MULTILINE)
+    if back and re.search(rb"^v[ \t]", data[back.start() :], re.MULTILINE):
         raise MeshError(
-            f"a face of {count} corners, {total} in all, more than {MOST_CORNERS} and {4 * MOST_TRIANGLES}; "
-            "triangulate and decimate the mesh"
+            f"{path}: has faces that count back among its points; export it with all points before the faces"
         )
+    return data
 
 
-def text_lines(data: bytes) -> list[bytes]:
-    """Lines of a text, not too many and none too long to be taken apart."""
-    count = data.count(b"\n") + data.count(b"\r")
-    if count > MOST_LINES:
-        raise MeshError(f"has {count} lines, more than {MOST_LINES}; decimate the mesh")
-    lines = data.splitlines()
-    if (longest := max(map(len, lines), default=0)) > LONGEST_LINE:
-        raise MeshError(f"has a line of {longest} bytes, more than {LONGEST_LINE}; export the mesh again")
-    return lines
+def _declared(kind: str, data: bytes) -> tuple[int, int]:
+    """Points and faces that a file says it has, which are counted or read from its head."""
+    if kind == ".stl":
+        faces = data.lower().count(b"endfacet") if _is_text(data) else (len(data) - STL_HEAD) // STL_FACET
+        return 3 * faces, faces
+    found = [re.findall(pattern, data, re.MULTILINE) for pattern in DECLARED[kind]]
+    if kind == ".obj":
+        return len(found[0]), len(found[1])
+    points, faces = (int(values[0]) if values and values[0][:15].isdigit() else 0 for values in found)
+    return points, faces
 
 
-def as_floats(values: np.ndarray) -> FloatArray:
-    """Numbers of any kind as floats; what is none comes out as NaN, without a warning."""
-    with np.errstate(invalid="ignore"):
-        return values.astype(float)
+def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
+    """The mesh as trimesh reads it: no other file is opened, nothing is changed."""
+    import numpy as np
+    import trimesh  # a third of a second, and most scenes have no mesh
 
-
-def numbers(words: list[bytes], kind: str) -> np.ndarray:
-    """Words as an array of ``f8`` or ``i8``; `MeshError` names the first that is no such number."""
     try:
-        if max(map(len, words), default=0) <= LONGEST_NUMBER:  # numpy would keep this room for each of them
-            return np.array(words, dtype="S").astype(kind) if words else np.empty(0, kind)
-    except (ValueError, OverflowError):
-        pass
-    word = next((word for word in words if not _is_number(word, kind)), b"a number beyond all bounds")
-    found = word[:LONGEST_NUMBER].decode("ascii", "replace")
-    raise MeshError(f"is damaged: found {found!a} where a number has to stand; export it again")
-
-
-def _is_number(word: bytes, kind: str) -> bool:
-    try:
-        return len(word) <= LONGEST_NUMBER and (kind == "f8" or abs(int(word)) < 2**63) and float(word) is not None
-    except (ValueError, OverflowError):
-        return False
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "string or file could not be read")  # numpy would leave the rest out
+            mesh = trimesh.load_mesh(
+                io.BytesIO(data), file_type=path.suffix[1:].lower(), process=False, maintain_order=True,
+                skip_materials=True,
+            )  # fmt: skip
+            points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    except Exception as problem:  # whatever a damaged file makes of the reader
+        reason = ascii(f"{type(problem).__name__}: {problem}")[1:200]
+        raise MeshError(f"{path}: is damaged or not what its ending says ({reason}); export it again") from problem
+    if faces.ndim != 2 or faces.shape[1] != 3 or points.shape[1:] != (3,) or not len(faces):
+        raise MeshError(f"{path}: is damaged or empty: no triangles could be read; export it again")
+    astray = (faces < 0) | (faces >= len(points))
+    if astray.any():
+        raise MeshError(
+            f"{path}: a face refers to point {faces[astray][0]}, but there are only {len(points)} (counted from 0); "
+            "the file is damaged, export it again"
+        )
+    return mesh

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import Gap, IntArray, Surface
-from softjaw.fem.objects.mesh_check import MeshError, sound_mesh
-from softjaw.fem.objects.mesh_file import read_polygons
+from softjaw.fem.objects.mesh_check import sound_mesh
+from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.pose import FloatArray, Pose
 from softjaw.fem.objects.tricubic import coefficients, evaluate
 
@@ -65,7 +66,7 @@ class MeshObject:
 
     @classmethod
     def from_file(cls, path: str | Path, unit: str, axis: str = "z", grid_step: float | None = None) -> Self:
-        """Mesh from an STL, OBJ or PLY file, checked and moved to the object's frame.
+        """Mesh from an STL, OBJ, PLY or OFF file, checked and moved to the object's frame.
 
         ``axis`` of the file becomes z, by a cyclic exchange of the coordinates; z starts at 0 and the bounding box is
         centred in x and y. Raises ``MeshError`` with one sentence that says what is wrong and what to do.
@@ -225,18 +226,3 @@ class MeshRegion:
         R = self.pose.rotation
         g, gradient, hessian = evaluate(self.coefficients, self.first, self.grid_step, np.ascontiguousarray(y))
         return g, gradient @ R.T, R @ hessian @ R.T
-
-
-def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
-    """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of an STL, OBJ or PLY file, unchecked."""
-    points, sizes, corners = read_polygons(path)
-    if (sizes == 3).all():
-        return points, corners.reshape(-1, 3)
-    if sizes.min() < 3:
-        raise MeshError(f"{path}: is damaged: a face has fewer than three corners; export it again")
-    if not np.isfinite(points).all():  # which sound_mesh tells of; here it is before polygons are cut
-        return points, corners[:3].reshape(1, 3)
-    import pyvista as pv
-
-    starts = np.insert(corners, np.cumsum(sizes) - sizes, sizes)
-    return points, pv.PolyData(points, starts).triangulate().regular_faces.astype(np.int64)

@@ -40,6 +40,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     NoContactError
         If no point meets the object within ``reach``, or only grazes it, or the pad starts inside the object.
     """
+    reach += GRAZE  # what is met just at the end of the reach is met
     start, approach = pose.to_object(points), pose.rotation[:, 2]
 
     def gap(which: np.ndarray, t: FloatArray) -> FloatArray:

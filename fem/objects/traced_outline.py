@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.pose import FloatArray
 from softjaw.fem.objects.profile import POLE, Curve, joint, line, rounding, spline

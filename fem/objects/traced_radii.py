@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.pose import FloatArray
 from softjaw.fem.objects.section_rays import Rays, cast

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import BSpline, CubicSpline
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.jet import Jet
-from softjaw.fem.objects.mesh_check import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.pose import FloatArray

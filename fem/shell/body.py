@@ -12,6 +12,7 @@ from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.shell.grid import MeshSize, along, around
 from softjaw.fem.shell.mesh import FloatArray, IntArray, ShellMesh, grid_elements
 
+AT_END = 1e-9  # heights this close to the wall's ends are at them [m]
 THICKEST = 1.0 - 1e-6  # of the outline's radius: a wall that reaches its centre of curvature has no inner face
 
 
@@ -137,7 +138,8 @@ def _steps(surface: OuterSurface, thickness: float | Sequence[tuple[float, float
     if np.ndim(thickness) == 0:
         return []
     z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
-    return [surface.station(height) for height, _ in thickness if z.min() < height < z.max()]
+    low, high = z.min() + AT_END, z.max() - AT_END
+    return [surface.station(height) for height, _ in thickness if low < height < high]
 
 
 def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:

@@ -8,7 +8,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from softjaw.study.exits import USAGE, StudyError
-from softjaw.study.scene.grasp_warnings import station_warnings
+from softjaw.study.scene.grasp_checks import station_warnings
 
 if TYPE_CHECKING:
     from softjaw.fem.materials import Material
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from softjaw.fem.pad.backing_plate import Sheet
     from softjaw.fem.pad.shape import PadShape
     from softjaw.study.scene import Scene
+    from softjaw.study.scene.objects import Shape, Walled
     from softjaw.study.scene.sections import Gripper
-    from softjaw.study.scene.shapes import Shape, Walled
 
 
 @lru_cache(maxsize=8)

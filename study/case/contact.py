@@ -22,7 +22,7 @@ from softjaw.friction.wrench import FrictionLimits, friction_limits
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.study.flags import Flag, raised
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side

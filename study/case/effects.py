@@ -14,7 +14,7 @@ from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_material, pad_shape, sheet
 from softjaw.study.case.margin import surely_below
-from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
@@ -38,7 +38,7 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 @dataclass(frozen=True)
 class SheetLevel:
-    """Level of the sheets of a scene; ``reason`` is one of `study.result.quantities.REASONS`.
+    """Level of the sheets of a scene; ``reason`` is one of `study.quantities.REASONS`.
 
     ``compliance`` is the mean deflection of the sheet under an even pressure over that of the pad.
     """
@@ -109,22 +109,20 @@ def effects_of(
     """Level, indicator and reason of every effect of one case; keys and levels as in ``EFFECTS``.
 
     The indicators are those of ``INDICATORS``. Levels that change the solve are chosen before it, by
-    `study.case.wall`, `study.case.pad_level` and `sheet_level`; here they only get their names.
+    `study.case.wall` and `sheet_level`; here they only get their names.
     """
     wanted = scene.effects
 
     def only(name: str) -> int:
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
-    pad, sheet = solving.pad_level, sheet_level(scene)
-    strain = max(c.state.checks.max_strain for c in contacts)
+    sheet = sheet_level(scene)
     S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["curved"] for own in fits]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
     size = MODEL_SIZES[solving.planes]
     return {
         "object": _object(solving.level),
-        "pad": (EFFECTS["pad"][not pad.linear], strain, REASONS.index(pad.reason)),
         "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),

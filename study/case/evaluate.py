@@ -28,9 +28,9 @@ from softjaw.scoring.volume import volume_linf
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.flags import raised
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
-from softjaw.study.scene.score_sections import LimitSurface as Choice
+from softjaw.study.scene.sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
@@ -105,7 +105,7 @@ def evaluate(
     Returns
     -------
     values : dict
-        Keyed ``group/name`` as in ``study.result.quantities``, in SI units; ``maps/flags`` has the flags that follow
+        Keyed ``group/name`` as in ``study.quantities``, in SI units; ``maps/flags`` has the flags that follow
         from patches alone.
     fits : list of dict
         For each contact its limit surface in every friction model.

@@ -28,13 +28,13 @@ from softjaw.lsfit.tilted import TiltedEllipsoid
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
-from softjaw.study.scene.score_sections import LimitSurface as Choice
+from softjaw.study.scene.sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
-STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.result.finger_quantities says
+STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.quantities says
 
 
 class SurfaceFit(NamedTuple):
@@ -154,7 +154,7 @@ def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
 def surface_values(
     contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], sampled: bool, six: bool
 ) -> dict[str, Any]:
-    """What is stored of both fingers' surfaces, keyed as in ``study.result.quantities``."""
+    """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
     every = [list(own.values()) for own in fits]
     per_model = {
         "matrix": lambda b: matrix(b.surface),
@@ -181,7 +181,7 @@ def surface_values(
 
 
 def six_values(contacts: Sequence[Contact]) -> dict[str, Any]:
-    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.result.quantities``."""
+    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
     found = [six_ellipsoid(c.local, c.rho, c.unit_limits["curved"].S) for c in contacts]
     names = ("matrix_6d", "rank_6d", "misfit_6d")
     return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*found, strict=True), strict=True)}

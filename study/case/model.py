@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.friction_coupling import CoupledProblem, way
-from softjaw.fem.contact.linear_press import linear_press
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.objects.gap import GapFunction, GapObject
 from softjaw.fem.objects.pose import Pose
 from softjaw.fem.objects.touch import NoContactError, first_touch
-from softjaw.fem.pad.linear_pad import CondensedPad, linearised
 from softjaw.fem.pad.mesh import Pad
 from softjaw.study.case.build import build_object, pad_material, pad_shape, sheet
 from softjaw.study.case.candidates import candidates
@@ -35,14 +33,6 @@ def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bo
     """Discrete pad with its sheet; the same for all candidates, so it is made once."""
     behind = sheet(gripper) if elastic_sheet else None
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
-
-
-@lru_cache(maxsize=8)
-def condensed_pad(
-    gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool
-) -> CondensedPad:
-    """Discrete pad for small strains, reduced to its front; one factorisation for all candidates."""
-    return CondensedPad(linearised(pad(gripper, symmetry, contact, coarser, elastic_sheet)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +134,16 @@ def settings(scene: Scene) -> Settings:
 
 
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
-    """Pad of finite strain on its sheet; ``rule`` collocates the gaps."""
+    """Pad on its sheet; ``rule`` collocates the gaps."""
     return pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
 
 
-def press_of(scene: Scene, finger: Finger, coarser: bool, linear: bool) -> Press:
-    """Pad of small (``linear``) or finite strains, with friction where the scene wants it to act back."""
+def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    """Pad on its object, with friction where the scene wants it to act back."""
     elements, rule = pad_shape(scene.gripper, coarser).elements, scene.accuracy.contact
     symmetry = usable_symmetry(scene, finger, elements)
     wanted, nodal = (pad_of(scene, symmetry, r, coarser) for r in (rule, "nodal"))
     fallback = None if nodal is wanted else nodal
-    if linear:
-        pad = condensed_pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
-        return linear_press(pad, finger.gap, linearised(fallback) if fallback else None, settings(scene))
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
         steps = {"problem_of": problem, "way": way, "stepping": Stepping}

@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Values of one case (candidate x force), keyed ``group/name`` as in ``study.result.quantities``.
+    """Values of one case (candidate x force), keyed ``group/name`` as in ``study.quantities``.
 
     ``patch`` holds the faces of both fingers, keyed by dataset name, each ``(2, faces, ...)``; ``message`` is empty or
     says what the reader should know about a result that is valid.

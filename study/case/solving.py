@@ -12,9 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
-from softjaw.fem.contact.press import Press, Pressed
-from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.pad.linear_pad import linearised
+from softjaw.fem.contact.press import Pressed
+from softjaw.fem.errors import CheckError
 from softjaw.fem.pad.spring_bed import SpringBed
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
@@ -24,7 +23,6 @@ from softjaw.study.case.build import pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, pad_of, press_of, settings
-from softjaw.study.case.pad_level import PadLevel, choose_pad_level, level_on_wall
 from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.scene import Scene
@@ -108,7 +106,6 @@ class Solver(Protocol):
     """
 
     level: WallLevel | None
-    pad_level: PadLevel
     fingers_solved: int
     planes: int
 
@@ -141,29 +138,18 @@ class OnRigid:
         self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
-        self.pad_level = choose_pad_level(scene, solved)
-        linear = self.pad_level.linear
-        self.presses = [[press_of(scene, f, coarser, linear) for coarser in meshes] for f in solved]
+        self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        ladders = (zip(*(self._climbed(p, forces) for p in own), strict=True) for own in self.presses)
+        ladders = (zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses)
         for states in zip(*ladders, strict=True):
             pairs = zip(self.fingers, states, strict=False)
             contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
             if self.shared:  # an image finger has its partner's states; only its place differs
                 contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
             yield Solved(contacts, [s for own in states for s in own], [])
-
-    def _climbed(self, press: Press, forces: Sequence[float]) -> Iterator[Pressed]:
-        try:
-            yield from press.ladder(forces)
-        except (ConvergenceError, CheckError) as error:
-            if not self.pad_level.linear:
-                raise
-            hint = "the scene asks for pads at small strains; effects.pad = 'auto' allows finite ones"
-            raise type(error)(f"{error} ({hint})") from error
 
     def destroy(self) -> None:
         """See `Solver`."""
@@ -175,7 +161,7 @@ class OnWall:
     """Fingers on a thin wall press against each other through it."""
 
     def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel) -> None:
-        self.scene, self.fingers, self.level, self.pad_level = scene, fingers, level, level_on_wall(scene)
+        self.scene, self.fingers, self.level = scene, fingers, level
         meshes = (False, True)[: scene.accuracy.meshes]
         self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
         self.grips = [
@@ -190,7 +176,7 @@ class OnWall:
             yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
 
     def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.result.quantities``."""
+        """What the wall bears at one force, keyed as in ``study.quantities``."""
         shell = self.grips[0].problem.model.shell
         return wall_values(self.scene, self.held[0], solved.grips[0], shell)
 
@@ -253,8 +239,6 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: WallLevel, co
 
     def problem(rule: str) -> GripProblem:
         pad = pad_of(scene, held.pad_symmetry, rule, coarser)
-        if scene.effects.pad == "linear":
-            pad = linearised(pad)
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]

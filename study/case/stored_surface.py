@@ -14,8 +14,8 @@ from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantity import MODELS
 from softjaw.study.show.data import Data
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.candidates import Candidate, candidates, groups
 from softjaw.study.result.layout import Derived
 from softjaw.study.scene import Option, Scene
-from softjaw.study.scene.units import UNITS, in_si, split_unit
+from softjaw.study.units import UNITS, in_si, split_unit
 
 if TYPE_CHECKING:
     from softjaw.study.result.store import ResultWriter

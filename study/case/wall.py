@@ -18,12 +18,12 @@ from softjaw.fem.shell.wall_material import wall_material
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.margin import MARGIN, surely_below
 from softjaw.study.flags import Flag
-from softjaw.study.result.wall_quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
-from softjaw.study.scene.shape import Walled
+from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
-RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.result.quantities lists them
+RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.quantities lists them
 STIFF = 0.02  # dent over travel below which a wall is as good as rigid: e_n then changes by less than 0.1 %
 SMALL_DENT = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
@@ -114,7 +114,7 @@ def _dents(shell: Shell, q: FloatArray) -> FloatArray:
 
 
 def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict[str, Any]:
-    """What the wall bears in one case, keyed as in ``study.result.quantities``."""
+    """What the wall bears in one case, keyed as in ``study.quantities``."""
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
     return {

@@ -28,8 +28,9 @@ from softjaw.study.lookup.interpolation import (
 )
 from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, read_source, turning
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.units import UNITS
 
 NUMBER = (float, int)
 
@@ -108,9 +109,9 @@ class GraspMap:
             return self._point(candidate, 0.0, force)
         if candidate is not None:
             raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
-        along = _one(station, station_mm, 1e-3, "station")
+        along = _one(station, station_mm, "mm", "station")
         turn = _one(
-            angle, angle_deg, math.pi / 180, "angle", self.source.axes[1].values[0] if self._one_angle else None
+            angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None
         )
         return self._point(along, turn, force)
 
@@ -211,10 +212,10 @@ class GraspMap:
         return (corner[:8].all(axis=0) | corner[8:].all(axis=0)).ravel().tolist()
 
 
-def _one(si: Any, other: Any, factor: float, name: str, default: Any = None) -> Any:
+def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:
     if (si is None) == (other is None) and not (si is other is None and default is not None):
         raise ValueError(f"{name} is given {'twice' if si is not None else 'nowhere'}: give it once")
-    return default if si is other is None else si if other is None else np.asarray(other, float) * factor
+    return default if si is other is None else si if other is None else np.asarray(other, float) * UNITS[unit].size
 
 
 def _like(mask: np.ndarray, values: np.ndarray, lead: int = 1) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.result.layout import MISSING
+from softjaw.study.units import shown_text
 
 if TYPE_CHECKING:
     from softjaw.lsfit.surface import LimitSurface
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
 INSIDE, OUTSIDE, NO_RESULT, SNAP = range(4)
-PEOPLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / math.pi), "Pa": ("MPa", 1e-6)}
 TOLD = ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "dent", "force_low", "force_high")
 
 
@@ -144,14 +143,14 @@ class GraspPoint:
         if self.shape:
             return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
         axes, station, angle, force = self.map.axes, *self.place[0]
-        turn = [] if self.map.by_poses else [f"angle {_number(angle, 'rad')}"]
-        words = [f"{axes[0].name} {_number(station, axes[0].units)}", *turn, f"force {force:.5g} N"]
+        turn = [] if self.map.by_poses else [f"angle {shown_text(angle, 'rad', 5)}"]
+        words = [f"{axes[0].name} {shown_text(station, axes[0].units, 5)}", *turn, f"force {force:.5g} N"]
         lines = [", ".join(words)]
         if self.reason:
             return f"{lines[0]}: {self.reason}"
         for name in (n for n in TOLD if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
-            lines.append(f"  {name:<13} {_number(self.value(name), units)}  +- {_number(error, units, 2)}")
+            lines.append(f"  {name:<13} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 
@@ -178,10 +177,10 @@ class GraspPoint:
     def _outside(self, i: int) -> str:
         a = int(np.argmin(self.corners.inside[i]))
         nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.source.axes[a]
-        found = f"outside the map: {nodes.name} {_number(value, nodes.units)}"
+        found = f"outside the map: {nodes.name} {shown_text(value, nodes.units, 5)}"
         if nodes.exact:
             return f"{found}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
-        low, high = (_number(v, nodes.units) for v in (axis.values.min(), axis.values.max()))
+        low, high = (shown_text(v, nodes.units, 5) for v in (axis.values.min(), axis.values.max()))
         return f"{found}, solved is {low}" + (f" to {high}" if low != high else " only")
 
     def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
@@ -191,8 +190,3 @@ class GraspPoint:
             at = np.unravel_index(n, self.map.shape)
             found.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
         return found
-
-
-def _number(value: float, units: str, digits: int = 5) -> str:
-    unit, factor = PEOPLE.get(units, (units, 1.0))
-    return f"{value * factor:.{digits}g} {unit}".rstrip()

@@ -39,7 +39,7 @@ class Source:
         wanted = [p for p in paths if p.split("/")[0] in (*GROUPS, *names) and p.split("/")[1] not in TOO_LARGE]
         self._values = {path: result.read(path)[self.index] for path in wanted}
         self._by_model = {q.name if q.group == "maps" else q.key: q.by_model for q in result.layout.quantities}
-        self.maps = {q.name: (q.units, q.definition) for q in maps}
+        self.maps = {q.name: (q.unit, q.definition) for q in maps}
         for d in result.layout.derived:
             over = tuple(n.replace(".", "_") for n in d.axes)
             if over in (result.layout.names, result.layout.names[:-1]) and not d.shape:
@@ -103,7 +103,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
 
 
 def _size(key: str) -> float:
-    from softjaw.study.scene.units import UNITS, split_unit
+    from softjaw.study.units import UNITS, split_unit
 
     unit = split_unit(key)[1]
     return UNITS[unit].size if unit else 1.0
@@ -126,7 +126,7 @@ def turning(source: Source) -> tuple[float, bool]:
     this version cannot read has a whole turn as its period.
     """
     from softjaw.study.scene import parse_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         scene = parse_scene(source.scene, check_files=False)

@@ -24,8 +24,8 @@ from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.flags import Flag
 from softjaw.study.patch.reading import ReadPatch, refuse
-from softjaw.study.result.quantity import MODELS
-from softjaw.study.scene.errors import Problem
+from softjaw.study.quantities import MODELS
+from softjaw.study.scene.problems import Problem
 
 SURFACES = {  # as a scene names them, and in the text
     "three_motions": "ellipsoid, three motions",

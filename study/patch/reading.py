@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from softjaw.friction.orientation import slivers
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.study.exits import OTHER_FILE, USAGE, StudyError
-from softjaw.study.scene.errors import Problem, closest
+from softjaw.study.scene.problems import Problem, closest
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes

@@ -24,7 +24,7 @@ from softjaw.study.patch.reading import (
     refuse,
     split_header,
 )
-from softjaw.study.scene.errors import Problem, shown
+from softjaw.study.scene.problems import Problem, shown
 from softjaw.study.show.tables.printable import shortened
 
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"

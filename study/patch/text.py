@@ -11,8 +11,8 @@ import numpy as np
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.patch.answer import DEFINITIONS, FRICTION, SCORES, SURFACES, UNITS
-from softjaw.study.result.quantity import MODELS
-from softjaw.study.show.tables.columns import DISPLAY
+from softjaw.study.quantities import MODELS
+from softjaw.study.units import shown, shown_unit
 from softjaw.study.writing import write_file
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
 def _friction_table(patch: dict[str, Any]) -> list[str]:
     rows = [["friction", *MODELS]]
     for name in FRICTION:
-        unit, factor = DISPLAY.get(UNITS[name], (UNITS[name], 1.0))
-        rows.append([f"{name} [{unit}]", *(_number(factor * patch["friction"][model][name]) for model in MODELS)])
+        values = [shown(patch["friction"][model][name], UNITS[name]) for model in MODELS]
+        rows.append([f"{name} [{shown_unit(UNITS[name])}]", *map(_number, values)])
     return _aligned(rows)
 
 

@@ -1,1 +1,1 @@
-"""The result file: what stands where, how it is written by many ranks, read, checked and repaired."""
+"""The result file: what stands where, how it is written by many ranks, read and checked."""

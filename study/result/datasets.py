@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.finger_quantities import PATCH
-from softjaw.study.result.quantities import EFFECTS, INDICATORS, REASONS
-from softjaw.study.result.quantity import FINGERS, MODELS, Quantity
+from softjaw.study.quantities import BY_KEY, FIRST, MODELS, Quantity, map_row
 
 MISSING = 0  # state of a case that has not been solved
 MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
@@ -21,7 +19,6 @@ SUMS = f"{ROOT}/checksums"  # a dataset for each part of a row, and these two:
 STATE, CLOSING = "code", "closing"  # of the states; of what is filled after all rows
 APART = ("cor_wrench",)  # columns so large that they are a part of a row by themselves
 TIMES = "times"  # a part that differs from run to run
-FIRST_SEEN = ("quality", "e_n")  # maps that viewers open at
 
 
 @dataclass(frozen=True)
@@ -65,43 +62,34 @@ class Column:
 
 def columns_of(layout: Any) -> Iterator[Column]:
     """All columns of a row of a layout."""
-    f8 = np.dtype("<f8")
     for q in layout.quantities:
+        shape = tuple(layout.counters[dim] for dim in q.dims)
+        dtype, fill = ("i1", -1) if q.meanings else ("<f8", np.nan)
         if q.group == "maps" and q.by_model:
             for model in MODELS:
-                yield Column(f"{q.key}/{model}", f"{ROOT}/{q.name}/{model}", (), f8, np.nan)
+                yield Column(f"{q.key}/{model}", f"{ROOT}/{q.name}/{model}", (), np.dtype(dtype), fill)
         elif q.group == "maps":
-            yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", (), f8, np.nan)
-        else:
-            yield Column(q.key, f"{ROOT}/{q.key}", q.row_shape, f8, np.nan, among=q.among)
-    for name in EFFECTS:
-        for part, dtype, fill in (("level", "i1", -1), ("indicator", "<f8", np.nan), ("reason", "i1", -1)):
-            yield Column(f"effects/{name}_{part}", f"{ROOT}/effects/{name}_{part}", (), np.dtype(dtype), fill)
-    if layout.patches:
-        for q in PATCH:
-            shape = (FINGERS, layout.faces, *q.shape)
-            yield Column(q.key, f"{ROOT}/{q.key}", shape, f8, np.nan, flat=True)
+            yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", shape, np.dtype(dtype), fill)
+        elif q.group != "status":
+            yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.group == "patch", q.among)
     yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{layout.message}"), b"")
 
 
 def datasets_of(layout: Any) -> Iterator[Dataset]:
     """All datasets of a layout but axes, texts and sessions."""
-    described = {q.key: q for q in (*layout.quantities, *PATCH)}
     for c in layout.columns:
-        q = described.get(c.key) or described.get(c.key.rpartition("/")[0])
-        attributes = _describe(q, c.key) if q else _describe_effect(c.key)
+        q = BY_KEY.get(c.key) or BY_KEY[c.key.rpartition("/")[0]]
         lead, scales = ((layout.rows,), ("row",)) if c.flat else (layout.shape, layout.names)
         if c.among:
             lead = (*lead[:-3], len(layout.chosen[c.among]), lead[-1])
             scales = (*scales[:-3], c.among, scales[-1])
-        yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, attributes, scales + _labels(q, c))
-    state = {"long_name": "state of the case", "meaning": "0 missing, 1 done, 2 failed", "units": ""}
-    yield Dataset(f"{ROOT}/status/code", layout.shape, np.dtype("u1"), MISSING, state, layout.names)
-    tries = {"long_name": "times this case was begun", "units": ""}
-    yield Dataset(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"), 0, tries, layout.names)
+        yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, _describe(q, c.key), scales + q.dims * bool(c.shape))
+    for name in ("code", "attempts"):
+        about = _describe(BY_KEY[f"status/{name}"], f"status/{name}")
+        yield Dataset(f"{ROOT}/status/{name}", layout.shape, np.dtype("u1"), MISSING, about, layout.names)
     yield from _checksums(layout)
-    for name in FIRST_SEEN:
-        q, order = described[f"maps/{name}"], layout.seen
+    for name in FIRST:
+        q, order = map_row(name), layout.seen
         shape, scales = (tuple(given[i] for i in order) for given in (layout.shape, layout.names))
         shown = {"interpretation": ("spectrum", "image")[len(layout.shown) - 1]}
         attributes = _describe(q, f"{q.key}/{MODELS[0]}") | shown
@@ -153,34 +141,11 @@ def _numbers(path: str, what: str, count: int, scale: str) -> Dataset:
 
 def _describe(q: Quantity, key: str) -> dict[str, str]:
     model = key.rpartition("/")[2] if key != q.key else ""
-    label = f"{q.long_name}, {model}" if model else q.long_name
-    long_name = f"{label} [{q.units}]" if q.units else label
-    attributes = {"units": q.units, "long_name": long_name, "definition": q.definition}
+    label = f"{q.label}, {model}" if model else q.label
+    long_name = f"{label} [{q.unit}]" if q.unit else label
+    attributes = {"units": q.unit, "long_name": long_name, "definition": q.definition}
     if q.by_model and not model:
         attributes["models"] = ", ".join(MODELS)
+    if q.meanings:
+        attributes["meaning"] = ", ".join(f"{i} {text}" for i, text in enumerate(q.meanings))
     return attributes
-
-
-def _describe_effect(key: str) -> dict[str, str]:
-    if key == "status/message":
-        return {"long_name": "why a case failed, or what to know about a result", "units": ""}
-    name, _, part = key.removeprefix("effects/").rpartition("_")
-    meaning = {"level": EFFECTS[name], "reason": REASONS}.get(part)
-    attributes = {"long_name": f"{part} of the effect '{name}'", "units": ""}
-    if meaning:
-        attributes["meaning"] = ", ".join(f"{i} {text}" for i, text in enumerate(meaning))
-    if part == "indicator" and name in INDICATORS:
-        attributes["definition"] = INDICATORS[name]
-    return attributes
-
-
-def _labels(q: Quantity | None, column: Column) -> tuple[str, ...]:
-    if q is None or not column.shape:
-        return ()
-    finger = ("finger",) if q.per == "finger" else ()
-    face = ("face",) if q.group == "patch" else ()
-    sample = {"cor_wrench": ("cor",), "wrench": ("sample",), "place": ("wall_place",)}.get(q.name, ())
-    sample = ("variation",) if q.among == "probe" else sample
-    labels = finger + face + (("model",) if q.by_model else ()) + sample
-    parts = {6: ("wrench", "wrench_2"), 15: ("monomial",)}.get(column.shape[-1], ("component", "component_2"))
-    return labels + parts[: len(column.shape) - len(labels)]

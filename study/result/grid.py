@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softjaw.study.quantities import FINGERS, ON_OBJECT
 from softjaw.study.result.datasets import MISSING, Dataset
 from softjaw.study.result.grid_arrays import quads_of, shared_steps, topology
-from softjaw.study.result.quantity import FINGERS
 
 PATH = "/VTKHDF"
 OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those that no candidate grasps
-SHOWN = ("quality", "e_n", "tau_z_max", "dent")  # maps; each costs 4 bytes for every face and force
 ABOUT = (
     "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
     " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that dent its wall"
@@ -40,8 +39,8 @@ class Surface(NamedTuple):
 
 
 def maps_of(layout: Any) -> dict[str, Any]:
-    """The quantities that the cells show, by name."""
-    return {q.name: q for q in layout.quantities if q.group == "maps" and q.name in SHOWN}
+    """The quantities that the cells show, by name; each costs 4 bytes for every face and force."""
+    return {q.name: q for q in layout.quantities if q.group == "maps" and q.name in ON_OBJECT}
 
 
 def sizes(layout: Any) -> tuple[int, int]:
@@ -77,7 +76,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
     if layout.front[0]:
         yield made("CellData/pressure", (steps * cells,), "<f4", np.nan, "Pa", "contact pressure")
     for q in maps_of(layout).values():
-        yield made(f"CellData/{q.name}", (steps * cells,), "<f4", np.nan, q.units, f"{q.long_name}, curved")
+        yield made(f"CellData/{q.name}", (steps * cells,), "<f4", np.nan, q.unit, f"{q.label}, curved")
     for name, values in shared_steps(layout.axes[-1].values, points, _advances(layout, cells)).items():
         yield made(f"Steps/{name}", values.shape, values.dtype.str, 0)
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softjaw.study.quantities import FINGERS
 from softjaw.study.result.grid import NOBODY, PATH, maps_of, sizes
 from softjaw.study.result.layout import DONE, Layout
-from softjaw.study.result.quantity import FINGERS
 from softjaw.study.show.view.pads import corners_of
 
 if TYPE_CHECKING:

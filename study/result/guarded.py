@@ -15,6 +15,7 @@ from softjaw.study.exits import IN_USE, OTHER_FILE, StudyError
 from softjaw.study.result.trial import trouble
 from softjaw.study.show.tables.printable import printable
 
+DEFLATE = 1000  # no data get smaller by more than this
 # what h5py raises for damage: its own errors have no class of their own
 BROKEN = (RuntimeError, OSError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError)
 
@@ -52,7 +53,7 @@ class GuardedFile:
             plist = found.id.get_create_plist()
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = found.size * max(found.dtype.itemsize, 1) if found.shape is not None else 0
-            too_large = nbytes > (1000 * self._bytes if found.chunks else self._bytes)  # deflate gains 1000 at most
+            too_large = nbytes > self._bytes * (DEFLATE if found.chunks else 1)
             if virtual or plist.get_external_count() or too_large:
                 raise StudyError(OTHER_FILE, f"{self.path}: {path} is not stored in this file; do not trust it")
             return found
@@ -87,7 +88,7 @@ class GuardedFile:
         try:
             yield
         except BROKEN as error:
-            text = f"{self.path}: damaged ({path}: {reason(error)}); restore it from a copy, or try 'softjaw repair'"
+            text = f"{self.path}: damaged ({path}: {reason(error)}); restore it from a copy"
             raise StudyError(OTHER_FILE, text) from error
 
 

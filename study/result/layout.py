@@ -14,14 +14,22 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.quantities import (
+    ALONG,
+    AROUND,
+    FINGERS,
+    HELD,
+    MODELS,
+    MONOMIALS,
+    NEEDS,
+    Quantity,
+    definitions,
+    quantities,
+)
 from softjaw.study.result.datasets import CLOSING, MESSAGE, MESSAGE_3, Column, Dataset, columns_of, datasets_of
 from softjaw.study.result.datasets import MISSING as MISSING
 from softjaw.study.result.datasets import ROOT as ROOT
-from softjaw.study.result.finger_quantities import PATCH
 from softjaw.study.result.grid import grid_datasets
-from softjaw.study.result.quantities import definitions, quantities
-from softjaw.study.result.quantity import FINGERS, MODELS, NEEDS, Quantity
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 
 PROGRAM, VERSION = "softjaw", 4
 READABLE = (3, 4)  # 3 has one checksum for a whole row, and none of its state, its timings and what is not in rows
@@ -116,11 +124,11 @@ class Layout:
         """Length of every axis."""
         return tuple(len(axis.values) for axis in self.axes)
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """All per-case quantities of this file but the patch."""
-        has = (*self.has, *[NEEDS[0]] * (self.meshes > 1))
-        return quantities(has, self.cor_grid, self.samples if self.sampled else 0, self.variations)
+        """All quantities of the cases of this file."""
+        held = zip(HELD, (self.cor_grid, self.sampled, self.probes, self.patches), strict=True)
+        return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *(name for name, size in held if size)))
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -152,8 +160,9 @@ class Layout:
     @property
     def counters(self) -> dict[str, int]:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
-        parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": 15, "session": SESSIONS}
-        parts |= {"component_2": 3, **({"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {})}
+        parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
+        parts |= {"session": SESSIONS, "component_2": 3}
+        parts |= {"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {}
         if self.cor_grid:
             parts["cor"] = self.cor_grid**2
         if NEEDS[3] in self.has:
@@ -216,7 +225,7 @@ class Layout:
     def definitions(self) -> str:
         """The definitions of all quantities of this layout, derived ones included."""
         derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in self.derived]
-        return definitions((*self.quantities, *PATCH)) + "".join(derived)
+        return definitions(self.quantities) + "".join(derived)
 
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""

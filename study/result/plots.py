@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.datasets import FIRST_SEEN
+from softjaw.study.quantities import FIRST, MODELS
 from softjaw.study.result.layout import Layout
-from softjaw.study.result.quantity import MODELS
 
 EVEN = 1e-6  # relative difference of steps that makes an axis uneven
 
@@ -43,17 +42,17 @@ def _plot(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
     plot = _plot(layout, range(len(layout.shape)))
-    first = {"signal": FIRST_SEEN[0], "auxiliary_signals": list(FIRST_SEEN[1:]), "title": "grasp map, curved model"}
+    first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": "grasp map, curved model"}
     found: dict[str, dict[str, Any]] = {"map": {**_plot(layout, layout.seen), **first}}
     for q in layout.quantities:
         if q.group != "maps":
             continue
         several = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])}
         signal = several if q.by_model else {"signal": q.name}
-        found[q.name] = {**plot, **signal, "title": q.long_name, "definition": q.definition}
+        found[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
     found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
-    collections = ["axes", "candidates", "provenance", "effects", *{q.group for q in layout.quantities}]
-    collections += ["patch"] * layout.patches + ["derived"] * bool(layout.derived)
+    collections = ["axes", "candidates", "provenance", *{q.group for q in layout.quantities} - {"status"}]
+    collections += ["derived"] * bool(layout.derived)
     collections += ["checksums"] * (layout.version > 3)
     found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
     return found

@@ -32,7 +32,7 @@ class Result:
 
     ``axes`` lists the axes of all maps: sweeps first, then station, angle and normal force; ``layout`` is the
     layout that follows from them. Rows are flat indices over the axes. What does not match its checksum is refused,
-    unless the result is read ``unchecked``, as a repair has to.
+    unless the result is read ``unchecked``.
     """
 
     def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
@@ -55,7 +55,7 @@ class Result:
         self._trusted: set[str] = set(self.layout.parts) if unchecked else set()
         self._unchecked = unchecked
         self._summed = self.layout.version > 3 and not unchecked
-        if self._summed and not self.header_good:
+        if self._summed and str(checksums.of_header(file, self.layout)) != study.get("checksum"):
             raise self._damaged("axes, scene or definitions do not match their checksum")
 
     def __enter__(self) -> Result:
@@ -187,18 +187,6 @@ class Result:
         sessions = self.sessions
         return bool(sessions and not sessions[-1]["stop"])
 
-    @property
-    def header_good(self) -> bool:
-        """Whether what is written when a file is made matches its checksum: axes, scene, definitions, labels."""
-        told = self.file.attributes(ROOT).get("checksum")
-        return self.layout.version == 3 or str(checksums.of_header(self.file, self.layout)) == told
-
-    def closing_good(self, name: str) -> bool:
-        """Whether something that is filled after all rows, named in ``layout.closing``, matches its checksum."""
-        dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
-        stored = checksums.closing_sum(self.file, self.layout, name) if self.layout.version > 3 else None
-        return stored in (None, checksums.of_array(self.file.values(dataset)))
-
     def _compare(self, part: str) -> None:
         """Refuse the file if a part of its rows does not match its checksums; once for each part."""
         if self._unchecked or not part or part in self._trusted:
@@ -240,7 +228,7 @@ class Result:
         raise self._damaged(f"{name} does not match its checksum")
 
     def _damaged(self, what: str) -> StudyError:
-        cure = "'softjaw repair' says what is good, or restore it from a copy"
+        cure = "restore it from a copy, or run the scene again, which solves damaged cases anew"
         return StudyError(OTHER_FILE, f"{self.path}: damaged ({what}); {cure}")
 
     def _checked(self, path: str) -> Any:

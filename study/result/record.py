@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.case.result import CaseResult
+from softjaw.study.quantities import EFFECTS, MODELS
 from softjaw.study.result.layout import Layout
-from softjaw.study.result.quantities import EFFECTS
-from softjaw.study.result.quantity import MODELS
 
 
 def text_bytes(text: str, length: int) -> bytes:
@@ -30,7 +29,7 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
     Raises
     ------
     ValueError
-        A key or a shape that is not in ``study.result.quantities``: a bug of the caller, not a failed case.
+        A key or a shape that is not in ``study.quantities``: a bug of the caller, not a failed case.
     """
     given = _flattened(layout, result)
     row = blank(layout, result.message)
@@ -42,7 +41,7 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
             raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.shape}")
         row[i] = value
     if given:
-        raise ValueError(f"a case gives {', '.join(sorted(given))}, which study.result.quantities does not list")
+        raise ValueError(f"a case gives {', '.join(sorted(given))}, which study.quantities does not list")
     return row
 
 

@@ -10,11 +10,11 @@ import h5py
 import numpy as np
 
 from softjaw.study.exits import CANNOT_WRITE, StudyError
+from softjaw.study.quantities import FIRST, MODELS
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, FIRST_SEEN, STATE, SUMS
+from softjaw.study.result.datasets import CLOSING, STATE, SUMS
 from softjaw.study.result.guarded import GuardedFile
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, Layout
-from softjaw.study.result.quantity import MODELS
 from softjaw.study.result.reading import Result
 from softjaw.study.result.record import blank, text_bytes
 from softjaw.study.result.skeleton import LIBVER, report_bytes
@@ -34,7 +34,7 @@ class ResultWriter:
         self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
         self._columns = [self._file[c.path] for c in layout.columns]
         keys = [c.key for c in layout.columns]
-        self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST_SEEN}
+        self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST}
         self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
         self._sums = {part: self._file[f"{SUMS}/{part}"] for part in (*layout.parts, STATE, CLOSING)}
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
@@ -70,10 +70,6 @@ class ResultWriter:
     def fail(self, row: int, message: str) -> None:
         """Store why a case has no result."""
         self._store(row, blank(self.layout, message), FAILED)
-
-    def copy(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
-        """Store a row as another file has it."""
-        self._store(row, values, state)
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)

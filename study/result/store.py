@@ -53,7 +53,7 @@ def _go_through(result: Result) -> None:
 
 def verify(path: Path, layout: Layout, header: Header) -> None:
     """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
-    from softjaw.study.scene.difference import differences
+    from softjaw.study.scene.text import differences
 
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:
@@ -71,13 +71,13 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
         for dataset in (*result.layout.datasets, *result.layout.grid):
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
-                text = f"{path}: was repacked and cannot be written in parallel any more; 'softjaw repair' undoes that"
+                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file with -o"
                 raise StudyError(OTHER_FILE, text)
         codes = result.codes.ravel()
         wrong = broken_states(result.file, layout, codes, result.killed)
         if lost := int(np.sum(codes[wrong] == MISSING)):
             text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
-            raise StudyError(OTHER_FILE, f"{text}; 'softjaw repair' makes a file that can be gone on with")
+            raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:

@@ -14,9 +14,9 @@ import numpy as np
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.record import record
-from softjaw.study.run.lost_ranks import LostRanks
+from softjaw.study.run.lock import Standing
 from softjaw.study.run.memory import is_out_of_memory
-from softjaw.study.run.standing import Standing
+from softjaw.study.run.schedule import LostRanks
 from softjaw.study.run.stopping import AbandonedError, Stopper, TimeLimitError
 
 DEADLY = 2

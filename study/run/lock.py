@@ -1,4 +1,4 @@
-"""One run at a time: a lock that lives as long as any rank, also one that outlived its mpirun."""
+"""The result file of a run: written by one run at a time, and still there while it is written."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import errno
 import fcntl
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from softjaw.study.exits import CANNOT_WRITE, IN_USE, StudyError
@@ -102,3 +104,43 @@ def holder(result: Path) -> str:
         return os.pread(fd, 200, 0).decode(errors="replace").strip() if error.errno in BUSY else ""
     finally:
         os.close(fd)
+
+
+class Standing:
+    """The file that a run has opened, under the name that it had then.
+
+    An open file outlives its name: without a look at the name, a run would fill a file that nobody can find any more.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._identity = self._now()
+
+    def check(self) -> None:
+        """Raise `StudyError` if the file was moved or removed, or its folder cannot be reached."""
+        try:
+            found = self._now()
+        except FileNotFoundError:
+            found = None
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+        if found != self._identity:
+            what = "was moved or removed" if found is None else "was replaced by another file"
+            remedy = "put it back, or begin again with the same command"
+            raise StudyError(CANNOT_WRITE, f"{self.path}: {what} while the run was writing it; {remedy}")
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Around a write: a failed one becomes a `StudyError`."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:  # h5py has both
+            raise self._lost(str(error)) from error
+
+    def _lost(self, reason: str) -> StudyError:
+        safe = "what was stored before is kept, and the same command goes on when the place can be written again"
+        return StudyError(CANNOT_WRITE, f"{self.path}: cannot be written any more ({reason}); {safe}")
+
+    def _now(self) -> tuple[int, int]:
+        status = self.path.stat()
+        return status.st_dev, status.st_ino

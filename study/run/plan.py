@@ -11,15 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.build import has_wall
+from softjaw.study.case.build import has_wall, outer_surface
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.run.progress import duration
-from softjaw.study.run.wall_cost import wall_size
+from softjaw.study.scene.grasp_checks import half_extent_mm
 from softjaw.study.show.tables.overview import aligned
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
+# Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
+# factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
+SECONDS, BYTES = 1e-4, 1.6e4
+DENSE = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
+CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
+MARGIN = 0.1  # of the pad's length, round what it covers
 
 
 @dataclass(frozen=True)
@@ -86,7 +92,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 
 
 def has(scene: Any) -> tuple[str, ...]:
-    """Which of `study.result.quantity.NEEDS` besides two meshes a scene asks for."""
+    """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
@@ -128,8 +134,7 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
-    nx, ny, nz = (n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in scene.gripper.elements)
-    pad = 8.0 * FILL * (3.0 * nx * ny * nz) ** (4.0 / 3.0)
+    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene)) ** (4.0 / 3.0)
     wall = wall_size(scene) if shells(scene) else None
     return LIBRARIES + pad + (wall.memory if wall else 0.0)
 
@@ -184,12 +189,9 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     seconds = _seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        known = f"known better when a few ladders are in {path}: start the run, then plan again"
-        return (
-            f"{_wall_time(plan, scene, ranks)}; {known}"
-            if shells(scene)
-            else f"not {known.replace(' better when', ' before')}"
-        )
+        known = f"a few ladders are in {path}: start the run, then plan again"
+        wall = shells(scene)
+        return f"{_wall_time(plan, scene, ranks)}; known better when {known}" if wall else f"not known before {known}"
     whole = duration(makespan(expected, ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
 
@@ -203,11 +205,8 @@ def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
     times = sorted(level.get(scene.effects.object, wall.seconds))
     ladders = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
     whole = [duration(each * makespan(ladders, ranks)) for each in (times[0], times[-1])]
-    names = (
-        "all candidates rigid, or all on the costliest shell"
-        if len(times) > 1
-        else scene.effects.object.replace("_", " ")
-    )
+    names = scene.effects.object.replace("_", " ")
+    names = "all candidates rigid, or all on the costliest shell" if len(times) > 1 else names
     return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
 
 
@@ -225,3 +224,95 @@ def _free(path: Path) -> int:
         if folder.is_dir():
             return shutil.disk_usage(folder).free
     return -1
+
+
+@dataclass(frozen=True)
+class WallSize:
+    """Unknowns of one candidate.
+
+    Attributes
+    ----------
+    pad, shell : int
+        Of the pads that are solved, and of the nonlinear shell.
+    whole, touched : int
+        Of the linear shell that all candidates share, and of its part that pads can touch.
+    """
+
+    pad: int
+    shell: int
+    whole: int
+    touched: int
+
+    @property
+    def seconds(self) -> tuple[float, float, float]:
+        """Time of one force on a rigid object, a linear and a nonlinear shell [s]."""
+        rigid = SECONDS * self.pad
+        return rigid, rigid + CUBE * self.touched**3, rigid + SECONDS * self.shell
+
+    @property
+    def memory(self) -> float:
+        """Memory of the costlier of both shells [bytes]."""
+        linear = BYTES * self.whole + 8.0 * DENSE * float(self.touched) ** 2
+        return max(BYTES * self.shell, linear)
+
+
+def wall_size(scene: Any) -> WallSize | None:
+    """Unknowns of a candidate in the middle of the scene's stations; None where the wall has no outline to divide."""
+    from softjaw.fem.objects.turned import Turned
+    from softjaw.fem.shell.grid import MeshSize, along, around
+
+    try:
+        surface, is_round = outer_surface(scene.object)
+    except (AttributeError, ValueError):
+        return None
+    angle = 0.0 if scene.candidates.poses else scene.candidates.angles[0]
+    turned, accuracy = Turned(surface, angle, is_round), scene.accuracy
+    mirrors = _mirrors(scene, turned.symmetric)
+    low, high, half = _covered(scene, surface)
+
+    def grid(heights: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
+        return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top, 0.0)
+
+    theta, s = grid((low, high))
+    wide, tall = grid(_heights(surface))
+    radius, z = surface.curve.derivative(tall)[:, 1], surface.curve.derivative(tall)[:, 0]
+    beside = np.abs(np.sin(theta)) * radius[(z >= low) & (z <= high)].max(initial=half) <= half
+    ends = 4 >> sum(mirrors)  # one more line beside each end of a region
+    touched = (np.count_nonzero(beside) + ends) * (np.count_nonzero((z >= low) & (z <= high)) + 2)
+    return WallSize(_pad(scene, mirrors), 6 * len(theta) * len(s), 6 * len(wide) * len(tall), 6 * touched)
+
+
+def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
+    """Planes of symmetry of a grasp across the axis that the meshes can use."""
+    if scene.candidates.poses or scene.effects.model_size == "full":
+        return False, False
+    even = scene.gripper.elements[1] % 2 == 0 and abs(math.sin(2 * scene.candidates.roll)) < 1e-9
+    return symmetric[0] and scene.effects.model_size != "half", symmetric[1] and even
+
+
+def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
+    """Heights that a pad reaches over at the middle station, and half of what it covers round the object [m]."""
+    gripper, where = scene.gripper, scene.candidates
+    margin = MARGIN * max(gripper.pad_size[:2])
+    ends = _heights(surface)
+    middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
+    along = 1e-3 * half_extent_mm(where, gripper) + margin
+    low, high = np.clip([middle - along, middle + along], *ends)
+    return float(low), float(high), 0.5 * gripper.pad_size[1] + margin
+
+
+def _heights(surface: Any) -> tuple[float, float]:
+    z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
+    return float(z.min()), float(z.max())
+
+
+def _pad(scene: Any, mirrors: tuple[bool, bool]) -> int:
+    """Unknowns of the pads that are solved, from the nodes of the whole pad."""
+    fingers = 1 if mirrors[0] else 2
+    return round(3 * _pad_nodes(scene) * fingers * (0.5 if mirrors[1] else 1.0))
+
+
+def _pad_nodes(scene: Any) -> int:
+    """Nodes of one whole pad."""
+    return math.prod(n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in scene.gripper.elements)

@@ -1,20 +1,28 @@
-"""Who solves what: ranks take units from a counter in the memory of their node, the most expensive ones first."""
+"""Who solves what, and since when: counters and clocks in the memory that the ranks of a node share."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-NEXT, STOP, SPOKEN = range(3)  # what stands in the shared memory
+NEXT, STOP, SPOKEN = range(3)  # what the counters of a node are for
+PATIENCE = 2.0  # of the time limit, after which a rank that has not even heard its own alarm counts as lost
+IDLE = -1
+
+
+def _shared(node: Any, count: int, kind: type) -> tuple[Any, np.ndarray]:
+    """A window and ``count`` numbers of eight bytes in it, which all ranks of the node see."""
+    window = MPI.Win.Allocate_shared(8 * count if node.rank == 0 else 0, 8, comm=node)
+    memory, _ = window.Shared_query(0)
+    return window, np.frombuffer(memory, kind)
 
 
 class Claims:
     """Positions ``0 .. count - 1``, each handed to one rank; creating and freeing are collective.
-
-    ``node`` are the ranks that share this rank's memory.
 
     Inside a node the next position comes from a counter in shared memory, which needs no help from a rank that is
     computing. Between nodes the positions are dealt out in turn: a counter on another node would wait until the rank
@@ -35,10 +43,7 @@ class Claims:
         self.node = comm.Split_type(MPI.COMM_TYPE_SHARED) if node is None else node
         leaders = sorted(set(comm.allgather(self.node.bcast(comm.rank))))
         self._first, self._step, self._count = leaders.index(self.node.bcast(comm.rank)), len(leaders), count
-        item = MPI.INT64_T.Get_size()
-        self._window = MPI.Win.Allocate_shared(3 * item if self.node.rank == 0 else 0, item, comm=self.node)
-        memory, _ = self._window.Shared_query(0)
-        self._shared = np.frombuffer(memory, np.int64)
+        self._window, self._shared = _shared(self.node, 3, np.int64)
         if self.node.rank == 0:
             self._shared[:] = 0
         self.node.Barrier()
@@ -46,14 +51,18 @@ class Claims:
 
     def __iter__(self) -> Iterator[int]:
         """Positions of this rank, until there are none left or somebody called `stop`."""
-        one, taken = np.ones(1, np.int64), np.zeros(1, np.int64)
         while not self.stopped:
-            self._window.Fetch_and_op(one, taken, 0, NEXT, MPI.SUM)
-            self._window.Flush(0)
-            position = self._first + int(taken[0]) * self._step
+            position = self._first + self._add_one(NEXT) * self._step
             if position >= self._count:
                 return
             yield position
+
+    def _add_one(self, counter: int) -> int:
+        """What a counter had before this rank added one."""
+        before = np.zeros(1, np.int64)
+        self._window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
+        self._window.Flush(0)
+        return int(before[0])
 
     def stop(self) -> None:
         """Ask all ranks of this node to begin nothing new."""
@@ -66,10 +75,7 @@ class Claims:
 
     def first_to_speak(self) -> bool:
         """Whether nobody on this node has asked this before; for a message that all ranks might give at once."""
-        one, asked = np.ones(1, np.int64), np.zeros(1, np.int64)
-        self._window.Fetch_and_op(one, asked, 0, SPOKEN, MPI.SUM)
-        self._window.Flush(0)
-        return not asked[0]
+        return self._add_one(SPOKEN) == 0
 
     def free(self) -> None:
         """Give the counter back."""
@@ -79,3 +85,45 @@ class Claims:
         self._window.Free()
         if self._own:
             self.node.Free()
+
+
+class LostRanks:
+    """What the ranks of a node solve since when; creating and freeing are collective over the node.
+
+    A case that hangs inside a library cannot be ended from within: the process that holds it hears no signal in Python.
+    Another process of the node can see that, mark the case as failed, and end the run when everything else is done.
+
+    Parameters
+    ----------
+    node : communicator
+        Ranks that share memory.
+    limit : float
+        Time limit of a case [s].
+    """
+
+    def __init__(self, node: Any, limit: float) -> None:
+        self.patience, self._node = PATIENCE * limit, node
+        self._window, numbers = _shared(node, 2 * node.size, float)
+        self._unit, self._since = numbers.reshape(2, node.size)
+        if node.rank == 0:
+            self._unit[:] = IDLE
+        node.Barrier()
+
+    def begin(self, unit: int) -> None:
+        """Note that this rank begins a case of the unit with this index."""
+        self._since[self._node.rank] = time.monotonic()  # one clock for all processes of a node
+        self._unit[self._node.rank] = unit
+
+    def end(self) -> None:
+        """Note that this rank solves nothing."""
+        self._unit[self._node.rank] = IDLE
+
+    def units(self) -> list[int]:
+        """Units whose ranks have been in one case for much longer than its time limit."""
+        late = (self._unit != IDLE) & (time.monotonic() - self._since > self.patience)
+        return [int(unit) for unit in self._unit[late]]
+
+    def free(self) -> None:
+        """Give the memory back."""
+        self._unit = self._since = np.empty(0)
+        self._window.Free()

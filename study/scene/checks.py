@@ -1,180 +1,212 @@
-"""What the values of a scene must satisfy together: the object, the grasps on it, and the list of all checks."""
+"""What the sections of a scene must satisfy together, all checks in one list, and values that are seldom meant."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
 
-from softjaw.study.scene.effect_checks import coupling
-from softjaw.study.scene.errors import Finding, shown
-from softjaw.study.scene.file_checks import output_file, petsc_options
-from softjaw.study.scene.gripper_checks import pad_material, pad_mesh, sheet
-from softjaw.study.scene.limit_surface_checks import sampled_candidates, surface_choice, weight
-from softjaw.study.scene.sections import Candidates, GraspPose, Gripper, Load
-from softjaw.study.scene.shapes import Box, Plate, Revolution, Shape
-from softjaw.study.scene.uncertainty_section import no_sweep, uncertainty_checks, wall_is_there
-from softjaw.study.scene.wall_checks import sections, wall
+from softjaw.study.scene import grasp_checks as grasps
+from softjaw.study.scene.objects import Shape, Walled
+from softjaw.study.scene.problems import Finding, KeyPath, closest, shown
+from softjaw.study.scene.sections import (
+    Accuracy,
+    Candidates,
+    Effects,
+    Friction,
+    Gripper,
+    LimitSurface,
+    Load,
+    Output,
+    Task,
+    Uncertainty,
+)
 
-SMALLEST_MM, LARGEST_MM, MOST_CASES = 1.0, 2000.0, 1_000_000
-
-
-def object_size(shape: Shape) -> Iterator[Finding]:
-    """Extents outside 1 mm to 2 m are slips of the unit."""
-    for axis, (low, high) in shape.spans_mm.items():
-        extent = high - low
-        if not SMALLEST_MM <= extent <= LARGEST_MM:
-            meant, other = (extent * 1000, "metres") if extent < SMALLEST_MM else (extent / 1000, "micrometres")
-            remedy = f"the unit is mm: if {other} were meant, the extent is {meant:g} mm"
-            if not SMALLEST_MM <= meant <= LARGEST_MM:
-                remedy = "check the unit, which is mm"
-            path, found = ("object", _size_key(shape, axis)), f"an extent of {extent:g} mm along {axis}"
-            yield Finding(path, found, f"{SMALLEST_MM:g} mm to {LARGEST_MM / 1000:g} m", remedy)
-            return
+MOST_CASES, MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 1_000_000, 20.0
+ROUNDING = 1e-9  # of a length: fem.pad.backing_plate finds nodes this close to the support's rim on it, too
+LEVELS = {  # level of the effect: models of [limit_surface]
+    "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),
+}  # fmt: skip
+PROGRAMMES = ("full", "quartic")  # models that can be fitted by a programme too
+OTHERS = "others go into the environment variable PETSC_OPTIONS"
 
 
-def _size_key(shape: Shape, axis: str) -> str:
-    keys = {"sphere": "radius_mm", "box": "size_mm", "plane": "thickness_mm", "revolution": "profile_mm"}
-    keys["sections"] = "sections"
-    cylinder = {"x": "semi_axis_a_mm", "y": "semi_axis_b_mm", "z": "length_mm"}
-    return keys.get(shape.shape, cylinder[axis])  # type: ignore[attr-defined]
-
-
-def profile(shape: Shape) -> Iterator[Finding]:
-    """An outline leads from one end to the other: z never falls, and only the ends may lie on the axis."""
-    if not isinstance(shape, Revolution):
+def _coupling(shape: Shape, effects: Effects) -> Iterator[Finding]:
+    """Friction acts back on pads that press on rigid objects."""
+    if effects.friction_pressure_coupling != "tangential":
         return
-    points = shape.profile_mm
-    for i, (z, r) in enumerate(points):
-        path = ("object", "profile_mm", i)
-        if i and (z < points[i - 1][0] or (z, r) == points[i - 1]):
-            found = f"[{z:g}, {r:g}] after [{', '.join(f'{v:g}' for v in points[i - 1])}]"
-            yield Finding(path, found, "z to rise from point to point", "sort the points [z, radius] along the axis")
-        at_end = i in (0, len(points) - 1)
-        if r < 0 or (r == 0 and not at_end):
-            expected = "a radius >= 0" if at_end else "a radius > 0 between the ends"
-            yield Finding(path, f"radius {r:g} mm", expected, "write each point as [z, radius], in mm")
+    where = ("effects", "friction_pressure_coupling")
+    if isinstance(shape, Walled) and shape.wall is not None and effects.object != "rigid":
+        found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
+        yield Finding(where, found, "a rigid object", remedy)
 
 
-def box_edges(shape: Shape) -> Iterator[Finding]:
-    """Edges cannot be rounder than the box is thick."""
-    if isinstance(shape, Box) and shape.edge_radius_mm > min(shape.size_mm) / 2:
-        most = min(shape.size_mm) / 2
-        expected = f"at most half the smallest size, {most:g} mm"
-        yield Finding(("object", "edge_radius_mm"), f"{shape.edge_radius_mm:g} mm", expected, f"write {most:g} or less")
+def _named(path: KeyPath, wanted: Any, candidates: Candidates) -> Iterator[Finding]:
+    """Numbers and labels that no candidate has, in a list of candidates."""
+    labels = candidates.labels
+    numbers = f"0 to {len(labels) - 1}"
+    for i, name in enumerate(wanted if isinstance(wanted, tuple) else ()):
+        if isinstance(name, int) and not 0 <= name < len(labels):
+            remedy = "numbers count stations, then angles"
+            yield Finding((*path, i), f"{name}", f"a candidate's number, {numbers}", remedy)
+        elif isinstance(name, str) and name not in labels:
+            near = closest(name, labels)
+            remedy = f"did you mean {shown(near)}?" if near else f"write the candidate's number, {numbers}"
+            yield Finding((*path, i), shown(name), f"a candidate's label, as {shown(labels[0])}", remedy)
 
 
-def candidate_choice(candidates: Candidates) -> Iterator[Finding]:
-    """Exactly one way of saying where to grasp."""
-    c, here = candidates, ("candidates",)
-    spread = c.stations is not None or c.station_range_mm is not None
-    given = {"stations": spread, "stations_mm": c.stations_mm is not None, "poses": bool(c.poses)}
-    ways = [way for way in given if given[way]]
-    example = "for example `stations = 35` with `station_range_mm = [25, 175]`"
-    if len(ways) != 1:
-        expected = "one of stations_mm, stations with station_range_mm, or [[candidates.poses]]"
-        found = " and ".join(ways) or "no grasp candidates"
-        yield Finding((*here, *ways[-1:]), found, expected, "keep one of them" if ways else f"add one, {example}")
-    if spread and (c.stations is None or c.station_range_mm is None):
-        found, missing = ("stations", "station_range_mm") if c.stations else ("station_range_mm", "stations")
-        yield Finding((*here, found), f"{found} alone", f"{missing} beside it", f"add {missing}, {example}")
-    if c.station_range_mm and c.station_range_mm[0] >= c.station_range_mm[1]:
-        low, high = c.station_range_mm
-        path, found = (*here, "station_range_mm"), f"[{low:g}, {high:g}]"
-        yield Finding(path, found, "two different stations, the lower first [mm]", f"write [{high:g}, {low:g}]")
-    for key in ("stations_mm", "angles_deg"):
-        yield from _twice((*here, key), getattr(c, key) or ())
-    for key in ("angles_deg", "roll_deg") if c.poses else ():
-        if getattr(c, key) != Candidates.model_fields[key].default:
-            remedy = "remove it; approach and long_side say how each pose is turned"
-            yield Finding((*here, key), f"{key} beside explicit poses", "it with stations only", remedy)
+def _pad_mesh(gripper: Gripper, effects: Effects) -> Iterator[Finding]:
+    """Symmetric halves need even counts; slivers and meshes beyond any memory are slips."""
+    n, counts = gripper.elements, ("gripper", "elements")
+    odd = [i for i in (0, 1) if n[i] % 2]
+    if odd and effects.model_size != "full":
+        even = [k + k % 2 if i < 2 else k for i, k in enumerate(n)]
+        expected = "even numbers along length and width, so that symmetric halves can be meshed"
+        yield Finding(counts, f"{list(n)}", expected, f'write {even}, or effects.model_size = "full"')
+    for i in odd:
+        if gripper.grading[i] != 1:
+            path, found = ("gripper", f"grading_{'xy'[i]}"), f"{gripper.grading[i]:g} with {n[i]} elements"
+            expected = "an even number of elements where they are graded"
+            yield Finding(path, found, expected, "write 1.0, or even elements")
+    if math.prod(n) > MOST_ELEMENTS:
+        found, expected = f"{list(n)}, which is {math.prod(n):,} elements", f"at most {MOST_ELEMENTS:,} elements"
+        yield Finding(counts, found, expected, "start with [20, 10, 6]")
+    edges = _element_edges(gripper)
+    if max(map(max, edges)) > LARGEST_ASPECT * min(map(min, edges)):
+        sizes = " x ".join(f"{low:.3g}" if low == high else f"{low:.3g}..{high:.3g}" for low, high in edges)
+        size = (gripper.pad_length_mm, gripper.pad_width_mm, gripper.pad_thickness_mm)
+        h = (math.prod(size) / math.prod(n)) ** (1 / 3)
+        better = [max(2, 2 * round(s / h / 2)) for s in size]
+        found = f"{list(n)}, which makes elements of {sizes} mm"
+        expected = f"edges that differ by a factor of {LARGEST_ASPECT:g} at most"
+        yield Finding(counts, found, expected, f"try {better} without grading")
 
 
-def _twice(path: tuple[str, ...], values: tuple[float, ...]) -> Iterator[Finding]:
-    for value in sorted({v for v in values if values.count(v) > 1} if len(values) < 1000 else ()):
-        yield Finding(path, f"{value:g} more than once", "each value once", "remove the repetition")
+def _element_edges(gripper: Gripper) -> list[tuple[float, float]]:
+    """Smallest and largest element edge along x, y and z [mm]."""
+    sizes = (gripper.pad_length_mm / 2, gripper.pad_width_mm / 2, gripper.pad_thickness_mm)
+    counts = (gripper.elements[0] // 2, gripper.elements[1] // 2, gripper.elements[2])
+    edges = []
+    for size, n, ratio in zip(sizes, counts, gripper.grading, strict=True):
+        steps = [ratio ** (i / (n - 1)) for i in range(n)] if n > 1 else [1.0]
+        edges.append((min(steps) / sum(steps) * size, max(steps) / sum(steps) * size))
+    return edges
 
 
-def stations_on_object(shape: Shape, candidates: Candidates) -> Iterator[Finding]:
-    """Grasps beside the object, or along its faces, cannot touch it."""
-    low, high = shape.spans_mm.get("z", (-math.inf, math.inf))
-    outside = [s for s in candidates.station_values_mm if not low <= s <= high]
-    if outside:
-        key = "stations_mm" if candidates.stations_mm is not None else "station_range_mm"
-        places = ", ".join(f"{s:g}" for s in outside[:4]) + (", ..." if len(outside) > 4 else "")
-        found = f"{len(outside)} station{'s' * (len(outside) > 1)} beside the object: {places} mm"
-        expected = f"stations from {low:g} to {high:g} mm, where the object is"
-        remedy = "stations are coordinates along the object's axis, in mm"
-        yield Finding(("candidates", key), found, expected, remedy)
-    for angle in candidates.angles_deg if isinstance(shape, Plate) and candidates.station_values_mm else ():
-        if abs(math.cos(math.radians(angle))) < 0.5:
-            found, expected = f"{angle:g} degrees with two planes", "angles within 60 of 0 or 180: the planes face x"
-            yield Finding(("candidates", "angles_deg"), found, expected, "write angles_deg = [0]")
+def _sheet(gripper: Gripper, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
+    """The finger holds the sheet by at least one node of every mesh; with even counts one is in the middle."""
+    if effects.sheet == "rigid":
+        return
+    counts = [gripper.elements[:2], [-(-n // 2) for n in gripper.elements[:2]]][: accuracy.meshes]
+    size = gripper.pad_length_mm, gripper.pad_width_mm
+    need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
+    if any(held < (1 - ROUNDING) * least for held, least in zip(gripper.sheet_support_mm, need, strict=True)):
+        meshes = " and ".join(f"{list(n)}" for n in counts)
+        found = f"{list(gripper.sheet_support_mm)} mm with {meshes} elements along length and width"
+        expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
+        remedy = "use even numbers of elements" if len(counts) == 1 else "use multiples of 4 elements"
+        yield Finding(("gripper", "sheet_support_mm"), found, expected, remedy)
 
 
-def explicit_poses(candidates: Candidates) -> Iterator[Finding]:
-    """Directions that do not fix a frame, points far from any object."""
-    for i, pose in enumerate(candidates.poses):
-        here = ("candidates", "poses", i)
-        lengths = {key: math.hypot(*getattr(pose, key)) for key in ("approach", "long_side")}
-        for key, length in lengths.items():
-            if not 1e-6 <= length <= 1e6:
-                found = shown(list(getattr(pose, key)))
-                yield Finding((*here, key), found, "a direction", "write for example [1, 0, 0]")
-                return
-        cosine = sum(a * b for a, b in zip(pose.approach, pose.long_side, strict=True)) / math.prod(lengths.values())
-        if abs(cosine) > 0.996:
-            found, remedy = f"{shown(list(pose.long_side))}, along the approach", "the long side lies in the pad's face"
-            yield Finding((*here, "long_side"), found, "a direction across the approach", remedy)
-        if max(map(abs, pose.point_mm)) > LARGEST_MM:
-            expected = f"a point within {LARGEST_MM:g} mm of the object's origin"
-            yield Finding((*here, "point_mm"), shown(list(pose.point_mm)), expected, "check the unit, which is mm")
+def _pad_material(g: Gripper) -> Iterator[Finding]:
+    """Constants that the chosen law cannot have."""
+    if g.material == "blatz_ko" and g.poisson_ratio != 0.25:
+        expected, remedy = "0.25, which Blatz-Ko foam always has", 'remove the key, or choose material = "hyperfoam"'
+        yield Finding(("gripper", "poisson_ratio"), f"{g.poisson_ratio:g}", expected, remedy)
+    if g.material != "hyperfoam":
+        for key in ("alpha", "shear_moduli_kpa"):
+            if getattr(g, key):
+                found, expected = f"{key} with material {shown(g.material)}", "it with hyperfoam only"
+                yield Finding(("gripper", key), found, expected, 'remove it, or write material = "hyperfoam"')
+        return
+    if len(g.alpha) != len(g.shear_moduli_kpa):
+        found = f"{len(g.alpha)} exponents and {len(g.shear_moduli_kpa)} moduli"
+        remedy = "give alpha and shear_moduli_kpa the same length"
+        yield Finding(("gripper", "alpha"), found, "one exponent per modulus", remedy)
+    if 0 in g.alpha:
+        found, remedy = shown(list(g.alpha)), "use a small exponent such as 0.01"
+        yield Finding(("gripper", "alpha"), found, "exponents other than 0", remedy)
+    total = sum(g.shear_moduli_kpa)
+    if total <= 0 or not math.isclose(total, g.shear_modulus_kpa, rel_tol=1e-9):
+        found = f"{g.shear_modulus_kpa:g} kPa"
+        expected = f"shear_modulus_kpa, the sum of shear_moduli_kpa, to be {total:g} kPa and > 0"
+        yield Finding(("gripper", "shear_modulus_kpa"), found, expected, "leave shear_modulus_kpa out")
 
 
-def poses_on_object(shape: Shape, candidates: Candidates, gripper: Gripper) -> Iterator[Finding]:
-    """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
-    spans = shape.spans_mm
-    for i, pose in enumerate(candidates.poses):
-        frame = pose_axes(pose)
-        if frame is None or len(spans) < 3 or max(map(abs, pose.point_mm)) > LARGEST_MM:
-            continue
-        for axis, size in zip(frame, (gripper.pad_length_mm, gripper.pad_width_mm), strict=True):
-            off = sum((p - sum(spans[k]) / 2) * a for p, k, a in zip(pose.point_mm, "xyz", axis, strict=True))
-            reach = sum((spans[k][1] - spans[k][0]) / 2 * abs(a) for k, a in zip("xyz", axis, strict=True)) + size / 2
-            if abs(off) > reach:
-                label = f" of '{pose.label}'" if pose.label else ""
-                found = f"a pad{label} that passes the object at a distance of {abs(off) - reach:.3g} mm"
-                remedy = "point_mm is in mm, in the frame in which the object's shape is given"
-                yield Finding(("candidates", "poses", i, "point_mm"), found, "a pad that meets it", remedy)
-                break
+def _limit_surface(surface: LimitSurface, effects: Effects) -> Iterator[Finding]:
+    """A forced level is the model's, and only some models have several objectives."""
+    level, models = effects.limit_surface, LEVELS.get(effects.limit_surface, ())
+    if models and surface.model not in models:
+        expected = f"the level of limit_surface.model, which is {shown(surface.model)}"
+        remedy = f'write `model = "{models[0]}"` in [limit_surface], or "auto" here'
+        yield Finding(("effects", "limit_surface"), shown(level), expected, remedy)
+    if surface.objective == "zhou" and surface.model not in PROGRAMMES:
+        found, expected = f'"zhou" with model {shown(surface.model)}', f"it with model {' or '.join(PROGRAMMES)}"
+        yield Finding(("limit_surface", "objective"), found, expected, 'write `objective = "least_squares"`')
 
 
-def pose_axes(pose: GraspPose) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    """Unit vectors along the pad's length and width; None where approach and long side do not fix them."""
-    a, b = pose.approach, pose.long_side
-    width = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    length = (width[1] * a[2] - width[2] * a[1], width[2] * a[0] - width[0] * a[2], width[0] * a[1] - width[1] * a[0])
-    sizes = math.hypot(*length), math.hypot(*width)
-    if not all(1e-12 < s < 1e12 for s in sizes):
-        return None
-    return tuple(v / sizes[0] for v in length), tuple(v / sizes[1] for v in width)
+def _weight(task: Task) -> Iterator[Finding]:
+    if not any(abs(v) > 1e-9 for v in task.weight_direction):
+        path = ("task", "weight_direction")
+        yield Finding(path, shown(list(task.weight_direction)), "a direction", "write for example [0, 0, -1]")
 
 
-def forces(load: Load) -> Iterator[Finding]:
-    """Every force once."""
-    yield from _twice(("load", "normal_force_n"), load.normal_force_n)
+def _output_file(output: Output) -> Iterator[Finding]:
+    """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
+    path, parts = ("output", "file"), PurePosixPath(output.file).parts
+    if not output.file.endswith(".hdf"):
+        remedy = f"write {shown(re.sub(r'[.][A-Za-z0-9]*$', '', output.file) + '.hdf')}"
+        yield Finding(path, shown(output.file), "a file ending in .hdf, which all viewers open", remedy)
+    if PurePosixPath(output.file).is_absolute() or PureWindowsPath(output.file).drive or ".." in parts:
+        remedy = "give any other place on the command line with `-o`"
+        yield Finding(path, shown(output.file), "a path below the working directory", remedy)
+
+
+def _petsc(table: Mapping[str, Any]) -> Iterator[Finding]:
+    """Options of the contact solver only, and none that writes files or runs code."""
+    for key, value in table.items():
+        path, bare = ("petsc", key), re.sub(r"^-*(contact_)?", "", key)
+        if not re.fullmatch(r"contact_[a-z0-9_]+", key):
+            remedy = f"write `contact_{bare}` if the contact solver is meant; {OTHERS}"
+            expected = "an option of the contact solver, contact_..., as softjaw takes no others"
+            yield Finding(path, f"the option {shown(key)}", expected, remedy)
+        elif bare.endswith("python_type"):
+            yield Finding(path, "an option that runs Python code", "options of the solver itself", "remove it")
+        elif not isinstance(value, str | int | float):
+            yield Finding(path, shown(value), "text, a number, or true or false", "write the option's value alone")
+        elif isinstance(value, str) and not re.fullmatch(r"[A-Za-z0-9_,.+-]*", value):
+            remedy = "options that name files go into the environment variable PETSC_OPTIONS"
+            yield Finding(path, shown(value), "a word, a number or a list of them", remedy)
+
+
+def _uncertain(own: Uncertainty, shape: Any, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[Finding]:
+    """A friction coefficient that may be negative, a wall that is not there, and a sweep, which has no bands."""
+    if own.mu and own.mu >= friction.mu:
+        expected = f"less than friction.mu, which is {friction.mu:g}"
+        remedy = "the half-width is in the unit of mu, not in per cent"
+        yield Finding(("uncertainty", "mu"), f"{own.mu:g}", expected, remedy)
+    if own.wall_thickness_percent and getattr(shape, "wall", None) is None:
+        found, expected = f"{own.wall_thickness_percent:g}", "0 for an object without a wall"
+        path = ("uncertainty", "wall_thickness_percent")
+        yield Finding(path, found, expected, "give object.wall_mm, or leave it out")
+    if own.parts and sweep:
+        found, remedy = f"it beside a sweep over {', '.join(sweep)}", "leave [sweep] out here, or [uncertainty]"
+        yield Finding(("uncertainty",), found, "a scene without a sweep", remedy)
 
 
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
-    (("object",), object_size), (("object",), profile), (("object",), box_edges), (("gripper", "effects"), pad_mesh),
-    (("gripper", "effects", "accuracy"), sheet),
-    (("object", "effects"), coupling),
-    (("gripper",), pad_material), (("candidates",), candidate_choice), (("object", "candidates"), stations_on_object),
-    (("candidates",), explicit_poses), (("object", "candidates", "gripper"), poses_on_object), (("load",), forces),
-    (("output",), output_file), (("petsc",), petsc_options), (("limit_surface", "effects"), surface_choice),
-    (("limit_surface", "candidates"), sampled_candidates), (("task",), weight), (("object", "effects"), wall),
-    (("object",), sections), (("uncertainty", "candidates", "friction"), uncertainty_checks),
-    (("uncertainty", "object"), wall_is_there), (("uncertainty", "sweep"), no_sweep),
+    (("object",), grasps.object_findings), (("object", "effects"), grasps.wall_findings),
+    (("object", "effects"), _coupling), (("gripper", "effects"), _pad_mesh), (("gripper",), _pad_material),
+    (("gripper", "effects", "accuracy"), _sheet), (("candidates",), grasps.candidate_findings),
+    (("object", "candidates"), grasps.station_findings),
+    (("object", "candidates", "gripper"), grasps.pose_findings),
+    (("load",), lambda load: grasps.twice(("load", "normal_force_n"), load.normal_force_n)),
+    (("output",), _output_file), (("petsc",), _petsc), (("limit_surface", "effects"), _limit_surface),
+    (("limit_surface", "candidates"), lambda s, c: _named(("limit_surface", "wrench_samples"), s.wrench_samples, c)),
+    (("task",), _weight), (("uncertainty", "object", "friction", "sweep"), _uncertain),
+    (("uncertainty", "candidates"), lambda u, c: _named(("uncertainty", "probes"), u.probes, c)),
 )  # fmt: skip
 
 
@@ -182,3 +214,23 @@ def findings(given: Mapping[str, Any]) -> list[Finding]:
     """Everything wrong with the sections that are there; a check whose sections are not all there is left out."""
     ready = [(names, check) for names, check in CHECKS if all(name in given for name in names)]
     return [finding for names, check in ready for finding in check(*(given[name] for name in names))]
+
+
+def value_warnings(gripper: Gripper, friction: Friction, load: Load, accuracy: Accuracy) -> Iterator[str]:
+    """Sentences about values that are allowed but seldom meant."""
+    if friction.mu > 2:
+        yield f"friction.mu = {friction.mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"
+    force, area = load.normal_force_n[-1], gripper.pad_length_mm * gripper.pad_width_mm
+    strain = force / area * 1000 / gripper.shear_modulus_kpa
+    if strain > 2:
+        yield (
+            f"load.normal_force_n = {force:g} N on {area:g} mm^2 is a mean pressure of {strain:.2g} times the pad's "
+            "shear modulus: cases may fail to converge"
+        )
+    if gripper.poisson_ratio > 0.45 and gripper.element == "hex8":
+        yield f'gripper.poisson_ratio = {gripper.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
+    if accuracy.meshes == 2 and any(n % 4 for n in gripper.elements):
+        yield (
+            f"accuracy.meshes = 2 halves the mesh, and gripper.elements = {list(gripper.elements)} cannot be halved "
+            "evenly: multiples of 4 can"
+        )

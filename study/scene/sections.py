@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from softjaw.study.scene.shapes import Section
-from softjaw.study.scene.units import si
+from softjaw.study.scene.objects import Section
+from softjaw.study.units import si
 
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -16,6 +16,9 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 Extent = Annotated[float, Field(ge=0, le=500)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
+POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
+Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
+Share = Annotated[float, Field(ge=0, le=50)]
 
 
 class Gripper(Section):
@@ -31,9 +34,11 @@ class Gripper(Section):
     poisson_ratio: float = Field(
         0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam has 0.25"
     )
-    alpha: tuple[float, ...] = Field((), strict=False, max_length=6, description="exponents of hyperfoam's terms")
+    alpha: tuple[float, ...] = Field(
+        (), strict=False, max_length=6, description="exponents of hyperfoam's terms", examples=[[-2]]
+    )
     shear_moduli_kpa: tuple[float, ...] = Field(
-        (), strict=False, max_length=6, description="moduli of hyperfoam's terms"
+        (), strict=False, max_length=6, description="moduli of hyperfoam's terms", examples=[[40]]
     )
     elements: Annotated[tuple[Count, Count, Count], Field(strict=False)] = Field(
         (20, 10, 6), description="elements of the whole pad along its length, width and thickness"
@@ -85,9 +90,13 @@ class Friction(Section):
 class GraspPose(Section):
     """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
 
-    point_mm: Vector = Field(description="a point on the line along which the fingers close, [x, y, z]")
-    approach: Vector = Field(description="direction from finger 1 towards the object")
-    long_side: Vector = Field(description="direction of the pads' long side; only its part across the approach counts")
+    point_mm: Vector = Field(
+        description="a point on the line along which the fingers close, [x, y, z]", examples=[[0, 0, 20]]
+    )
+    approach: Vector = Field(description="direction from finger 1 towards the object", examples=[[1, 0, 0]])
+    long_side: Vector = Field(
+        description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
+    )
     label: str = Field("", max_length=100, description="name of the grasp")
     point = si("point_mm")
 
@@ -99,18 +108,25 @@ class Candidates(Section):
         None, ge=2, le=10_000, description="number of stations, spread evenly over station_range_mm"
     )
     station_range_mm: Annotated[tuple[float, float], Field(strict=False)] | None = Field(
-        None, description="first and last station along the object's axis"
+        None, description="first and last station along the object's axis", examples=[[25, 175]]
     )
     stations_mm: Annotated[tuple[float, ...], Field(strict=False, min_length=1, max_length=10_000)] | None = Field(
-        None, description="stations along the object's axis"
+        None, description="stations along the object's axis", examples=[[25, 50, 75]]
     )
     angles_deg: tuple[Angle, ...] = Field(
-        (0.0, 90.0), strict=False, min_length=1, max_length=3600, description="angles about the axis"
+        (0.0, 90.0),
+        strict=False,
+        min_length=1,
+        max_length=3600,
+        description="angles about the axis",
+        examples=[[0, 90]],
     )
     roll_deg: Angle = Field(
         0.0, description="turn of the gripper about the approach; 0 has the long side along the axis"
     )
-    poses: tuple[GraspPose, ...] = Field((), strict=False, max_length=100_000, description="explicit grasps")
+    poses: tuple[GraspPose, ...] = Field(
+        (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
+    )
     angles, roll = si("angles_deg"), si("roll_deg")
 
     @field_validator("stations_mm", "angles_deg")
@@ -148,7 +164,7 @@ class Load(Section):
     """What the fingers press with."""
 
     normal_force_n: tuple[Force, ...] = Field(
-        strict=False, min_length=1, max_length=1000, description="normal forces per finger"
+        strict=False, min_length=1, max_length=1000, description="normal forces per finger", examples=[[1, 2, 5]]
     )
     normal_force = si("normal_force_n")
 
@@ -158,14 +174,60 @@ class Load(Section):
         return tuple(sorted(values))
 
 
+class Score(Section):
+    """How torques are made comparable with forces in the grasp quality."""
+
+    torque_scale: Literal["contact", "object"] = Field(
+        "contact",
+        description="soft torques over the contact length (the paper's choice), or all over the object length",
+    )
+    object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
+        "auto", description="length that scales torque arms; auto is the object's largest extent"
+    )
+    contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
+        "auto", description="length that scales soft torques; auto is the pad's length"
+    )
+    epsilon: Literal["facing", "everywhere"] = Field(
+        "facing",
+        description="where epsilon is computed: for contacts that face each other, or in any pose (some 0.1 s each)",
+    )
+    graspit: bool = Field(
+        False, description="also map the quality that GraspIt!'s 20 vertices per contact give, which is too small"
+    )
+    object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
+
+
+class LimitSurface(Section):
+    """The surface that bounds the friction wrenches of a contact, fitted to the wrenches of many motions."""
+
+    model: Literal["three_motions", "axis_aligned", "full", "quartic"] = Field(
+        "quartic",
+        description="ellipsoid from three motions, fitted ellipsoid with axes along the frame or any, convex quartic",
+    )
+    objective: Literal["least_squares", "zhou"] = Field(
+        "least_squares", description="what the fit of a full ellipsoid or a quartic makes small; zhou is slower"
+    )
+    samples: int = Field(500, ge=50, le=20_000, description="motions that the surface is fitted to")
+    wrench_samples: Names | Literal["none", "all"] = Field(
+        "none", description="candidates whose sampled wrenches are stored, by number or label"
+    )
+
+
+class Task(Section):
+    """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
+
+    weight_direction: Vector = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
+    centre_of_mass_mm: Vector | Literal["auto"] = Field(
+        "auto", description="centre of mass [x, y, z]; auto is the middle of the box round the object"
+    )
+    centre_of_mass = si("centre_of_mass_mm")
+
+
 class Effects(Section):
     """What is simulated; ``auto`` takes the cheapest level that the scene allows."""
 
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
         "auto", description="the object's compliance; the shells need object.wall_mm"
-    )
-    pad: Literal["auto", "linear", "hyperelastic"] = Field(
-        "auto", description="the deformation of the pads: small strains (condensed once for all cases), or finite"
     )
     sheet: Literal["auto", "rigid", "elastic"] = Field(
         "auto", description="the sheet behind the pad: rigid, or a plate that bends"
@@ -203,6 +265,38 @@ class Accuracy(Section):
         None, min_length=1, max_length=1000, description="result of 'softjaw cost' that they are chosen from"
     )
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
+
+
+class Uncertainty(Section):
+    """How far inputs may be off (0: not asked), as half-widths within which about 95 of 100 cases lie.
+
+    Errors that no formula gives are found by solving a few candidates, the probes, again with the input changed.
+    """
+
+    probes: Annotated[int, Field(ge=2, le=1000)] | Names = Field(
+        5, description="how many candidates are solved again, or which ones, by number or label"
+    )
+    mesh: bool = Field(False, description="the error of the mesh, from one with half as many elements per direction")
+    shear_modulus_percent: Share = Field(0.0, description="half-width of the pads' shear modulus")
+    wall_thickness_percent: Share = Field(0.0, description="half-width of the thickness of a thin wall")
+    mu: float = Field(0.0, ge=0, le=5, description="half-width of the friction coefficient")
+    pose_mm: float = Field(0.0, ge=0, le=50, description="half-width of the gripper's place along the pads' long side")
+    pose_deg: float = Field(0.0, ge=0, le=30, description="half-width of the gripper's turn about the approach")
+    pose, pose_turn = si("pose_mm"), si("pose_deg")
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What is asked for, of ``mesh, mu, modulus, wall, pose``."""
+        asked = {
+            "mesh": self.mesh, "mu": self.mu, "modulus": self.shear_modulus_percent,
+            "wall": self.wall_thickness_percent, "pose": self.pose_mm or self.pose_deg,
+        }  # fmt: skip
+        return tuple(name for name, wanted in asked.items() if wanted)
+
+    def numbers(self, labels: tuple[str, ...]) -> tuple[int, ...]:
+        """Numbers of the candidates that are named, in the order given; empty where only their count is given."""
+        named = () if isinstance(self.probes, int) else self.probes
+        return tuple(dict.fromkeys(name if isinstance(name, int) else labels.index(name) for name in named))
 
 
 class Output(Section):

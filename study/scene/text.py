@@ -1,4 +1,4 @@
-"""The text of a scene: reading it, the line of every key, and writing it back."""
+"""The TOML text of a scene: reading it, the line of every key, writing it back, and comparing two of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.scene.errors import KeyPath, Problem, SceneError, closest, key_text, shown
+from softjaw.study.scene.problems import KeyPath, Problem, SceneError, closest, key_text, shown
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
 CURES = {  # start of tomllib's sentence: what to do
@@ -29,6 +29,7 @@ _TOKEN = re.compile(
     r"#[^\n]*|\n|[\[\]{}=,.]|[^\s\[\]{}=,.\"'#]+",
     re.DOTALL,
 )
+MOST_NAMED, WIDTH = 5, 30
 
 
 def read_text(path: Path) -> str:
@@ -80,115 +81,78 @@ def _syntax_problem(text: str, file: str, message: str) -> Problem:
     last = text.rstrip("\n").count("\n") + 1
     line = min(int(numbers[0]), last) if numbers else last
     if reason.startswith(("Cannot overwrite", "Cannot declare", "Cannot mutate", "Duplicate")):
-        before = "\n".join(text.split("\n")[:line])
-        lines: dict[KeyPath, int] = {}
-        again: list[tuple[KeyPath, int]] = []
+        seen: dict[KeyPath, int] = {}
         with contextlib.suppress(ValueError):  # the rest of the line may not be TOML
-            again = key_lines(before, lines)
-        if again:
-            path, line = again[0]
-            found = f"the same {'section' if len(path) == 1 else 'key'} again"
-            expected = f"it once, and line {lines[path]} has it"
-            return Problem(file, line, key_text(path), found, expected, "remove one of them")
+            for path, again in key_lines("\n".join(text.split("\n")[:line])):
+                if path in seen:
+                    found = f"the same {'section' if len(path) == 1 else 'key'} again"
+                    expected = f"it once, and line {seen[path]} has it"
+                    return Problem(file, again, key_text(path), found, expected, "remove one of them")
+                seen[path] = again
     cure = next((c for start, c in CURES.items() if reason.startswith(start)), "correct this line")
     found = f"{shown(text.split(chr(10))[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
     return Problem(file, line, "", found, "TOML", cure)
 
 
-def key_lines(text: str, lines: dict[KeyPath, int]) -> list[tuple[KeyPath, int]]:
-    """Put the line of every section, key and list member of a TOML text into ``lines``.
-
-    Returns
-    -------
-    list of (path, line)
-        Keys and sections that are given again, in the order of the text.
-    """
-    return _Scan(text, lines).statements()
-
-
-class _Scan:
-    """A walk over text that ``tomllib`` has accepted (or refused for a duplicate only), to learn lines."""
-
-    def __init__(self, text: str, lines: dict[KeyPath, int]) -> None:
-        self.tokens: list[tuple[str, int]] = []
-        line = 1
-        for match in _TOKEN.finditer(text):
-            if not match[0].startswith("#"):
-                self.tokens.append((match[0], line))
-            line += match[0].count("\n")
-        self.tokens.append(("", line))
-        self.lines, self.at, self.again = lines, 0, list[tuple[KeyPath, int]]()
-
-    def peek(self) -> str:
-        return self.tokens[self.at][0]
-
-    def skip(self, *kinds: str) -> None:
-        while self.peek() in kinds:
-            self.at += 1
-
-    def record(self, path: KeyPath, line: int, once: bool = True) -> None:
-        for n in range(1, len(path)):
-            self.lines.setdefault(path[:n], line)
-        if once and path in self.lines:
-            self.again.append((path, line))
-        self.lines.setdefault(path, line)
-
-    def key(self, *ends: str) -> KeyPath:
-        parts: list[str] = []
-        while self.peek() not in (*ends, "", "\n"):
-            token = self.peek()
-            if token != ".":
-                parts.append(next(iter(tomllib.loads(f"{token}=0"))))
-            self.at += 1
-        return tuple(parts)
-
-    def statements(self) -> list[tuple[KeyPath, int]]:
-        base: KeyPath = ()
-        counts: dict[KeyPath, int] = {}
-        sections: set[KeyPath] = set()
-        while self.skip("\n") or self.peek():
-            line = self.tokens[self.at][1]
-            if self.peek() == "[":
-                start = self.at
-                self.skip("[")
-                many = self.at - start == 2
-                base = self.key("]")
-                self.skip("]")
-                if many:
-                    counts[base] = counts.get(base, -1) + 1
-                    base = (*base, counts[base])
-                else:
-                    base = next(((*p, n, *base[len(p) :]) for p, n in counts.items() if base[: len(p)] == p), base)
-                self.record(base, line, once=base in sections)
-                sections.add(base)
-            else:
-                self.entry(base)
-        return self.again
-
-    def entry(self, base: KeyPath) -> None:
-        line = self.tokens[self.at][1]
-        path = (*base, *self.key("="))
-        self.record(path, line)
-        self.skip("=")
-        self.value(path)
-
-    def value(self, path: KeyPath) -> None:
-        if self.peek() == "[":
-            self.at += 1
-            index = 0
-            while self.skip("\n", ",") or self.peek() not in ("]", ""):
-                self.record((*path, index), self.tokens[self.at][1])
-                self.value((*path, index))
-                index += 1
-            self.at += 1
-        elif self.peek() == "{":
-            self.at += 1
-            while self.skip("\n", ",") or self.peek() not in ("}", ""):
-                self.entry(path)
-            self.at += 1
+def key_lines(text: str) -> list[tuple[KeyPath, int]]:
+    """Path and line of every section, key and list member of a text that is TOML, but perhaps for duplicates."""
+    tokens, line = [], 1
+    for match in _TOKEN.finditer(text):
+        if not match[0].startswith("#"):
+            tokens.append((match[0], line))
+        line += match[0].count("\n")
+    tokens.reverse()  # they are taken from the end
+    found: list[tuple[KeyPath, int]] = []
+    base: KeyPath = ()
+    counts: dict[KeyPath, int] = {}
+    while tokens:
+        token, line = tokens[-1]
+        if token == "\n":
+            tokens.pop()
+        elif token == "[":
+            many = tokens[-2:-1] and tokens[-2][0] == "["
+            base = _names(tokens, "]")
+            if many:
+                counts[base] = counts.get(base, -1) + 1
+                base = (*base, counts[base])
+                tokens.pop()
+            else:  # a table within the last of its kind
+                base = next(((*p, n, *base[len(p) :]) for p, n in counts.items() if base[: len(p)] == p), base)
+            found.append((base, line))
         else:
-            while self.peek() not in (",", "]", "}", "\n", ""):
-                self.at += 1
+            _entry(tokens, base, found)
+    return found
+
+
+def _names(tokens: list[tuple[str, int]], end: str) -> KeyPath:
+    parts: list[str] = []
+    while tokens and (token := tokens.pop()[0]) != end:
+        if token not in ".[":
+            parts.append(next(iter(tomllib.loads(f"{token}=0"))))
+    return tuple(parts)
+
+
+def _entry(tokens: list[tuple[str, int]], base: KeyPath, found: list[tuple[KeyPath, int]]) -> None:
+    line = tokens[-1][1]
+    path = (*base, *_names(tokens, "="))
+    found.append((path, line))
+    _value_lines(tokens, path, found)
+
+
+def _value_lines(tokens: list[tuple[str, int]], path: KeyPath, found: list[tuple[KeyPath, int]]) -> None:
+    opening = tokens.pop()[0] if tokens and tokens[-1][0] in "[{" else ""
+    index = 0
+    while tokens and tokens[-1][0] not in ("]", "}") and (opening or tokens[-1][0] not in (",", "\n")):
+        if not opening or tokens[-1][0] in (",", "\n"):
+            tokens.pop()
+        elif opening == "{":
+            _entry(tokens, path, found)
+        else:
+            found.append(((*path, index), tokens[-1][1]))
+            _value_lines(tokens, (*path, index), found)
+            index += 1
+    if opening and tokens:
+        tokens.pop()
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
@@ -216,3 +180,58 @@ def _value(value: Any) -> str:
     if isinstance(value, str):  # JSON's escapes are TOML's, but for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value) if isinstance(value, float) else json.dumps(value)
+
+
+def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Tables in tables as one table with dotted keys."""
+    pairs: dict[str, Any] = {}
+    for key, value in table.items():
+        pairs |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value}
+    return pairs
+
+
+def differences(theirs: str, ours: str) -> str:
+    r"""Up to five keys that change results and differ between two effective scenes, with both values.
+
+    >>> differences("[friction]\nmu = 0.8", "[friction]\nmu = 0.5")
+    'friction.mu is 0.8 there and 0.5 here'
+    """
+    try:
+        changed = changes(theirs, ours)
+    except ValueError:
+        return "its scene cannot be read"
+    if not changed:
+        return "the same keys, but another mesh file or another version"
+    named = [f"{key} is {value_text(one)} there and {value_text(other)} here" for key, one, other in changed]
+    more = [f"and {len(named) - MOST_NAMED} more keys"] if len(named) > MOST_NAMED else []
+    return "; ".join([*named[:MOST_NAMED], *more])
+
+
+def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
+    """Keys that change results and differ between two effective scenes, with both values; None is a key not set.
+
+    Raises
+    ------
+    ValueError
+        One of them is not TOML.
+    """
+    one, other = (_values(text) for text in (theirs, ours))
+    keys = [key for key in dict.fromkeys([*other, *one]) if one.get(key) != other.get(key)]
+    return [(key, one.get(key), other.get(key)) for key in keys]
+
+
+def _values(text: str) -> dict[str, Any]:
+    """Values by dotted key, without those that change no result."""
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    values = flat({name: table for name, table in tables.items() if name not in ("output", "run")})
+    for pose in values.get("candidates.poses", ()):
+        pose.pop("label", None)
+    return {key: value for key, value in values.items() if key != "object.name"}
+
+
+def value_text(value: Any) -> str:
+    """A value of a scene in a few words."""
+    return "not set" if value is None else shown(value, WIDTH)

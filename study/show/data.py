@@ -11,12 +11,10 @@ import numpy as np
 
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT
 from softjaw.study.show.tables.ranking import BORNE, LOST, TIE, borne_level, judged, ranking
+from softjaw.study.units import shown as in_shown
+from softjaw.study.units import shown_unit
 
-SHOWN = {
-    "m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "Pa": ("kPa", 1e-3), "m^2": ("mm²", 1e6), "N m": ("N mm", 1e3),
-    "1/m": ("1/m", 1.0),
-}  # fmt: skip
-OWN_UNITS = {"wall_stress": ("MPa", 1e-6)}  # maps whose numbers would be unwieldy in the unit of the others
+TYPESET = {"deg": "°", "mm^2": "mm²"}  # as pages write these units
 WIDE = 5e-3  # relative difference of widths that makes no place wider
 # What a check may be at most (or, for the last two, must exceed), and how the reader should take it.
 LIMITS = {
@@ -32,7 +30,8 @@ ABOVE = ("min_det_f", "acoustic")
 
 def shown(units: str) -> tuple[str, float]:
     """Unit that people read, and the factor from SI to it."""
-    return SHOWN.get(units, (units, 1.0))
+    unit = shown_unit(units)
+    return TYPESET.get(unit, unit), in_shown(1.0, units)
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -122,7 +121,7 @@ class Data:
         found = self._paths[path].attributes if path in self._paths else {}
         units = found.get("units", "")
         label = found.get("long_name", name).removesuffix(f" [{units}]").removesuffix(", curved")
-        return label, *OWN_UNITS.get(name, shown(units))
+        return label, *shown(units)
 
     def label(self, name: str) -> str:
         """A map's name and unit for an axis or a column."""

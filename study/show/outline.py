@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.wall_quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.show.data import Data
 
 Outline = tuple[np.ndarray, np.ndarray, bool]
@@ -16,7 +16,7 @@ Outline = tuple[np.ndarray, np.ndarray, bool]
 def read_scene(text: str) -> Any:
     """The scene kept in a result file; None if this version cannot read it."""
     from softjaw.study.scene import parse_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         return parse_scene(text, check_files=False)
@@ -33,7 +33,7 @@ def outline(data: Data, scene: Any, index: tuple[int, ...]) -> Outline | None:
 
 def swept_object(scene: Any, index: tuple[int, ...]) -> Any:
     """The object at this point of the sweep; None if it cannot be told."""
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     try:
         if any(any(isinstance(v, str) for v in values) for values in scene.sweep.values()):

@@ -112,7 +112,7 @@ def writing_share(scene: Path, folder: Path) -> float:
 
     from softjaw.study import pipeline
     from softjaw.study.result import store
-    from softjaw.study.run import run
+    from softjaw.study.run import session as run
     from softjaw.study.run.plan import make_plan
     from softjaw.study.scene import load_scene
 

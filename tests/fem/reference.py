@@ -1,6 +1,6 @@
 """Closed forms that the solver is measured against: energies, homogeneous states, Hertz, and rigid objects.
 
-Nothing here uses the code under test, but for ``placed``, which puts an object before the pad.
+Nothing here uses the code under test, but for ``placed``, which puts an object before the pad, and ``e_n``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softjaw.fem.contact.extract import extract
 from softjaw.fem.objects.pose import Pose
+from softjaw.friction.frame import contact_frame, in_frame
+from softjaw.friction.wrench import friction_limits
 
 # -- energies per reference volume [Pa] of one deformation gradient (3, 3) --------------------------------------------
 
@@ -165,3 +168,9 @@ def placed(obj, pose):
 def facing(a):
     """Pose before an object whose axis is z: long side along the axis, approach along -x, front at ``x = a``."""
     return Pose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([a, 0.0, 0.0]))
+
+
+def e_n(state):
+    """Eccentricity parameter of a pressed pad, curved model [m]."""
+    patch = extract(state.pad, state)
+    return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "curved").e_n

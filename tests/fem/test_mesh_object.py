@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.closest import ellipse_gap
 from softjaw.fem.objects.crossing import crossing_pairs
-from softjaw.fem.objects.mesh_check import MeshError, sound_mesh, winding_number
-from softjaw.fem.objects.mesh_object import MeshObject, read_triangles
+from softjaw.fem.objects.mesh_check import sound_mesh, winding_number
+from softjaw.fem.objects.mesh_file import read_triangles
+from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.pose import Pose
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.fem.objects.touch import NoContactError, first_touch
@@ -194,16 +196,55 @@ def test_chosen_axis_becomes_z_without_mirroring(tmp_path, axis):
     assert mesh.notes == ()
 
 
-@pytest.mark.parametrize("ending", ["obj", "ply", "stl"])
-def test_same_mesh_from_every_format(tmp_path, ending):
+def off(path, points, faces):
+    rows = [*(" ".join(map(repr, map(float, x))) for x in points), *(" ".join(map(str, (len(f), *f))) for f in faces)]
+    path.write_text("\n".join(["OFF", f"{len(points)} {len(faces)} 0", *rows, ""]))
+
+
+@pytest.mark.parametrize(("ending", "binary"), [
+    ("obj", False), ("off", False), ("ply", True), ("ply", False), ("stl", True), ("stl", False),
+])  # fmt: skip
+def test_same_mesh_from_every_format(tmp_path, ending, binary):
     points, triangles = ball(2)
     path = tmp_path / f"ball.{ending}"
     surface = pv.PolyData.from_regular_faces(points, triangles)
-    surface.save(path, binary=False) if ending == "stl" else surface.save(path)
+    off(path, points, triangles) if ending == "off" else surface.save(path, binary=binary)
     mesh = MeshObject.from_file(path, "m")
     assert len(mesh.points) == len(points)
     assert len(mesh.triangles) == len(triangles)
     assert mesh.distance(np.array([[0, 0, RADIUS]]))[0] == pytest.approx(-RADIUS, rel=0.05)
+
+
+BLOCK = 0.01 * np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))])
+RING = [(0, 1, 2, 3), (3, 4, 5, 0)]  # of an L-shaped block; the six corners at once are not convex
+SIDES = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
+
+
+def obj(path, points, faces):
+    rows = [
+        *(f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()),
+        *(f"f {' '.join(str(k + 1) for k in f)}" for f in faces),
+    ]
+    path.write_text("\n".join([*rows, ""]))
+
+
+@pytest.mark.parametrize("written", [off, obj])
+def test_faces_of_four_corners_are_cut_where_they_are_convex(tmp_path, written):
+    path = tmp_path / f"block.{written.__name__}"
+    written(path, BLOCK, [*SIDES, *(f[::-1] for f in RING), *(tuple(6 + k for k in f) for f in RING)])
+    points, triangles = read_triangles(path)
+    np.testing.assert_array_equal(points, BLOCK)
+    points, triangles, _ = sound_mesh(points, triangles)
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(3e-6, rel=1e-12)
+
+
+def test_faces_that_are_not_convex_are_refused(tmp_path):
+    """A fan from the corner beside the notch leaves the face and lies on itself."""
+    path = tmp_path / "block.obj"
+    obj(path, BLOCK, [*SIDES, (1, 0, 5, 4, 3, 2), (7, 8, 9, 10, 11, 6)])
+    with pytest.raises(MeshError, match=r"block.obj: .*not convex.*triangulate"):
+        read_triangles(path)
 
 
 def test_unit_is_applied():
@@ -311,20 +352,20 @@ end_header
 
 
 @pytest.mark.parametrize(("name", "content", "message"), [
-    ("cut.stl", FLASK.read_bytes()[:20_000], r"cut short or no STL file: 20000 bytes, but its header calls for 179284"),
+    ("cut.stl", FLASK.read_bytes()[:20_000], "20000 bytes, expected at least 179284"),
     ("junk.stl", b"hello", "cut short or no STL file"),
-    ("huge.stl", bytes(80) + b"\xff" * 4, "its header calls for 214748364834"),
-    ("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "damaged or no STL file|is empty"),
+    ("huge.stl", bytes(80) + b"\xff" * 4, "expected at least 214748364834"),
+    ("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "is damaged|is empty"),
     ("empty.stl", b"", "the file is empty"),
-    ("a.step", b"ISO-10303-21;", r"meshes are read from .stl, .obj, .ply files"),
-    ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "refers to point 8, but there are only 3"),
+    ("a.step", b"ISO-10303-21;", r"meshes are read from .stl, .obj, .ply, .off files"),
+    ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "is damaged"),
     ("b.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not a finite number"),
     ("c.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "is empty: it holds no triangles"),
     ("d.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "not closed: 4 of its 5 edges"),
-    ("a.ply", PLY.format(3, 1, 9).encode(), "refers to point 9, but there are only 3"),
-    ("b.ply", PLY.format(300_000_000_000, 1, 2).encode(), "cut short: 4 lines of data"),
-    ("c.ply", b"ply\nformat ascii 1.0\n", "no PLY file with a complete header"),
-    ("d.ply", PLY.format(-3, 1, 2).encode(), "no PLY file with a complete header"),
+    ("a.ply", PLY.format(3, 1, 9).encode(), "is damaged|refers to point 9"),
+    ("b.ply", PLY.format(300_000_000_000, 1, 2).encode(), "has 300000000000 points"),
+    ("c.ply", b"ply\nformat ascii 1.0\n", "is empty|is damaged"),
+    ("d.ply", PLY.format(-3, 1, 2).encode(), "is damaged"),
 ])  # fmt: skip
 def test_damaged_files_are_refused_with_their_name(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import grid_triangles
-from softjaw.fem.objects.mesh_check import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import Section, of_sections
 from softjaw.fem.objects.revolution import Revolution

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softjaw.fem.objects.mesh_check import MeshError
+from softjaw.fem.errors import MeshError
 from softjaw.study.exits import StudyError
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
 
 
@@ -43,22 +43,6 @@ normal_force_n = [1, 2.5e0]
 [petsc]
 contact_snes_max_it = 30
 """
-CATALOGUE = b"""title = "cases"
-[base.plain]
-object = { shape = "sphere", radius_mm = 30 }
-candidates = { stations_mm = [0] }
-load = { normal_force_n = [1] }
-[[case]]
-name = "one"
-kind = "first"
-[[case]]
-name = "two"
-kind = "second"
-expect = "refused"
-reason = "mu.*0"
-friction = { mu = -1 }
-same_as = { case = "one", within = 0.1 }
-"""
 TABLE = b"""x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa
 0,0,0,1,0,0,1,5
 1,0,0,1,0,0,1,5.5
@@ -87,6 +71,11 @@ def obj():
     ).encode()
 
 
+def off():
+    rows = [*(" ".join(f"{x:g}" for x in p) for p in POINTS), *(f"3 {a} {b} {c}" for a, b, c in FACES)]
+    return ("OFF\n6 8 0\n" + "\n".join(rows) + "\n").encode()
+
+
 def ply(binary):
     head = f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex 6\n"
     head += "".join(f"property float {axis}\n" for axis in "xyz")
@@ -104,12 +93,6 @@ def _scene(path):
 
     scene = load_scene(path)
     return scene.effective_toml(), scene.digest
-
-
-def _catalogue(path):
-    from softjaw.study.catalogue.run import check_text
-
-    return check_text(path, [])
 
 
 def _patch(path):
@@ -147,6 +130,7 @@ QUICK = {
     "binary STL": Reader("mesh.stl", stl(True), BINARY, _mesh, (MeshError,)),
     "OBJ": Reader("mesh.obj", obj(), TEXTUAL, _mesh, (MeshError,)),
     "ASCII PLY": Reader("mesh.ply", ply(False), TEXTUAL, _mesh, (MeshError,)),
+    "OFF": Reader("mesh.off", off(), TEXTUAL, _mesh, (MeshError,)),
     "binary PLY": Reader("mesh.ply", ply(True), TEXTUAL, _mesh, (MeshError,)),
 }
 
@@ -164,7 +148,6 @@ def slow_readers(folder: Path) -> dict[str, Reader]:
     cost.add(Measured("base", "as it is", "0 mm", np.array([1.0]), np.ones((1, 4)), 1.0, 0.0, 1, ""))
     save(folder / "cost.hdf", cost)
     return {
-        "catalogue": Reader("cases.toml", CATALOGUE, TEXTUAL, _catalogue),
         "VTU": Reader("patch.vtu", grids[0].read_bytes(), TEXTUAL, _patch),
         "VTP": Reader("patch.vtp", grids[1].read_bytes(), TEXTUAL, _patch),
         "result": Reader("result.hdf", make(folder / "seed.hdf").read_bytes(), BINARY, _result),

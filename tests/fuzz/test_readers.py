@@ -18,7 +18,7 @@ from tests.fuzz.readers import QUICK, slow_readers
 
 SECONDS, ROOM = 20, 3 * 2**29  # of CPU, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
-SLOW = ("catalogue", "VTU", "VTP", "result", "cost")
+SLOW = ("VTU", "VTP", "result", "cost")
 
 
 def complaint(reader, path):
@@ -110,7 +110,7 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
 )
 def test_an_override_is_taken_or_refused(tmp_path, text):
     from softjaw.study.scene import load_scene
-    from softjaw.study.scene.errors import SceneError
+    from softjaw.study.scene.problems import SceneError
 
     path = tmp_path / "scene.toml"
     path.write_bytes(QUICK["scene"].content)

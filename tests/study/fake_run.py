@@ -54,7 +54,7 @@ def fake_result(row):
     values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/tension": random.random(2)}
     values |= {"work/seconds_assembly": 1e-3, "fingers/pose_rotation": random.random((2, 3, 3))}
     patch = {"pressure": random.random((2, FACES)), "normal": random.random((2, FACES, 3))}
-    return CaseResult(values, patch, "a note" if row % 7 == 3 else "", {"pad": ("hyperelastic", 0.5, 1)})
+    return CaseResult(values, patch, "a note" if row % 7 == 3 else "", {"sheet": ("elastic plate", 0.5, 1)})
 
 
 def fake_ladder(options):
@@ -107,7 +107,7 @@ def main():
     from mpi4py import MPI
 
     from softjaw.study.exits import StudyError
-    from softjaw.study.run.run import Work, run_study
+    from softjaw.study.run.session import Work, run_study
     from softjaw.study.show.tables.status import summary
     from softjaw.study.speaking import complain
 

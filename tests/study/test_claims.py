@@ -51,7 +51,7 @@ def test_both_definitions_of_e_n_and_the_projected_one():
 @pytest.mark.long
 def test_friction_that_acts_back_moves_what_auto_leaves_out():
     """At 78 mm by less than 2 %, at 73.5 mm by 5 %, at 175 mm by a third; all of it is told, none of it is taken."""
-    from softjaw.study.result.quantities import REASONS
+    from softjaw.study.quantities import REASONS
 
     where = ["candidates.stations_mm=[73.5294, 77.9412, 175]", "load.normal_force_n=[1, 2, 13]"]
     auto, coupled = solved(*where), solved(*where, 'effects.friction_pressure_coupling="tangential"')

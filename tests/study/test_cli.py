@@ -21,8 +21,7 @@ from softjaw import study
 from softjaw.study.cli import main, program
 from softjaw.study.environment import launch_environment
 from softjaw.study.exits import MEANING, StudyError
-from softjaw.study.help import GROUPS
-from softjaw.study.run.running import petsc_overrides
+from softjaw.study.preparation import petsc_overrides
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
@@ -148,12 +147,6 @@ def test_no_command_is_answered_with_the_help(capsys):
     assert bare == capsys.readouterr().out
     assert len(bare.splitlines()) <= 50
     assert max(map(len, bare.splitlines())) <= 80
-
-
-def test_groups_of_the_help_name_each_command_once():
-    grouped = [name for _, names in GROUPS for name in names]
-    assert len(set(grouped)) == len(grouped)
-    assert set(grouped) >= set(COMMANDS)
 
 
 EXAMPLES = [
@@ -296,7 +289,7 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished, once):
     words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
-    libraries = ["-c", "import h5py, numpy, study.scene"]
+    libraries = ["-c", "import h5py, numpy, softjaw.study.scene"]
     spent = [once(lambda w=w: processor_seconds(sys.executable, *w)) for w in (words, libraries)]
     assert spent[0] < 2.0 * spent[1]
 

@@ -278,7 +278,7 @@ def test_what_the_scene_gives_itself_stays():
     what, study, probes, solve, _ = formula_study(own)
     given = explicit(own)
     assert given["gripper.elements"] == (12, 6, 4)
-    assert "effects.pad" not in given
+    assert "effects.sheet" not in given
     choice = choose(what, study, 0.01, given, probes, (), solve)
     assert choice.values.get("gripper.elements", [12, 6, 4]) == [12, 6, 4]
     assert not choice.met

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from softjaw.study.result.quantities import REASONS
-from tests.study.test_pad_level import e_n
-from tests.study.test_pipeline import OVAL, cases, solved
+from softjaw.study.quantities import REASONS
+from tests.study.test_pipeline import OVAL, cases, e_n, solved
 
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
 

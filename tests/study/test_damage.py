@@ -18,7 +18,6 @@ from softjaw.study.result import guarded
 from softjaw.study.result.derived import finalise
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.record import record
-from softjaw.study.result.repair import repair
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
@@ -226,27 +225,21 @@ def test_lost_states_are_no_missing_cases(copy, answers, name):
         assert code == OTHER_FILE, (reader, text)
 
 
-def test_a_run_does_not_begin_a_file_anew_whose_states_are_lost_and_repair_finds_them(copy, whole):
+def test_a_run_does_not_begin_a_file_anew_whose_states_are_lost(copy):
     plan = make_plan(parse_scene(SCENE), "cylinder.toml")
     verify(copy, plan.layout, plan.header)
     zero(copy, *data_blocks(copy)["study/status/code"])
     with pytest.raises(StudyError, match="states of 4 cases are lost") as refused:
         verify(copy, plan.layout, plan.header)
     assert refused.value.code == OTHER_FILE
-    assert "4 of 4 cases good" in repair(copy)
-    repair(copy, write=True)
-    with open_result(copy.with_suffix(".repaired.hdf")) as made, open_result(whole) as sound:
-        assert (made.status == DONE).all()
-        assert np.array_equal(made.map("e_n", "curved"), sound.map("e_n", "curved"))
 
 
-def test_a_scene_that_is_damaged_is_not_solved_as_if_it_were_whole(copy):
-    offset, _ = data_blocks(copy)["study/scene"]
-    content = copy.read_bytes()
-    digit = content.index(b"semi_axis_a_mm = 25", offset) + len("semi_axis_a_mm = ")
-    flip(copy, digit, 0)
-    with pytest.raises(StudyError, match="not the one that was solved"):
-        repair(copy, write=True)
+@pytest.mark.parametrize("share", [0.98, 0.6, 0.1])
+def test_a_file_that_was_cut_off_is_refused_by_every_reader(copy, answers, share):
+    with copy.open("r+b") as file:
+        file.truncate(int(share * copy.stat().st_size))
+    for reader, (code, text) in answers(copy):
+        assert code == OTHER_FILE, (reader, text)
 
 
 def test_what_a_killed_run_leaves_is_missing_and_no_damage(copy):

@@ -137,7 +137,7 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
-    from softjaw.study.case import effects, pad_level, wall
+    from softjaw.study.case import effects, wall
     from softjaw.study.scene import parse_scene
 
     scene = parse_scene(SPHERE)
@@ -148,11 +148,6 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
     reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
     assert effects.REASONS[reason].startswith("left out")
-    monkeypatch.setattr(pad_level, "departure", lambda law, strain: pad_level.NEARLY_LINEAR * on)
-    monkeypatch.setattr(pad_level.model, "usable_symmetry", lambda *_: (True, True))
-    bed = SimpleNamespace(travel=lambda force: 1e-3)
-    monkeypatch.setattr(pad_level, "SpringBed", lambda *_: bed)
-    assert not pad_level.choose_pad_level(scene, [SimpleNamespace(gap=None)]).linear
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
     for dent, ratio, level in (
         (wall.STIFF * on, 0.1, wall.LINEAR),

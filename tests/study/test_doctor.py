@@ -130,4 +130,4 @@ def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
 @pytest.mark.launches
 def test_the_doctor_loads_no_mpi_itself():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
-    assert ask(f"import sys, study.doctor; print({foreign} & set(sys.modules))").output == "set()"
+    assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").output == "set()"

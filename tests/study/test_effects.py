@@ -16,7 +16,7 @@ from softjaw.study.case.build import build_object
 from softjaw.study.case.effects import coupling_level, neglected_traction
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.sweep import units
-from softjaw.study.result.quantities import EFFECTS, REASONS
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved
 
@@ -105,7 +105,7 @@ def test_no_effect_of_rigid_objects_is_skipped_wrongly(job, monkeypatch):
     assert max(exact) < 1e-6
     judged = [row for row in rows if row[0] in job.PANELS]
     assert wrong_skips(job, judged) == []
-    for effect in ("pad", "friction-pressure coupling", "friction"):
+    for effect in ("friction-pressure coupling", "friction"):
         own = [row for row in judged if row[0] == effect]
         assert len(wrong_skips(job, own)) == 0
         assert max(row[3] for row in own) > job.TARGET  # something to be wrong about
@@ -125,7 +125,7 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
 
 
 CHOOSING = {
-    "softjaw.study.case.solving": ("choose_level", "choose_pad_level"),
+    "softjaw.study.case.solving": ("choose_level",),
     "softjaw.study.pipeline": ("effects_of",),
 }
 
@@ -159,8 +159,6 @@ def cpu_share_of_choosing(file, overrides, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize(("file", "overrides"), [
     ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]")),
-    ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]",
-                                "load.normal_force_n=[0.05, 0.1, 0.2]")),
     ("jobs/bottle.toml", ("candidates.stations_mm=[60, 112]",)),
 ])  # fmt: skip
 def test_choosing_costs_at_most_five_per_cent(file, overrides, monkeypatch):

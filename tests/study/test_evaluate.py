@@ -13,7 +13,7 @@ from softjaw.fem.objects.pose import Pose
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, mesh_errors, quality
 from softjaw.study.flags import Flag
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
 

@@ -17,8 +17,8 @@ from softjaw.study.case import sweep
 from softjaw.study.cli import main
 from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
 from softjaw.study.lookup import GraspMap
+from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE
-from softjaw.study.result.map_quantities import MAPS
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
 from softjaw.study.run.plan import make_plan
@@ -88,7 +88,7 @@ def test_words_fit_their_column_and_sentences_their_message():
 
 
 def test_the_definition_in_the_file_tells_every_bit_of_a_file_and_no_other():
-    text = next(q for q in MAPS if q.name == "flags").definition
+    text = map_row("flags").definition
     assert text == flag_definitions()
     for flag in Flag:
         assert (f" {int(flag)} {flag.sentence}" in text) == bool(flag & OF_FILE)

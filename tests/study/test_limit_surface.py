@@ -16,7 +16,7 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import limit_surface
 from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
 from softjaw.study.flags import Flag
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
 WEIGHT = 9.80665

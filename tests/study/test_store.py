@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import zlib
 from collections import namedtuple
@@ -14,12 +15,10 @@ import pytest
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.result.finger_quantities import PATCH
+from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
 from softjaw.study.result.grid import Surface
 from softjaw.study.result.layout import Derived, Header, Layout, layout_from_options
 from softjaw.study.result.plots import axes_of, groups, view_slice
-from softjaw.study.result.quantities import MAPS, quantities
-from softjaw.study.result.quantity import MODELS, NEEDS
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import blank, record, text_bytes
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
@@ -68,23 +67,22 @@ def test_what_was_written_is_read(path):
         assert np.array_equal(read.checks("tension")[1, 1, 1], result.values["checks/tension"])
         assert np.array_equal(read.patch(10)["normal"], patch["normal"])
         assert np.isnan(read.patch(10)["centroid"]).all()
-        assert {k: v[1, 1, 1] for k, v in read.effects("pad").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
+        assert {k: v[1, 1, 1] for k, v in read.effects("sheet").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
         assert read.messages[1, 1, 1] == "grüße"
         assert (read.status == 1).sum() == 1
         assert read.scene == 'a = "µ"\n'
         assert read.title == "Flasche"
         assert list(read.labels.ravel()[:3]) == ["left", "ötken", ""]
-        for q in MAPS:
-            assert (q.key in read.definitions) != bool(q.needs)
+        for q in TABLE:
+            assert (f"{q.key} [" in read.definitions) == (not q.needs or q.needs == "patches")
 
 
 def test_a_fresh_file_is_empty_everywhere(path):
     layout = small()
     with open_result(path) as read:
-        for q in quantities():
-            values = [read.map(q.name, m) for m in MODELS] if q.group == "maps" and q.by_model else None
-            values = values or ([read.map(q.name)] if q.group == "maps" else [read.read(q.key)])
-            assert all(np.isnan(v).all() for v in values), q.key
+        for c in layout.columns[:-1]:
+            values = read.read(c.path.removeprefix("/study/"))
+            assert (np.isnan(values) if values.dtype.kind == "f" else values == -1).all(), c.key
         assert not read.status.any()
         assert not read.sessions
     assert layout.nbytes >= path.stat().st_size > 0.5 * layout.nbytes - 2**17
@@ -125,24 +123,26 @@ def test_every_dimension_has_a_scale_beside_the_data(path):
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), front=(2, 2))
+    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), front=(2, 2),
+                   probes=(1,), variations=("mu", "pose"))  # fmt: skip
     surface = Surface(np.eye(3), np.array([[0, 1, 2]]), np.array([0]))
     create(tmp_path / "whole.hdf", layout, replace(HEADER, surface=surface))
-    quantities_ = {q.key for q in (*layout.quantities, *PATCH)}
     seen = set()
 
     def look(name, node):
         if isinstance(node, h5py.Dataset):
             assert node.attrs["long_name"], name
             assert node.dtype.kind in "SV" or isinstance(node.attrs["units"], str), name
-            key = name if name in quantities_ else f"maps/{name.partition('/')[0]}"
-            if key in quantities_ and "CLASS" not in node.attrs:  # the scales beside them
+            key = name if name in BY_KEY else f"maps/{name.partition('/')[0]}"
+            if key in BY_KEY and "CLASS" not in node.attrs:  # the scales beside them
                 seen.add(key)
                 assert len(node.attrs["definition"]) > 5, name
+            elif "CLASS" not in node.attrs:  # structure, and what says which candidates and motions were taken
+                assert re.fullmatch(r"(checksums|map)/.*|.*/(candidate|motion|label|sessions)|[a-z]+", name), name
 
     with h5py.File(tmp_path / "whole.hdf") as file:
         file["study"].visititems(look)
-        assert seen == quantities_
+        assert seen == set(BY_KEY)  # every dataset has a row, every row a dataset
         for path in ("Points", *(f"CellData/{name}" for name in file["VTKHDF/CellData"])):
             assert file[f"VTKHDF/{path}"].attrs["long_name"]
             assert isinstance(file[f"VTKHDF/{path}"].attrs["units"], str)

@@ -9,7 +9,7 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.study.case.stored_surface import circle, shadow_outline, stored_surface
-from softjaw.study.result.finger_quantities import MONOMIALS
+from softjaw.study.quantities import MONOMIALS
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.show import pictures

@@ -20,7 +20,7 @@ from softjaw.study.lookup import GraspMap
 from softjaw.study.result.layout import Derived, Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import parse_scene
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.show.tables.compare import compare
 from softjaw.study.show.tables.export import cases
 from softjaw.study.show.tables.show import as_text, best

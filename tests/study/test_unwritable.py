@@ -16,8 +16,6 @@ from softjaw.study.accuracy.cost.command import SIZES
 from softjaw.study.cli import main
 from softjaw.study.environment import launch_environment
 from softjaw.study.exits import CANNOT_WRITE, StudyError
-from softjaw.study.result import repair as repairing
-from softjaw.study.result.layout import Header
 from softjaw.study.show.figures import command as figures
 from softjaw.study.show.report import writing as report
 from softjaw.study.writing import beside, make_folders, write_file
@@ -101,18 +99,6 @@ def test_a_run_says_what_it_cannot_write(tmp_path, words):
     with read_only(tmp_path, {}):
         code, _, errors = launch(0, "-m", "softjaw", *words, tmp_path / "x.hdf")
     refused(code, errors, tmp_path)
-
-
-@pytest.mark.parametrize("left", [0.9, 1.0])
-def test_a_repair_says_what_it_cannot_write(file, tmp_path, capfd, monkeypatch, left):
-    """What it would remove after a failure cannot be reached there either."""
-    plan = lambda result: SimpleNamespace(layout=result.layout, header=Header(result.digest, result.scene))  # noqa: E731
-    monkeypatch.setattr(repairing, "_plan", plan)
-    content = bytearray(file.read_bytes())
-    content[content.index(b"no </script> convergence")] = 0  # the message of a case
-    with read_only(tmp_path, {"a.hdf": content[: int(left * len(content))]}):
-        code = main(["repair", str(tmp_path / "a.hdf"), "--write"])
-    refused(code, capfd.readouterr().err, tmp_path)
 
 
 @pytest.mark.launches

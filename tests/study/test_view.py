@@ -20,8 +20,8 @@ import pytest
 from softjaw.fem.objects.shapes import Box, EllipticCylinder
 from softjaw.study.cli import main
 from softjaw.study.exits import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.store import open_result
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.show.data import Data
 from softjaw.study.show.view import colours, command, limits
 from softjaw.study.show.view.model import quantity_of, view_of

@@ -18,8 +18,7 @@ from softjaw.study.flags import Flag
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.run.plan import make_plan, memory, plan_text
-from softjaw.study.run.wall_cost import wall_size
+from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data
@@ -109,7 +108,7 @@ def changed(path, folder, name, values, index=...):
 
 def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
     text = scene_text(solved[0], "can.toml")
-    assert "0.3 mm PP (1.3 GPa, yields at 31 MPa), standing, open top, dents up to 1.5 mm allowed" in text
+    assert "0.3 mm PP (1.3 GPa, yields at 31000 kPa), standing, open top, dents up to 1.5 mm allowed" in text
     assert RULE in text
     # the sentence states the numbers that the choice is made by
     assert f"below {100 * wall.STIFF:g} % of the pads' travel" in RULE
@@ -157,7 +156,7 @@ def test_show_has_dents_stress_and_the_window_of_forces(can):
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
     assert names.split()[-3:] == ["dent", "stress", "window"]
-    assert units.split()[-4:] == ["[mm]", "[MPa]", "[N]", "flags"]
+    assert units.split()[-4:] == ["[mm]", "[kPa]", "[N]", "flags"]
     assert "safety" in units
     assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
     assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text

@@ -23,7 +23,7 @@ from softjaw.study.accuracy.cost.knobs import Level
 from softjaw.study.accuracy.cost.measure import Measured, measure
 from softjaw.study.accuracy.cost.study import Costs, CostStudy, same, setting_of
 from softjaw.study.scene import Scene
-from softjaw.study.scene.difference import value_text
+from softjaw.study.scene.text import value_text
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.probes import Probe

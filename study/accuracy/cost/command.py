@@ -75,7 +75,7 @@ def _conclude(study: Any, what: Any, path: Path) -> None:
 
 def check_same(path: Path, old: Any, digest: str, scene: str, candidates: list[str]) -> None:
     """Refuse to go on with a study of another scene or other candidates."""
-    from softjaw.study.scene.difference import differences
+    from softjaw.study.scene.text import differences
 
     other = "choose another file with -o, or move this one away"
     if old.digest != digest:

@@ -23,7 +23,7 @@ from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, volume_in_pose
 from softjaw.study.case.solving import solver
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from softjaw.study.case.build import has_wall
-from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.quantities import EFFECTS
 from softjaw.study.scene import Scene
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.sections import Effects, WallSize
 
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
@@ -27,7 +27,7 @@ EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
 # Time over that of the level which is taken for granted, about; more than the unknowns tell.
 DEARER = {
-    "gripper.element": {"hex27": 1.25}, "effects.pad": {"linear": 0.2}, "effects.sheet": {"elastic": 1.3},
+    "gripper.element": {"hex27": 1.25}, "effects.sheet": {"elastic": 1.3},
     "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
 }  # fmt: skip
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 4000)
@@ -126,7 +126,7 @@ def refusal(scene: Scene, level: Level) -> str:
 
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
-    from softjaw.study.run.wall_cost import wall_size
+    from softjaw.study.run.plan import wall_size
 
     times = 1.0
     for key, levels in DEARER.items():
@@ -216,7 +216,7 @@ def _collocation(scene: Scene) -> Knob:
 
 
 def _effects(scene: Scene) -> Iterable[Knob]:
-    """One knob for every effect with levels to choose from, in the order of `study.result.quantities.EFFECTS`."""
+    """One knob for every effect with levels to choose from, in the order of `study.quantities.EFFECTS`."""
     for name, field in Effects.model_fields.items():
         levels = [level for level in get_args(field.annotation) if level != "auto"]
         if name in OWN or len(levels) < 2 or (name == "object" and not has_wall(scene.object)):

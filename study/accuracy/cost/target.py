@@ -24,8 +24,8 @@ from softjaw.study.accuracy.cost.study import CostStudy, costs, load, new_study,
 from softjaw.study.case import sweep
 from softjaw.study.exits import OTHER_FILE, StudyError
 from softjaw.study.scene import Scene, parse_scene
-from softjaw.study.scene.difference import changes
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene.text import changes
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.probes import Probe

@@ -38,7 +38,7 @@ class Probing:
         self.failures: list[str] = []
 
     def values(self) -> dict[str, np.ndarray]:
-        """Values ``(variations,)`` of the next force, keyed as in ``study.result.quantities``."""
+        """Values ``(variations,)`` of the next force, keyed as in ``study.quantities``."""
         found = np.full((len(NAMES), len(self._ladders)), np.nan)
         self.failures = []
         try:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.show.tables.columns import DISPLAY
 from softjaw.study.show.tables.ranking import TIE
+from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
 MOVES = {"mu": "mu", "modulus": "the shear modulus", "wall": "the wall's thickness"}  # all grasps at once
@@ -124,6 +124,5 @@ def _without_images(value: FloatArray, order: Sequence[int], place: Sequence[tup
 
 
 def _text(found: Sure, i: int, units: str) -> str:
-    unit, factor = DISPLAY.get(units, (units, 1.0))
-    value = f"{found.value[i] * factor:#.4g}".rstrip(".")
-    return f"{value} +- {found.half_width[i] * factor:.2g} {unit}".rstrip()
+    value = f"{shown(found.value[i], units):#.4g}".rstrip(".")
+    return f"{value} +- {shown_text(found.half_width[i], units, 2)}"

@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantities import EFFECTS, REASONS
 from softjaw.study.run.progress import duration
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.report.page import bullets, paragraph, table, text_block

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.quantity import MODELS
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.outline import swept_object

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, shown
 from softjaw.study.show.report.page import Picture

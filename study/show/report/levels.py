@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.result.layout import FAILED
-from softjaw.study.result.quantities import EFFECTS, REASONS
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.report.maps import elsewhere, main_axis, plane, ticks

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.wall_quantities import ALONG, AROUND
 from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import undeformed

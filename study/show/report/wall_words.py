@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.quantities import EFFECTS
+from softjaw.study.quantities import EFFECTS
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import swept_object
 from softjaw.study.show.report.page import paragraph, table

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import shutil
 import textwrap
 from collections.abc import Collection, Iterable, Sequence
@@ -12,7 +11,6 @@ from typing import Any
 
 GAP = "  "
 PAPER = 80  # letters in a line of a text that is kept
-DISPLAY = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi), "Pa": ("MPa", 1e-6)}  # people read this; programs get SI
 
 
 def terminal_width() -> int:
@@ -98,6 +96,15 @@ def cell(value: Any) -> Any:
     except ValueError:
         return f"'{value}"
     return value
+
+
+def digits(value: float) -> str:
+    """A number with four digits, and with an exponent only where it would be long.
+
+    >>> digits(2.0), digits(0.0123456), digits(31000.4), digits(2e-7)
+    ('2.000', '0.01235', '31000', '2.000e-07')
+    """
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{value:#.4g}".rstrip(".")
 
 
 def with_unit(name: str, unit: str) -> str:

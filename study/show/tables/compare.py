@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.exits import USAGE, StudyError
 from softjaw.study.result.layout import DONE
-from softjaw.study.scene.difference import changes
+from softjaw.study.scene.text import changes
 from softjaw.study.show.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]
@@ -170,7 +170,7 @@ def _difference(
         found = _error(result, name, model, solved, _block(axes, i))
         errors.append(np.full(solved.shape, np.nan) if found is None else found)
         stated.append(found is not None)
-    return Difference(name, q.units, (values[0], values[1]), errors[0] + errors[1], (stated[0], stated[1]))
+    return Difference(name, q.unit, (values[0], values[1]), errors[0] + errors[1], (stated[0], stated[1]))
 
 
 def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[Any, ...]) -> FloatArray | None:
@@ -181,4 +181,4 @@ def _error(result: Any, name: str, model: str, values: FloatArray, block: tuple[
     if f"{name}_error" not in there or (there[name].by_model and model != "curved"):
         return None
     found = result.map(f"{name}_error")[block]
-    return np.abs(found * values) if there[f"{name}_error"].long_name.startswith("relative") else np.abs(found)
+    return np.abs(found * values) if there[f"{name}_error"].relative_to else np.abs(found)

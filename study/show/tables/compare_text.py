@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.scene.difference import value_text
-from softjaw.study.show.tables.columns import DISPLAY, PAPER, aligned, csv_text, two_lines, with_unit, wrapped
+from softjaw.study.scene.text import value_text
+from softjaw.study.show.tables.columns import PAPER, aligned, csv_text, digits, two_lines, with_unit, wrapped
 from softjaw.study.show.tables.compare import AxisMatch, Comparison, Difference
 from softjaw.study.show.tables.ranking import falling
+from softjaw.study.units import shown, shown_unit
 
 MOST_SETTINGS, WIDEST_SETTING = 12, 24
 BEYOND = {True: "yes", False: "no", None: "-"}
@@ -44,13 +45,12 @@ def _short(text: str) -> str:
 
 
 def _only(axis: AxisMatch) -> list[str]:
-    unit, factor = DISPLAY.get(axis.units, (axis.units, 1.0))
     lines = []
     for letter, values in zip("ab", axis.only, strict=True):
         if len(values):
-            texts = [f"{v * factor:.5g}" for v in values]
+            texts = [f"{shown(v, axis.units):.5g}" for v in values]
             texts = texts if len(texts) <= 8 else [*texts[:3], "...", texts[-1], f"({len(texts)} values)"]
-            lines.append(f"{axis.name} only in {letter}, left out: {' '.join(texts)} {unit}".rstrip())
+            lines.append(f"{axis.name} only in {letter}, left out: {' '.join(texts)} {shown_unit(axis.units)}".rstrip())
     return lines
 
 
@@ -64,13 +64,13 @@ def _summary(found: Comparison) -> list[str]:
         both = np.isfinite(d.change)
         if not both.any():
             continue
-        unit, factor = DISPLAY.get(d.units, (d.units, 1.0))
-        means = [f"{float(v[both].mean()) * factor:#.4g}".rstrip(".") for v in d.values]
+        means = [digits(shown(float(v[both].mean()), d.units)) for v in d.values]
         largest = np.nanmax(np.abs(d.relative)) if np.isfinite(d.relative).any() else np.nan
         mean = d.change[both].mean() / max(np.abs(d.values[0][both]).mean(), 1e-300)
         exceed, judged = d.exceed
         beyond = f"{exceed} of {judged}" if judged else "-"
-        rows.append((with_unit(d.name, unit), *means, _percent(mean), _percent(largest).lstrip("+"), beyond))
+        shares = _percent(mean), _percent(largest).lstrip("+")
+        rows.append((with_unit(d.name, shown_unit(d.units)), *means, *shares, beyond))
     return aligned(rows, left=[0]) if len(rows) > 2 else ["no case is solved in both"]
 
 
@@ -92,23 +92,23 @@ def _verdict(found: Comparison) -> str:
 def _cases(found: Comparison, top: int) -> list[str]:
     d = found.asked
     order = [int(i) for i in falling(np.abs(d.change.ravel())) if np.isfinite(d.change.ravel()[i])]
-    shown = order[: top or None]
-    if not shown:
+    listed = order[: top or None]
+    if not listed:
         return []
-    unit, factor = DISPLAY.get(d.units, (d.units, 1.0))
+    unit = shown_unit(d.units)
     axes = [axis for axis in found.axes if len(axis.common) > 1 or axis is found.axes[-1]]
-    heads = [two_lines(axis.name, DISPLAY.get(axis.units, (axis.units, 1.0))[0]) for axis in axes]
+    heads = [two_lines(axis.name, shown_unit(axis.units)) for axis in axes]
     heads += [two_lines(name, unit) for name in ("a", "b", "b-a")] + [("b-a", "[%]")]
     judged = any(d.exceed)
     heads += [two_lines("errors", unit), ("exceeds", "errors")] * judged
     rows = []
-    for i in shown:
+    for i in listed:
         index = np.unravel_index(i, d.change.shape)
-        numbers = [f"{v[index] * factor:#.4g}".rstrip(".") for v in (*d.values, d.change)]
-        error = d.error[index] * factor
+        numbers = [digits(shown(float(v[index]), d.units)) for v in (*d.values, d.change)]
+        error = shown(float(d.error[index]), d.units)
         tail = ["-" if np.isnan(error) else f"{error:.2g}", BEYOND[d.beyond[index]]] * judged
         rows.append((*(_place(found, axis, index) for axis in axes), *numbers, _percent(d.relative[index]), *tail))
-    title = f"{with_unit(d.name, unit)}: {len(shown)} of {len(order)} differences, the largest first"
+    title = f"{with_unit(d.name, unit)}: {len(listed)} of {len(order)} differences, the largest first"
     return [title, *aligned([*zip(*heads, strict=True), *rows]), ""]
 
 
@@ -116,7 +116,7 @@ def _place(found: Comparison, axis: AxisMatch, index: tuple[Any, ...]) -> str:
     i = index[found.axes.index(axis)]
     if axis is found.axes[-3] and found.labels is not None:
         return str(found.labels[i])
-    return f"{axis.common[i] * DISPLAY.get(axis.units, ('', 1.0))[1]:.5g}"
+    return f"{shown(axis.common[i], axis.units):.5g}"
 
 
 def _percent(share: float) -> str:

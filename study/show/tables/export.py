@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.flags import flags_in
-from softjaw.study.result.finger_quantities import MONOMIALS
-from softjaw.study.result.quantity import MODELS
+from softjaw.study.quantities import MODELS, MONOMIALS
 from softjaw.study.show.tables.columns import cell
 
 STATES = ("missing", "done", "failed")
@@ -73,8 +72,8 @@ def cases(result: Any, model: str = "curved") -> Iterator[dict[str, Any]]:
 
 def _units(result: Any) -> dict[str, str]:
     """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
-    derived = [d for d in result.layout.derived if len(d.axes) >= len(result.axes) - 1 and not d.shape]
-    return {q.name: q.units for q in (*(q for q in result.layout.quantities if q.group == "maps"), *derived)}
+    derived = {d.name: d.units for d in result.layout.derived if len(d.axes) >= len(result.axes) - 1 and not d.shape}
+    return {q.name: q.unit for q in result.layout.quantities if q.group == "maps"} | derived
 
 
 def _map(result: Any, name: str, model: str) -> np.ndarray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from softjaw.study.units import UNITS, shown, shown_text
+
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
@@ -18,7 +20,7 @@ def scene_text(scene: Any, file: str) -> str:
         if c.poses
         else f"{c.count}: {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
     )
-    size = " x ".join(f"{1e3 * s:g}" for s in g.pad_size)
+    size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
     mesh = " x ".join(map(str, g.elements))
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
     rows = {
@@ -85,11 +87,10 @@ def wall_text(shape: Any) -> str:
     found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
     given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
-    strength = (
-        f", yields at {found.yield_strength / 1e6:g} MPa" if found.yield_strength else ", yield strength not known"
-    )
+    strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""
+    strength = f", yields at {strength}" if strength else ", yield strength not known"
     words = [
-        f"{thickness} mm {shape.wall_material} ({found.young_modulus / 1e9:g} GPa{strength})",
+        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa{strength})",
         shape.support,
         "open top" if shape.open_top else "closed top",
         f"dents up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "no limit for dents",

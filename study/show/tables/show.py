@@ -12,10 +12,11 @@ import numpy as np
 from softjaw.study.accuracy.uncertainty.verdict import sure, verdict
 from softjaw.study.flags import OF_FILE
 from softjaw.study.result.layout import DONE
-from softjaw.study.show.tables.columns import DISPLAY, csv_text, with_unit
+from softjaw.study.show.tables.columns import csv_text, with_unit
 from softjaw.study.show.tables.ranking import BORNE, LOST, borne_level, judged, nearest, passed_over, ranking
 from softjaw.study.show.tables.show_text import WINDOW, Columns, alike
 from softjaw.study.show.tables.show_text import as_text as as_text
+from softjaw.study.units import shown_text
 
 COLUMNS = (  # map, friction model ("" where it has none), unit
     ("quality", "curved", ""),
@@ -133,7 +134,7 @@ def _maps(result: Any) -> Iterator[tuple[str, str, np.ndarray]]:
         if f"{name}_band" in bands:
             yield f"{name}_band", units, result.derived(f"{name}_band")
         elif error := there.get(f"{name}_error"):
-            yield error.name, error.units, result.map(error.name)
+            yield error.name, error.unit, result.map(error.name)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
@@ -178,8 +179,7 @@ def place(result: Any, row: int) -> str:
         if label and axis.name in ("station", "angle"):
             words += [label] * (axis.name == "station")
             continue
-        unit, factor = DISPLAY.get(axis.units, (axis.units, 1.0))
-        words.append(f"{axis.name} {axis.values[i] * factor:.5g} {unit}".rstrip())
+        words.append(f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}")
     return ", ".join(words)
 
 

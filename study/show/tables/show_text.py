@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softjaw.study.flags import flag_words, flags_in
-from softjaw.study.show.tables.columns import DISPLAY, PAPER, aligned, fitting, two_lines, wrapped
+from softjaw.study.show.tables.columns import PAPER, aligned, digits, fitting, two_lines, wrapped
+from softjaw.study.units import shown, shown_unit
 
 if TYPE_CHECKING:
     from softjaw.study.show.tables.show import Table
@@ -63,8 +64,8 @@ def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
 def _head(name: str, units: str) -> tuple[str, str]:
     """Both lines above a column."""
     if name.endswith(("_error", "_band")):
-        return two_lines(ERROR, DISPLAY.get(units, (units, 1.0))[0] or "%" * name.endswith("_error"))
-    return two_lines(HEADS.get(name, name), DISPLAY.get(units, (units, 1.0))[0])
+        return two_lines(ERROR, shown_unit(units) or "%" * name.endswith("_error"))
+    return two_lines(HEADS.get(name, name), shown_unit(units))
 
 
 def _lines(table: Table) -> tuple[list[list[str]], int]:
@@ -161,13 +162,13 @@ def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
     if np.isnan(value):
         return "-"
     if name.endswith("_error"):
-        return f"{value * DISPLAY.get(units, (units, 1.0))[1] * (1 if units else 100):.2g}"
+        return f"{shown(value, units) * (1 if units else 100):.2g}"
     if name.endswith("_band"):
-        return f"{value * DISPLAY.get(units, (units, 1.0))[1]:.2g}"
-    value *= DISPLAY.get(units, (units, 1.0))[1]
+        return f"{shown(value, units):.2g}"
+    value = shown(value, units)
     if coordinate:
         return f"{value:.5g}"
-    return f"{value:.2g}" if name == "misfit" else f"{value:#.4g}".rstrip(".")
+    return f"{value:.2g}" if name == "misfit" else digits(value)
 
 
 def alike(row: tuple[Any, ...], other: tuple[Any, ...], columns: Columns) -> bool:

@@ -16,9 +16,10 @@ from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.lock import holder
 from softjaw.study.run.progress import Progress, duration
-from softjaw.study.show.tables.columns import DISPLAY, terminal_width, wrapped
+from softjaw.study.show.tables.columns import terminal_width, wrapped
 from softjaw.study.show.tables.show import best, place
 from softjaw.study.show.tables.status import reasons
+from softjaw.study.units import shown_text
 
 BAR = 40
 
@@ -55,15 +56,15 @@ class View:
 
     def _draw(self, result: Any, codes: np.ndarray, runner: str) -> None:
         assert self._progress is not None
-        text = self._progress.line(codes) if runner else _counts(codes)
+        line = self._progress.line(codes) if runner else _counts(codes)
         if not self._live:
-            if text.partition(" done")[0] != self._line.partition(" done")[0]:
-                self._stream.write(f"[{time.strftime('%H:%M:%S')}] {text}\n")
+            if line.partition(" done")[0] != self._line.partition(" done")[0]:
+                self._stream.write(f"[{time.strftime('%H:%M:%S')}] {line}\n")
                 self._stream.flush()
-            self._line = text
+            self._line = line
             return
         width = terminal_width() - 1
-        lines = [f"{result.path}{f' ({result.title})' if result.title else ''}", _bar(codes, width), text]
+        lines = [f"{result.path}{f' ({result.title})' if result.title else ''}", _bar(codes, width), line]
         lines += [f"{runner}{_since(result)}"] if runner else []
         lines += [best_so_far(result, codes)]
         if self._failure >= 0:
@@ -114,10 +115,9 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     where = [f'"{row["label"]}"'] if "label" in row else []
     axes = result.axes[:-3] if where else result.axes[:-1]
     where += [_coordinate(axis, row[axis.name]) for axis in axes]
-    numbers = [f"quality {row['quality']:.4g}", f"e_n {1e3 * row['e_n']:.4g} mm"]
+    numbers = [f"quality {row['quality']:.4g}", f"e_n {shown_text(row['e_n'], 'm')}"]
     return f"best so far at {table.force:g} N: {', '.join(numbers)}, at {', '.join(where)}"
 
 
 def _coordinate(axis: Any, value: float) -> str:
-    unit, factor = DISPLAY.get(axis.units, (axis.units, 1.0))
-    return f"{axis.name} {value * factor:.5g} {unit}".rstrip()
+    return f"{axis.name} {shown_text(value, axis.units, 5)}"

@@ -29,7 +29,7 @@ class View:
     @cached_property
     def gripper(self) -> Any:
         """The gripper at this point of the sweep; None where it cannot be told."""
-        from softjaw.study.scene.errors import SceneError
+        from softjaw.study.scene.problems import SceneError
 
         if self.scene is None or any(isinstance(v, str) for values in self.scene.sweep.values() for v in values):
             return getattr(self.scene, "gripper", None)

@@ -1,0 +1,374 @@
+"""Every number of a result file: name, dimensions, unit, label, definition and group, in one literal table.
+
+A new quantity is one more row here. Layout, checksums, reader, tables, comparison, export and look-up follow from the
+rows: which maps are the main ones, in which order, what their columns are called, and what the file says of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from softjaw.study.flags import flag_definitions
+
+MODELS = ("curved", "flat", "projected")
+FINGERS = 2
+AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
+STATES = ("missing", "done", "failed")  # of a case, by their codes
+PARTS = ("assembly", "factorisation", "rest", "friction", "total")  # of a case's time
+# What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
+NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
+HELD = ("cor grid", "samples", "probes", "patches")
+# Exponents of x, y and t, highest power of x first.
+MONOMIALS = tuple(
+    " ".join(f"{letter}^{k}" if k > 1 else letter for letter, k in zip("xyt", (i, j, 4 - i - j), strict=True) if k)
+    for i in range(4, -1, -1)
+    for j in range(4 - i, -1, -1)
+)
+# Levels of each effect, cheapest first, and what its indicator is, where it has one.
+EFFECTS = {
+    "object": ("rigid", "linear shell", "nonlinear shell"),
+    "sheet": ("rigid", "elastic plate"),
+    "model_size": ("quarter", "half", "full"),
+    "fingers": ("one", "two"),
+    "friction": ("flat", "curved"),
+    "wrench": ("3-D", "6-D"),
+    "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
+    "friction_pressure_coupling": ("none", "tangential traction"),
+}
+INDICATORS = {
+    "object": "dent that a linear wall would get at the largest force, over the wall's thickness",
+    "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
+    "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
+    "wrench": "mean share of the three dropped components in the friction wrench",
+    "limit_surface": "radial misfit of the fitted limit surface, curved model, of the finger where it is larger",
+    "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
+    " finger where it is larger",
+}
+REASONS = (
+    "the only level of this version",
+    "forced by the scene",
+    "indicator below the target",
+    "indicator above the target",
+    "exact by symmetry",
+    "the default level of this version",
+    "the object has no wall",
+    "never skipped, because it costs next to nothing",
+    "left out, though the indicator is above the target",
+    "e_n and quality do not depend on it",
+)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number, or one small array, of a case: a row of the table.
+
+    Parameters
+    ----------
+    name : str
+        Name of the dataset in its group.
+    dims : tuple of str
+        Dimensions after those of the cases; ``model`` for one value per friction model.
+    unit, label, definition : str
+        SI unit ("" for a pure number), label of a colour bar, and one sentence that readers see beside the data.
+    group : str
+        Group of the file; those of ``maps`` are groups of their own, which viewers draw.
+    symbol : str
+        Head of a column; the name where it is empty.
+    needs : str
+        One of `NEEDS` or `HELD`, or nothing; without it the quantity is not in the file.
+    rank : int
+        Place among the main maps, 1 for the first; 0 for all others.
+    among : str
+        Dimension of the candidates that it is stored for alone, ``sampled`` or ``probe``; else nothing.
+    relative_to : str
+        The map of which a relative error is a share.
+    meanings : tuple of str
+        What the integers 0, 1, ... of a code mean; -1 is none.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    unit: str
+    label: str
+    definition: str
+    group: str = "maps"
+    symbol: str = ""
+    needs: str = ""
+    rank: int = 0
+    among: str = ""
+    relative_to: str = ""
+    meanings: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Key of the value in ``CaseResult.values``, and path of its dataset but for maps."""
+        return f"{self.group}/{self.name}"
+
+    @property
+    def variable(self) -> str:
+        """Name of the variable of the dataset that `study.result.read.open` gives."""
+        return self.name if self.group in ("maps", "status") else f"{SINGULAR.get(self.group, self.group)}_{self.name}"
+
+    @property
+    def by_model(self) -> bool:
+        """Whether there is one value for each of `MODELS`."""
+        return "model" in self.dims
+
+
+SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect", "probes": "probe"}
+F, M, FM = ("finger",), ("model",), ("finger", "model")
+AS_MAP = "As the map, for each finger."
+TABLE = (
+    # maps of every case, with what is said beside them
+    Quantity("quality", M, "", "grasp quality",
+             "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
+             "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
+             " as in the paper.", rank=1),
+    Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
+             "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
+             " many motions.", symbol="fitted", rank=9),
+    Quantity("quality_graspit", M, "", "grasp quality, linearised as in GraspIt!",
+             "As quality, with the hull of the 20 points that GraspIt! takes on each ellipsoid instead of the "
+             "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs="graspit"),
+    Quantity("misfit", (), "", "misfit of the fitted limit surface",
+             "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
+             "377 motions that it was not fitted to; curved model, of the finger where it is larger.", rank=10),
+    Quantity("misfit_ellipsoid", (), "", "misfit of the ellipsoid from three motions",
+             "As misfit, of the ellipsoid that quality is computed from."),
+    Quantity("e_n", M, "m", "eccentricity parameter e_n",
+             "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.", rank=2),
+    Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
+             "max tau_z / (mu F_N), with F_N the sum of pressure times area times the cosine between face normal and "
+             "contact normal; of the weaker finger."),
+    Quantity("epsilon", M, "", "largest-minimum resisted wrench",
+             "Radius of the largest ball around the origin inside the grasp wrench space of quality, with torques "
+             "about the midpoint of the contacts. NaN where the contacts are more than 0.5 degrees from antipodal, "
+             "unless score.epsilon is 'everywhere'."),
+    Quantity("f_x_max", M, "N", "largest friction along x",
+             "Total friction force along the contact frame's x axis when the pad slides along x, Eqs. (6)-(8); of the"
+             " weaker finger.", rank=7),
+    Quantity("f_y_max", M, "N", "largest friction along y",
+             "Total friction force along the contact frame's y axis when the pad slides along y, Eqs. (6)-(8); of the"
+             " weaker finger.", rank=8),
+    Quantity("tau_z_max", M, "N m", "largest friction torque about z",
+             "Total friction torque about the contact normal when the pad turns about it, Eqs. (6)-(8); of the weaker"
+             " finger.", rank=4),
+    Quantity("tau_pure", (), "N m", "largest torque without a net force",
+             "Largest torque about the contact normal that the contact carries while it transmits no force in its "
+             "plane; tau_z_max comes with such a force where the patch is not symmetric, and is larger: up to 2 "
+             "max(a, b) / (a + b) times where a pad bears on two ends with loads a and b, because its origin lies "
+             "between them. Curved model, of the weaker finger."),
+    Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
+    Quantity("F_N", (), "N", "normal force",
+             "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
+    Quantity("travel", (), "m", "travel of the pad",
+             "How far the pad's back moved towards the object after first touch; mean of both fingers."),
+    Quantity("contact_area", (), "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
+    Quantity("p_max", (), "Pa", "largest pressure", "Largest contact pressure on either finger."),
+    Quantity("contact_distance", (), "m", "distance of the contacts", "Distance between the contact frames' origins."),
+    Quantity("curvature_loss", (), "", "force lost to curvature",
+             "1 - F_N / S: zero for a flat contact, what the tilt of the loaded normals takes off the normal force "
+             "otherwise; both fingers together."),
+    Quantity("misalignment", (), "rad", "misalignment of the contacts",
+             "Largest of the angles between one contact normal and the other reversed, and between the line that "
+             "joins the contacts and each normal."),
+    Quantity("flags", (), "", "flags of the case", flag_definitions()),
+    *(
+        Quantity(f"{name}_overestimate{suffix}", (), "", f"{what}: {model} over curved model",
+                 f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved contact"
+                 f" cannot carry ({note}); of the finger where it is largest.")
+        for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
+        for suffix, model, note in (
+            ("", "flat", "both scaled by S, the paper's normalisation"),
+            ("_projected", "projected", "both scaled by the physical normal force F_N; not positive, for a planar model"
+             " with that force claims too little"),
+        )
+    ),
+    Quantity("e_n_error", (), "", "relative error of e_n",
+             "Difference of e_n (curved) between the mesh and one with half as many elements per direction, over its "
+             "value.", needs="two meshes", relative_to="e_n"),
+    Quantity("quality_error", (), "", "relative error of quality", "As e_n_error.", needs="two scores",
+             relative_to="quality"),
+    Quantity("f_x_max_error", (), "", "relative error of f_x_max", "As e_n_error.", needs="two meshes",
+             relative_to="f_x_max"),
+    Quantity("f_y_max_error", (), "", "relative error of f_y_max", "As e_n_error.", needs="two meshes",
+             relative_to="f_y_max"),
+    Quantity("tau_z_max_error", (), "", "relative error of tau_z_max", "As e_n_error.", needs="two meshes",
+             relative_to="tau_z_max"),
+    *(
+        Quantity(f"{name}_overestimate{suffix}_error", (), "", f"error of {name}_overestimate{suffix}",
+                 "Absolute difference between the mesh and one with half as many elements per direction.",
+                 needs="two meshes")
+        for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_projected")
+    ),
+    Quantity("safety_factor", M, "", "weight held over weight",
+             "How many times its own weight the object could have before the grasp, with the normal force of this "
+             "case on both fingers, lost it, with the hull of the sampled wrenches as limit surface (on the safe "
+             "side). Below 1 it cannot hold the object. The centre of mass is that of [task], or the middle of the "
+             "box round the object.", symbol="safety", needs="mass", rank=5),
+    Quantity("dent", (), "m", "depth of the dent",
+             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=3),
+    Quantity("wall_stress", (), "Pa", "largest stress in the wall",
+             "Largest von Mises stress on its two faces.", symbol="stress", needs="wall", rank=6),
+    Quantity("wall_strain", (), "", "largest strain of the wall",
+             "Largest principal strain, by size, on its two faces.", needs="wall"),
+    Quantity("support_force", (), "N", "force of the support",
+             "What the support has to bear in this frictionless contact: the pads push an object with sloping walls "
+             "along its axis. Friction takes it in a grasp; where it is more than mu F_N of both fingers can take, "
+             "the flag 'slides out' says so.", needs="wall"),
+    # each finger: limits, contact frame, pose of the pad
+    Quantity("f_x_max", FM, "N", "largest friction along x", AS_MAP, "fingers"),
+    Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
+    Quantity("tau_z_max", FM, "N m", "largest friction torque about z", AS_MAP, "fingers"),
+    Quantity("tau_pure", F, "N m", "largest torque without a net force", AS_MAP, "fingers"),
+    Quantity("S", F, "N", "pressure times area", AS_MAP, "fingers"),
+    Quantity("F_N", F, "N", "normal force", AS_MAP, "fingers"),
+    Quantity("travel", F, "m", "travel of the pad", AS_MAP, "fingers"),
+    Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
+             "In the pad's frame: where the line through the centre of pressure along z meets the pad's deformed "
+             "face, loaded there or not.", "fingers"),
+    Quantity("frame_axes", (*F, "component", "component_2"), "", "axes of the contact frame",
+             "Rows x, y, z in the pad's frame; z is the object's normal at the origin, the deformed face's own where "
+             "no load is near.", "fingers"),
+    Quantity("frame_flag", F, "", "flag of the contact frame",
+             "0: regular; otherwise a rule for a degenerate patch chose the frame.", "fingers"),
+    Quantity("pose_rotation", (*F, "component", "component_2"), "", "rotation of the pad",
+             "x_object = rotation x_pad + origin.", "fingers"),
+    Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
+             "Centre of the undeformed front face at first touch, in the object's frame; under load the pad's back "
+             "has moved on by the travel, along its z axis.", "fingers"),
+    # checks of the contact solution
+    Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
+    Quantity("tension", F, "", "largest tension",
+             "Largest negative nodal pressure over the largest pressure.", "checks"),
+    Quantity("penetration", F, "", "largest penetration", "Deepest mean overlap at a node over an element.", "checks"),
+    Quantity("complementarity", F, "", "complementarity",
+             "Largest product of pressure and gap at a node, over the largest pressure and the element size.",
+             "checks"),
+    Quantity("overlap", F, "m", "deepest point inside the object",
+             "Of the quadrature points of the front: weighted gaps hold on average, so this tells how well the mesh "
+             "follows the object.", "checks"),
+    Quantity("min_det_f", F, "", "smallest det F", "Smallest ratio of deformed to undeformed volume.", "checks"),
+    Quantity("max_strain", F, "", "largest strain", "Largest difference of a principal stretch from 1.", "checks"),
+    Quantity("acoustic", F, "", "smallest acoustic eigenvalue",
+             "Over the shear modulus, in 24 directions at one point per element; not positive: the foam lost "
+             "ellipticity and strains may localise.", "checks"),
+    # work
+    Quantity("newton_iterations", F, "", "Newton iterations", "Since the force below.", "work"),
+    Quantity("load_steps", F, "", "load steps", "Newton solves since the force below.", "work"),
+    Quantity("cuts", F, "", "step cuts", "Solves that failed and were tried again in shorter steps.", "work"),
+    *(
+        Quantity(f"seconds_{part}", (), "s", f"seconds in {part}", f"Time of the case spent in {part}.", "work")
+        for part in PARTS
+    ),
+    # limit surfaces
+    Quantity("semi_axes", (*FM, "component"), "-, -, m", "semi-axes of the ellipsoid from three motions",
+             "Largest f_x, f_y and tau_z over S: the ellipsoid that quality is computed from.", "limit_surface"),
+    Quantity("rank", FM, "", "semi-axes that are not zero",
+             "3: a body; less: a disc, a segment or a point, because the contact carries no load along an axis.",
+             "limit_surface"),
+    Quantity("rho", F, "m", "length of the contact",
+             "By which torques are divided in the fit: the longer side of the loaded patch in the contact frame.",
+             "limit_surface"),
+    Quantity("matrix", (*FM, "component", "component_2"), "", "matrix of the fitted ellipsoid",
+             "A of w A w = 1 in w = (f_x, f_y, tau_z / rho) / (mu S); NaN where a quartic was fitted.",
+             "limit_surface"),
+    Quantity("coefficients", (*FM, "monomial"), "", "coefficients of the fitted quartic",
+             f"P(w) = 1 in w = (x, y, t) = (f_x, f_y, tau_z / rho) / (mu S), of {', '.join(MONOMIALS)} in this order;"
+             " NaN where an ellipsoid was fitted.", "limit_surface"),
+    Quantity("certificate", FM, "", "how the fit is known to be convex",
+             "0 the fit failed, the ellipsoid from three motions stands in; 1 an ellipsoid; 2 the quartic came out "
+             "convex; 3 a semidefinite programme kept the quartic convex.", "limit_surface"),
+    Quantity("fit_flag", FM, "", "flag of the fit",
+             "Sum of: 1 the wrenches lie in a plane or on a line, so the surface is flat; 2 fewer independent "
+             "wrenches than coefficients; 4 its reach was limited, for the wrenches alone would give an endless body;"
+             " 8 rho does not suit the contact.", "limit_surface"),
+    Quantity("misfit", (*FM, "component"), "-, -, rad", "misfit of the fitted surface",
+             "Means over 377 motions that it was not fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of "
+             "the radius), angle between gradient and motion.", "limit_surface"),
+    Quantity("misfit_own", (*FM, "component"), "-, -, rad", "misfit of the fitted surface on its own samples",
+             "Means over the motions that it was fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of the "
+             "radius), angle between gradient and motion.", "limit_surface"),
+    Quantity("misfit_ellipsoid", (*FM, "component"), "-, -, rad", "misfit of the ellipsoid from three motions",
+             "Means over the 377 motions: |P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle "
+             "between gradient and motion.", "limit_surface"),
+    Quantity("matrix_6d", (*F, "wrench", "wrench_2"), "", "matrix of the fitted 6-D ellipsoid",
+             "A of w A w = 1 in w = (f_x, f_y, f_z, tau_x / rho, tau_y / rho, tau_z / rho) / (mu S), curved model; of"
+             " the directions that the contact resists.", "limit_surface", needs="six components"),
+    Quantity("rank_6d", F, "", "directions that the contact resists",
+             "Of the six; 3 for a planar contact.", "limit_surface", needs="six components"),
+    Quantity("misfit_6d", (*F, "component"), "-, -, rad", "misfit of the 6-D ellipsoid",
+             "As misfit, over the motions it was fitted to.", "limit_surface", needs="six components"),
+    # deformed wall
+    Quantity("place", ("wall_place", "component"), "m", "deformed wall",
+             f"Outer face in the object's frame at {AROUND} angles about the axis, in equal steps from finger 1's,"
+             f" times {ALONG} places along the outline, in equal steps of its arc length from the bottom's middle or"
+             " rim to the top; the angle runs slowest.", "wall", needs="wall"),
+    # large arrays
+    Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
+             "Friction (f_x, f_y, tau_z) of the curved model in the contact frame, for turns about the points of a"
+             " square grid of ten contact lengths a side about the origin, x first.", "fingers", needs="cor grid"),
+    Quantity("wrench", (*FM, "sample", "component"), "N, N, N m", "wrenches of sampled motions",
+             "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
+             " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
+             needs="samples", among="sampled"),
+    *(
+        Quantity(name, ("variation",), unit, f"{name} of changed probes", "Curved model, of the candidates in"
+                 " probes/candidate solved again with one thing changed; the dimension's attribute lists what.",
+                 "probes", needs="probes", among="probe")
+        for name, unit in (("e_n", "m"), ("quality", ""))
+    ),
+    # effects: level, indicator and reason of each
+    *(
+        Quantity(f"{name}_{part}", (), "", f"{part} of the effect '{name}'", text, "effects", meanings=meanings)
+        for name, levels in EFFECTS.items()
+        for part, text, meanings in (
+            ("level", "Position in the list of levels, the cheapest first.", levels),
+            ("indicator", INDICATORS.get(name, "None: this effect is not left to an indicator."), ()),
+            ("reason", "Why this level was taken.", REASONS),
+        )
+    ),
+    # contact patches
+    Quantity("pressure", (*F, "face"), "Pa", "contact pressure", "Pressure of each face of the pad's front.",
+             "patch", needs="patches"),
+    Quantity("area", (*F, "face"), "m^2", "face area", "Deformed area of each face.", "patch", needs="patches"),
+    Quantity("centroid", (*F, "face", "component"), "m", "face centroid",
+             "Deformed position in the pad's frame.", "patch", needs="patches"),
+    Quantity("normal", (*F, "face", "component"), "", "face normal",
+             "Unit normal of the deformed face, in the pad's frame.", "patch", needs="patches"),
+    # how the case stands
+    Quantity("code", (), "", "state of the case", "Whether it has values.", "status", meanings=STATES),
+    Quantity("attempts", (), "", "times this case was begun", "Without coming to an end, or with.", "status"),
+    Quantity("message", (), "", "why a case failed, or what to know about a result", "Empty where all is said.",
+             "status"),
+)  # fmt: skip
+MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
+FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
+BY_KEY = {q.key: q for q in TABLE}
+
+
+def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:
+    """All quantities of a file whose scene asks for these of `NEEDS` and `HELD`."""
+    return tuple(q for q in TABLE if not q.needs or q.needs in has)
+
+
+def map_row(name: str) -> Quantity:
+    """The row of a map; `KeyError` for a name that is none."""
+    return BY_KEY[f"maps/{name}"]
+
+
+def definitions(listed: Iterable[Quantity]) -> str:
+    """One text that says what every one of these quantities is; stored in each result file."""
+    lines = [
+        "Friction models: 'curved' lets every face resist in its own plane (curved contact model, Xu, Alt, Zhang,",
+        "Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a",
+        "Curved Contact Area Friction Model); 'flat' lays all faces into one plane and keeps the pressure sum S, the",
+        "paper's planar model; 'projected' is the planar model with the physical normal force F_N.",
+        "NaN: not there; status/code and status/message say why. All values are SI.",
+        "",
+    ]
+    for q in listed:
+        models = f" [{', '.join(MODELS)}]" if q.by_model else ""
+        lines.append(f"{q.key} [{q.unit or '-'}]{models}: {q.label}. {q.definition}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,105 @@
+"""Units: what a scene may be written in, and what people are shown; everything between is SI.
+
+Nobody else multiplies by 1000: keys of a scene end in their unit (``pad_length_mm``), quantities name their SI unit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from softjaw.fem.objects.mesh_file import LENGTHS
+
+
+class Unit(NamedTuple):
+    """A unit that values are given or shown in: one of it is ``times / over`` SI units (two numbers, to round once)."""
+
+    si: str
+    times: float
+    over: float
+    text: str
+
+    @property
+    def size(self) -> float:
+        """One such unit in SI units."""
+        return self.times / self.over
+
+
+UNITS = {  # by the suffix of a scene's key
+    **{name: Unit("m", times, over, name) for name, (times, over) in LENGTHS.items()},
+    "um": Unit("m", 1, 1e6, "um"),
+    "kg": Unit("kg", 1, 1, "kg"),
+    "g": Unit("kg", 1, 1000, "g"),
+    "n": Unit("N", 1, 1, "N"),
+    "kn": Unit("N", 1000, 1, "kN"),
+    "pa": Unit("Pa", 1, 1, "Pa"),
+    "kpa": Unit("Pa", 1000, 1, "kPa"),
+    "mpa": Unit("Pa", 1e6, 1, "MPa"),
+    "gpa": Unit("Pa", 1e9, 1, "GPa"),
+    "deg": Unit("rad", math.pi, 180, "deg"),
+    "rad": Unit("rad", 1, 1, "rad"),
+}
+SHOWN = {  # SI unit -> unit that people read; other units are shown as they are
+    "m": UNITS["mm"],
+    "rad": UNITS["deg"],
+    "Pa": UNITS["kpa"],
+    "m^2": Unit("m^2", 1, 1e6, "mm^2"),
+    "N m": Unit("N m", 1, 1000, "N mm"),
+}
+
+
+def split_unit(key: str) -> tuple[str, str]:
+    """Name and unit suffix of a scene's key; the suffix is empty where there is none.
+
+    >>> split_unit("pad_length_mm"), split_unit("model_size")
+    (('pad_length', 'mm'), ('model_size', ''))
+    """
+    stem, _, suffix = key.rpartition("_")
+    return (stem, suffix) if stem and suffix in UNITS else (key, "")
+
+
+def in_si(key: str, value: Any) -> Any:
+    """A scene key's value in SI units; lists go through member by member, ``"auto"`` becomes None.
+
+    >>> in_si("profile_mm", ((0.0, 30.0),)), in_si("grid_step_mm", "auto")
+    (((0.0, 0.03),), None)
+    """
+    if isinstance(value, list | tuple):
+        return tuple(in_si(key, member) for member in value)
+    if value is None or value == "auto":
+        return None
+    unit = UNITS.get(split_unit(key)[1])
+    return value * unit.times / unit.over if unit else value
+
+
+def si(key: str) -> Any:
+    """A property that gives the key ``key`` of a scene section in SI units (None where the key says ``"auto"``)."""
+    return property(lambda section: in_si(key, getattr(section, key)), doc=f"``{key}`` in SI units.")
+
+
+def shown_unit(si_unit: str) -> str:
+    """The unit in which people read a quantity.
+
+    >>> shown_unit("m"), shown_unit("N"), shown_unit("")
+    ('mm', 'N', '')
+    """
+    return SHOWN[si_unit].text if si_unit in SHOWN else si_unit
+
+
+def shown(value: Any, si_unit: str) -> Any:
+    """A value, or an array of values, in the unit that people read.
+
+    >>> shown(0.0125, "m"), shown(2.0, "N")
+    (12.5, 2.0)
+    """
+    unit = SHOWN.get(si_unit)
+    return value if unit is None else value * (unit.over / unit.times)
+
+
+def shown_text(value: float, si_unit: str, digits: int = 4) -> str:
+    """A value with its unit, as people read it.
+
+    >>> shown_text(0.0125, "m"), shown_text(5.0, "N"), shown_text(0.5, "")
+    ('12.5 mm', '5 N', '0.5')
+    """
+    return f"{shown(value, si_unit):.{digits}g} {shown_unit(si_unit)}".rstrip()

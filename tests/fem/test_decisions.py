@@ -1,0 +1,713 @@
+"""Outcomes of the finite element package that rounding does not decide: meshes, touch, profiles, symmetry, grids.
+
+Each decision is put where it is hardest, on its limit, then turned, scaled and moved by a few ulp: 200 times the same.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, way
+from softjaw.fem.contact.load_stepping import falls
+from softjaw.fem.contact.reasons import refuse_fall
+from softjaw.fem.errors import CheckError
+from softjaw.fem.objects.crossing import crossing_pairs
+from softjaw.fem.objects.mesh_check import MeshError, sound_mesh
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.outer_surface import Section, _by_height, of_sections
+from softjaw.fem.objects.pose import Pose
+from softjaw.fem.objects.profile import _corner, straight_runs
+from softjaw.fem.objects.revolution import Revolution, _check_line
+from softjaw.fem.objects.section_rays import Rays, cast, centroids
+from softjaw.fem.objects.shapes import Box, EllipticCylinder, Sphere
+from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.objects.stacked import Stacked, wall_surface
+from softjaw.fem.objects.touch import NoContactError, first_touch
+from softjaw.fem.objects.traced_outline import _centre_line, folded
+from softjaw.fem.objects.traced_radii import _symmetric
+from softjaw.fem.objects.turned import Turned
+from softjaw.fem.pad.backing_plate import Sheet, _plate
+from softjaw.fem.pad.mesh import _as_grid, _lines
+from softjaw.fem.shell.body import _planes, _steps, _wall
+from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.fem.shell.grid import MeshSize, along, divided
+from softjaw.fem.shell.support import _clamped
+from softjaw.fem.shell.thin_walled import ThinWalled, grasp
+
+EPS = np.finfo(float).eps
+ULPS = EPS * np.arange(-8, 9)
+# the same examples on every rank and every day, and no folder of past failures beside the project; no seed is simpler
+tries = settings(max_examples=200, deadline=None, derandomize=True, database=None, phases=[Phase.generate])
+seeds = st.integers(0, 2**32 - 1)
+
+
+def moved(values, seed):
+    """The values, each off by at most eight ulp of the largest."""
+    x = np.asarray(values, float)
+    return x + np.abs(x).max() * np.random.default_rng(seed).choice(ULPS, x.shape)
+
+
+def turned(points, seed):
+    """Points at random scale, turned and moved at random, each number off by a few ulp; and the scale."""
+    rng = np.random.default_rng(seed)
+    scale = rng.uniform(0.03, 0.3)
+    R = Rotation.random(random_state=rng).as_matrix()
+    return moved(scale * np.asarray(points) @ R.T + rng.uniform(-0.1, 0.1, 3), seed), scale
+
+
+def about_z(points, seed):
+    """The same for what has to keep its heights: turned about z, not moved up or down."""
+    rng = np.random.default_rng(seed)
+    scale = rng.uniform(0.03, 0.3)
+    R = Rotation.from_rotvec([0.0, 0.0, rng.uniform(-4, 4)]).as_matrix()
+    return moved(scale * np.asarray(points) @ R.T, seed), scale
+
+
+def outcome(function, *arguments):
+    """What a call returns, or the type of what it raises."""
+    try:
+        return function(*arguments)
+    except (ValueError, ArithmeticError, CheckError) as error:
+        return type(error)
+
+
+def hull(points):
+    """Convex body of corners: the corners, and triangles turned outwards."""
+    x = np.asarray(points, float)
+    triangles = ConvexHull(x, qhull_options="QJ" if len(x) > 8 else "Qt").simplices.astype(np.int64)
+    a, b, c = x[triangles].transpose(1, 0, 2)
+    wrong = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - x.mean(axis=0)) < 0
+    triangles[wrong] = triangles[wrong][:, ::-1]
+    return x, triangles
+
+
+def union(*bodies):
+    """Several meshes as one."""
+    first = np.cumsum([0, *(len(x) for x, _ in bodies)])
+    triangles = np.concatenate([t + n for (_, t), n in zip(bodies, first, strict=False)])
+    return np.concatenate([x for x, _ in bodies]), triangles
+
+
+CUBE = hull(np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3, indexing="ij"), axis=-1).reshape(-1, 3))
+OCTAHEDRON = hull(0.5 * np.concatenate([np.eye(3), -np.eye(3)]))
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+FLAT_PIECE = SQUARE, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+
+
+def shifted(body, scale, by=(0.0, 0.0, 0.0)):
+    return scale * body[0] + by, body[1]
+
+
+def volume(points, triangles):
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
+# --- meshes -----------------------------------------------------------------------------------------------------------
+
+TWO_TURNED = CUBE[0], np.concatenate([CUBE[1][:2, ::-1], CUBE[1][2:]])
+ACCEPTED = {  # mesh, and its volume
+    "closed": (CUBE, 1.0),
+    "two turned": (TWO_TURNED, 1.0),
+    "inside out": ((CUBE[0], CUBE[1][:, ::-1]), 1.0),
+    "inner piece": (union(CUBE, shifted(CUBE, 0.9)), 1.0),
+    "inside out around another": (union((CUBE[0], CUBE[1][:, ::-1]), shifted(OCTAHEDRON, 0.999)), 1.0),
+    "two apart": (union(CUBE, shifted(CUBE, 0.5, [0.03, 0.02, 0.76])), 1.125),
+    "standing on another": (union(CUBE, shifted(CUBE, 0.5, [0.03, 0.02, 0.75])), 1.125),
+    "touching along an edge": (union(CUBE, shifted(CUBE, 0.5, [0.75, 0.75, 0.0])), 1.125),
+    "thin": ((CUBE[0] * [1, 1, 1e-4], CUBE[1]), 1e-4),
+}
+REFUSED = {  # mesh, and a word of the refusal
+    "open": ((CUBE[0], CUBE[1][1:]), "closed"),
+    "flat": (FLAT_PIECE, "volume"),
+    "flat beside another": (union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])), "volume"),
+    "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), "intersects"),
+    "corners on another": (union(CUBE, shifted(OCTAHEDRON, 1.0)), "two pieces"),
+    "face on a face": (union(CUBE, shifted(CUBE, 1.0, [0.0, 0.0, 1.0])), "manifold"),
+}
+
+
+@pytest.mark.parametrize("name", list(ACCEPTED))
+@tries
+@given(seed=seeds)
+def test_a_mesh_is_sound_in_every_position(name, seed):
+    (points, triangles), expected = ACCEPTED[name]
+    x, scale = turned(points, seed)
+    assert volume(*sound_mesh(x, triangles)[:2]) == pytest.approx(expected * scale**3, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", list(REFUSED))
+@tries
+@given(seed=seeds)
+def test_a_mesh_without_an_inside_is_refused_in_every_position(name, seed):
+    (points, triangles), word = REFUSED[name]
+    with pytest.raises(MeshError, match=word):
+        sound_mesh(turned(points, seed)[0], triangles)
+
+
+@tries
+@given(seeds)
+def test_corners_that_rounding_of_a_file_moved_apart_are_one(seed):
+    """Every triangle has corners of its own, in numbers of single precision; a slit of 1e-4 stays open."""
+    x, scale = turned(CUBE[0], seed)
+    rng = np.random.default_rng(seed)
+    soup = x[CUBE[1]].reshape(-1, 3).astype(np.float32)
+    soup = np.nextafter(soup, soup + rng.choice(np.float32([-1, 0, 1]), soup.shape)).astype(float)
+    own = np.arange(len(soup)).reshape(-1, 3)
+    points, triangles, _ = sound_mesh(soup, own)
+    assert (len(points), len(triangles)) == (8, 12)
+    assert volume(points, triangles) == pytest.approx(scale**3, rel=1e-4)
+    soup[:3] += 1e-4 * scale
+    with pytest.raises(MeshError, match="closed"):
+        sound_mesh(soup, own)
+
+
+@pytest.mark.parametrize(("size", "beyond"), [(1e-3, 1 - 1e-5), (2.0, 1 + 1e-5)])
+@tries
+@given(seed=seeds)
+def test_a_mesh_as_large_as_is_allowed_is_allowed(size, beyond, seed):
+    points = CUBE[0] * [0.1, 0.2, 1.0] + [0.0, 0.0, np.random.default_rng(seed).uniform(-1, 1)]
+    factor, unit = ((size, "m"), (1e3 * size, "mm"), (size / 0.0254, "inch"))[seed % 3]
+    assert len(sound_mesh(moved(factor * points, seed), CUBE[1], unit)[1]) == 12
+    with pytest.raises(MeshError):
+        sound_mesh(moved(factor * beyond * points, seed), CUBE[1], unit)
+
+
+BASE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+
+
+def crossings(other, seed):
+    """Pairs among a triangle and another one in a random position."""
+    return len(crossing_pairs(turned(np.concatenate([BASE, other]), seed)[0], np.arange(6).reshape(2, 3)))
+
+
+@pytest.mark.parametrize(
+    "tip", [(0.3, 0.2), (0.5, 0.5), (0.0, 0.0)], ids=["face", "edge", "corner"]
+)
+@tries
+@given(seed=seeds)
+def test_a_triangle_that_touches_another_with_its_tip_does_not_cross_it(tip, seed):
+    up = np.array([[*tip, 0], [tip[0] + 0.1, tip[1] + 0.3, 0.4], [tip[0] - 0.2, tip[1] + 0.1, 0.7]])
+    assert crossings(up, seed) == 0
+    if sum(tip) == 0.5:
+        assert crossings(np.concatenate([up[:1] - [[0.0, 0.0, 1e-4]], up[1:]]), seed) == 1
+
+
+@tries
+@given(seeds)
+def test_triangles_that_overlap_in_one_plane_do_not_cross(seed):
+    assert crossings(BASE + np.array([0.1, 0.2, 0.0]), seed) == 0
+
+
+@tries
+@given(seeds)
+def test_a_box_of_whole_steps_has_as_many_cells(seed):
+    """The grid in which the distance to a mesh is sampled: typed sizes over a typed step."""
+    rng = np.random.default_rng(seed)
+    step, many = rng.uniform(0.5e-3, 2e-3), rng.integers(1, 4, 3)
+    lower = rng.uniform(-0.05, 0.05, 3)
+    mesh = MeshObject(*shifted(CUBE, 0.1), grid_step=moved(step, seed))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(MeshObject, "distance", lambda self, x: np.zeros(len(x)))
+        region = mesh.near(Pose(np.eye(3), np.zeros(3)), lower, moved(lower + step * many, seed))
+    assert region.samples.shape == tuple(many + 7)
+
+
+# --- cuts through meshes ----------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds)
+def test_a_cut_through_a_tip_is_empty(seed):
+    pyramid = hull([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0.2, 0.1, 1.0]])
+    x, scale = about_z(pyramid[0], seed)
+    z = moved(scale * np.array([0.5, 1.0, 1.0 - 1e-13]), seed)
+    c = centroids(x, pyramid[1], z)
+    assert np.isnan(c[1:]).all()
+    assert np.hypot(*c[0]) == pytest.approx(0.5 * scale * np.hypot(0.2, 0.1), rel=1e-9)
+
+
+@tries
+@given(seeds)
+def test_a_ray_through_a_corner_meets_a_section_once(seed):
+    """A prism whose edges lie on the rays, at any angle that keeps them there."""
+    n, rng = 12, np.random.default_rng(seed)
+    phi = 2 * np.pi / n * (np.arange(n) + rng.integers(-n, n))
+    ring = rng.uniform(0.01, 0.1) * np.stack([np.cos(phi), np.sin(phi)], axis=1)
+    points = moved(np.concatenate([np.insert(ring, 2, z, axis=1) for z in (0.0, 0.02)]), seed)
+    i, j = np.arange(n), (np.arange(n) + 1) % n
+    triangles = np.concatenate([np.stack([i, j, i + n], 1), np.stack([j, j + n, i + n], 1)])
+    rays = cast(points, triangles, np.array([0.005, 0.01]), np.zeros((2, 2)), 4 * n)
+    assert (rays.hits == 1).all()
+    assert not folded(rays, 1e-9).any()
+
+
+@tries
+@given(seeds)
+def test_a_fold_is_one_from_the_size_of_a_facet_on(seed):
+    """Rays that miss are folded, too."""
+    facet = np.random.default_rng(seed).uniform(1e-4, 1e-2)
+    inner = moved(np.full((1, 4), 0.03), seed)
+    outer = inner + facet * np.array([0.0, 0.99, 1.01, np.nan])
+    assert folded(Rays(outer, inner, np.ones((1, 4))), facet).tolist() == [[False, False, True, True]]
+
+
+@tries
+@given(seeds)
+def test_radii_have_the_symmetry_that_they_nearly_have(seed):
+    """Ovals and circles; one pressed in by more than the tolerance on one side."""
+    rng, theta = np.random.default_rng(seed), 2 * np.pi / 64 * np.arange(64)
+    scale, tolerance, there = rng.uniform(0.01, 0.1), 1e-7, np.array([True, True])
+    oval, egg = scale * (1 + 0.1 * np.cos(2 * theta)), scale * (1 + 0.1 * np.cos(theta) ** 3)
+    for r, expected in (
+        (np.full(64, scale), (True, True, True)),
+        (oval, (True, True, False)),
+        (egg, (False, True, False)),
+        (np.roll(oval, 3), (False, False, False)),
+    ):
+        R, found, is_round = _symmetric(moved(np.tile(r, (3, 1)), seed), there, tolerance)
+        assert (*found, is_round) == expected
+        assert not expected[1] or (R[:, 1:] == R[:, :0:-1]).all()
+
+
+@tries
+@given(seeds)
+def test_centres_near_the_axis_are_on_it(seed):
+    rng, z = np.random.default_rng(seed), np.linspace(0.0, 0.1, 40)
+    noise = rng.uniform(-1e-16, 1e-16, (40, 2))
+    line = _centre_line(z, noise + np.array([0.0, 1e-3]), (0.0, 0.1), 0.05, 1e-7)
+    assert line(z)[:, 0].tolist() == [0.0] * 40
+    assert line(z)[:, 1] == pytest.approx(1e-3, rel=1e-6)
+
+
+# --- touch ------------------------------------------------------------------------------------------------------------
+
+
+def travel_past(shape, place, seed, reach=20.0):
+    """Travel along y until one of three points, the first at ``place``, meets a shape; all of it turned at random."""
+    rng = np.random.default_rng(seed)
+    turn = Rotation.random(random_state=rng).as_matrix()
+    body = SimpleNamespace(gap=lambda x: shape.gap(x @ turn))
+    R = turn @ [[0, 1, 0], [0, 0, 1], [1, 0, 0.0]]
+    row = np.array([[0.0, 0.0, 0.0], [0.0, 0.01, 0.0], [0.01, 0.01, 0.0]])
+    return first_touch(body, Pose(moved(R, seed), moved(turn @ place, seed)), row, reach)
+
+
+@tries
+@given(seeds)
+def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
+    """Past a sphere it has none; along the side of a box it is known to graze."""
+    half = np.random.default_rng(seed).uniform(0.01, 0.05)
+    ball, box = Sphere(half), Box((2 * half,) * 3, 0.1 * half)
+    for out in (0.0, 1e-8):
+        with pytest.raises(NoContactError):
+            travel_past(ball, [0.0, -0.1, half + out], seed, 5.0)
+    assert travel_past(ball, [0.0, -0.1, half - 1e-5], seed, 5.0) == pytest.approx(0.1 - np.sqrt(2e-5 * half), abs=1e-5)
+    with pytest.raises(NoContactError, match="grazes"):
+        travel_past(box, [0.0, -0.1, half], seed)
+    with pytest.raises(NoContactError, match="passes"):
+        travel_past(box, [0.0, -0.1, half + 1e-8], seed)
+    assert 0.1 - half < travel_past(box, [0.0, -0.1, half - 1e-8], seed) < 0.1 - 0.8 * half
+
+
+@tries
+@given(seeds)
+def test_a_pad_that_starts_at_the_surface_touches_at_once(seed):
+    rng = np.random.default_rng(seed)
+    R = Rotation.random(random_state=rng).as_matrix()
+    radius = rng.uniform(0.01, 0.05)
+
+    def travel(outside):
+        pose = Pose(moved(R, seed), moved(-(radius + outside) * R[:, 2], seed))
+        return first_touch(Sphere(radius), pose, np.array([[0.0, 0.0, 0.0], [0.0, 0.005, 0.0]]), 0.5)
+
+    assert travel(0.0) == pytest.approx(0.0, abs=2e-9)
+    assert travel(1e-3) == pytest.approx(1e-3, abs=2e-12)
+    with pytest.raises(NoContactError, match="inside"):
+        travel(-1e-8)
+
+
+@tries
+@given(seeds)
+def test_what_is_met_just_at_the_end_of_the_reach_is_met(seed):
+    half = np.random.default_rng(seed).uniform(0.01, 0.05)
+    ahead = moved([0.1, half], seed)[0]
+    assert travel_past(Sphere(half), [0.0, -0.1 - half, 0.0], seed, ahead) == pytest.approx(0.1, rel=1e-6)
+
+
+@tries
+@given(seeds)
+def test_a_frame_is_one_up_to_rounding(seed):
+    R = Rotation.random(random_state=seed).as_matrix()
+    assert outcome(Pose, moved(R, seed), np.zeros(3)) is not ValueError
+    assert outcome(Pose, moved(-R, seed), np.zeros(3)) is ValueError
+    for bent in ([[1, 1e-7, 0], [0, 1, 0], [0, 0, 1]], np.diag([1.0, 1.0, 1.0 + 1e-4])):
+        assert outcome(Pose, moved(R @ bent, seed), np.zeros(3)) is ValueError
+
+
+# --- states of a press ------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds)
+def test_a_node_bears_something_or_nothing(seed):
+    """What rounding leaves of a pressure is none; tension is kept for the checks, idle or not."""
+    from softjaw.fem.contact.problem import borne
+
+    scale = np.random.default_rng(seed).uniform(1e2, 1e6)
+    noise = scale * np.random.default_rng(seed + 1).uniform(1e-18, 1e-11, 3)
+    pressure = np.concatenate([moved(scale * np.array([1.0, 0.5, 1e-8, -1e-3, -1e-3, 0.5]), seed), noise])
+    active = np.array([True, True, True, True, False, False, True, True, False])
+    assert np.sign(borne(pressure, active)).tolist() == [1, 1, 1, -1, -1, 0, 0, 0, 0]
+    assert borne(np.zeros(9), active).tolist() == [0.0] * 9
+
+
+@tries
+@given(seeds)
+def test_a_force_falls_by_more_than_rounding(seed):
+    """A plateau is no fall, at any force."""
+    plateau = np.array([0.5, 1.0, 1.0, 1.0, 1.0, 1.5]) * np.random.default_rng(seed).uniform(1e-2, 1e3)
+    assert falls(moved(plateau, seed)) is False
+    assert falls(moved(plateau * [1, 1, 1, 1 - 1e-5, 1, 1], seed)) is True
+
+
+@tries
+@given(seeds, st.integers(1, 6))
+def test_a_way_of_whole_steps_has_as_many_forces(seed, steps):
+    low = np.random.default_rng(seed).uniform(0.01, 10.0)
+    reached, force = moved([low, low * GROWTH**steps], seed)
+    assert len(way(float(reached), float(force))) == steps
+
+
+@tries
+@given(seeds)
+def test_a_travel_that_stays_is_no_fall(seed):
+    travel = np.random.default_rng(seed).uniform(1e-4, 1e-2)
+    for after, kept in ((1.0, True), (0.96, True), (0.94, False)):
+        (one, other) = moved([travel, after * travel], seed)
+        assert (outcome(refuse_fall, (1.0, one), (2.0, other)) is None) is kept
+
+
+@tries
+@given(seeds)
+def test_a_point_is_closed_where_it_bears_something(seed):
+    """Tractions go on from there at the next state; elsewhere they begin anew."""
+    pressure = np.array([[1.0, 0.5, 1e-8], [1e-13, 1e-17, 0.0]]) * np.random.default_rng(seed).uniform(1e2, 1e6)
+    problem = object.__new__(CoupledProblem)
+    problem._contact = lambda x, tangent: None
+    problem._traction = lambda x: (np.zeros((2, 3, 3)),)
+    problem._points, problem._pressure = np.zeros((2, 3, 3)), lambda x: np.maximum(moved(pressure, seed), 0.0)
+    problem.accept(None)
+    assert problem._closed.tolist() == [[True] * 3, [False] * 3]
+
+
+# --- grids ------------------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds, st.integers(2, 9), st.integers(2, 9))
+def test_nodes_of_a_face_are_a_grid(seed, columns, rows):
+    """Nodes inside elements are off their line by rounding, and no number of lines makes one of two."""
+    rng, size = np.random.default_rng(seed), 0.05
+    x, y = np.cumsum(rng.uniform(1e-4, 1e-2, columns)) - 0.02, np.cumsum(rng.uniform(1e-4, 1e-2, rows)) - 0.02
+    order = rng.permutation(columns * rows)
+    nodes = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((columns, rows))], -1).reshape(-1, 3)
+    shuffled = np.empty_like(nodes)
+    shuffled[order] = nodes
+    assert _lines(moved(shuffled[:, 0], seed), 1e-9 * size).max() == columns - 1
+    number, shape = _as_grid(moved(shuffled, seed), np.ones(len(nodes), bool), 1e-9 * size)
+    assert shape == (columns, rows)
+    assert number.tolist() == order.tolist()
+
+
+@tries
+@given(seeds)
+def test_nodes_on_the_rim_of_the_support_are_held(seed):
+    x, y = np.linspace(-0.025, 0.025, 11), np.linspace(-0.011, 0.011, 5)
+    scale = np.random.default_rng(seed).uniform(0.3, 3.0)
+    support = tuple(scale * np.array([0.020, 0.011]))
+    sheet = Sheet(1e-3, 2e9, 0.35, tuple(moved(support, seed)))
+    half, whole = ((x[5:], y[2:], (True, True)), (x, y, (False, False)))
+    for lines, other, symmetry in (half, whole):
+        _, fixed, free = _plate(tuple(moved(scale * lines, seed)), tuple(moved(scale * other, seed)), symmetry, sheet)
+        held = ~free.any(axis=-1)
+        assert held.sum() == (6 if all(symmetry) else 15)
+        assert fixed.sum() == (6 * 6 + 2 * (3 + 1) if all(symmetry) else 15 * 6)
+    assert outcome(_plate, x[:2], y, (False, False), Sheet(1e-3, 2e9, 0.35, (0.02, 0.011))) is ValueError
+
+
+@tries
+@given(seeds, st.integers(1, 30))
+def test_a_length_of_whole_elements_has_as_many(seed, many):
+    """Also where the number has to be a multiple of four."""
+    rng = np.random.default_rng(seed)
+    start, h = rng.uniform(-0.1, 0.1), rng.uniform(1e-4, 1e-2)
+    ends = moved([start, start + many * h], seed)
+    x = np.linspace(*ends, 50)
+    assert len(divided(*ends, x, moved(np.full(50, h), seed))) == many + 1
+    assert len(divided(*ends, x, moved(np.full(50, h), seed), 4)) == 4 * -(-many // 4) + 1
+
+
+BODY = ThinWalled(of_sections([Section(z, 0.03) for z in (0.0, 0.05, 0.1)]), True, 1e-3, None)
+COARSE = MeshSize(heights=(0.03, 0.05), along=0.006, coarse=0.012)
+LINES = along(BODY.surface, COARSE, True, True, 0.0)
+
+
+@tries
+@given(seeds)
+def test_a_slope_of_the_thickness_at_an_end_adds_no_line(seed):
+    """Places within rounding of the ends of the mesh, or of the edge of a flat lid's own line."""
+    marks = moved([*BODY.surface.wall, BODY.surface.wall[0]], seed)
+    assert len(along(BODY.surface, COARSE, True, True, 0.0, marks)) == len(LINES)
+
+
+@tries
+@given(seeds)
+def test_a_table_of_thickness_that_ends_with_the_wall_has_no_step_there(seed):
+    table = [(0.0, 1e-3), *((z, 5e-4) for z in moved([0.05, 0.1], seed))]
+    assert len(_steps(BODY.surface, table)) == 1
+
+
+@tries
+@given(seeds)
+def test_numbers_on_planes_of_symmetry_are_fixed(seed):
+    n = 4 * np.random.default_rng(seed).integers(1, 6)
+    number = np.arange(3 * (n + 1)).reshape(n + 1, 3)
+    quarter = moved(np.linspace(0.0, 0.5 * np.pi, n + 1), seed)
+    assert _planes((True, True), quarter, number, number.size).sum() == 2 * 2 * 3
+    half = moved(np.linspace(0.0, np.pi, n + 1), seed)
+    assert _planes((False, True), half, number, number.size).sum() == 2 * 2 * 3
+
+
+# --- profiles ---------------------------------------------------------------------------------------------------------
+
+EGG = np.array([[0.0, 0.0], [0.02, 0.02], [0.05, 0.03], [0.08, 0.02], [0.1, 0.0]])
+PIECES = len(Revolution(EGG).curve.coefficients)
+# back down beside the first run, as close as is wanted
+FOLDED = np.array([[0, 30], [100, 30], [100, 50], [40, 50], [40, 30], [-20, 30]]) / 1e3
+
+
+@tries
+@given(seeds)
+def test_an_end_of_a_profile_is_on_the_axis_or_not(seed):
+    """The egg has no lids, and touches the axis nowhere else."""
+    egg = moved(np.random.default_rng(seed).uniform(0.5, 3.0) * EGG, seed)
+    body = Revolution(egg)
+    assert body.profile[[0, -1], 1].tolist() == [0.0, 0.0]
+    assert len(body.curve.coefficients) == PIECES
+    egg[2, 1] = np.random.default_rng(seed).choice([-1e-16, 0.0, 1e-16, 1e-12])
+    assert outcome(Revolution, egg) is ValueError
+
+
+@tries
+@given(seeds)
+def test_an_outline_that_runs_back_on_itself_touches_itself(seed):
+    """The last run lies on the first one, or 1e-6 of the size above it; and the same at its corner."""
+    scale = np.random.default_rng(seed).uniform(0.5, 3.0)
+    for line in (FOLDED, FOLDED[:5]):
+        assert outcome(_check_line, moved(scale * line, seed)) is ValueError
+        apart = line + np.where(np.arange(len(line)) > 3, 1e-7, 0.0)[:, None] * [0.0, 1.0]
+        assert outcome(_check_line, moved(scale * apart, seed)) is None
+
+
+@tries
+@given(seeds)
+def test_an_outline_that_comes_down_to_the_axis_touches_it(seed):
+    scale = np.random.default_rng(seed).uniform(0.5, 3.0)
+    for low, found in ((0.0, ValueError), (1e-10, ValueError), (1e-7, None)):
+        line = np.array([[0.0, 0.0], [0.0, 0.03], [0.05, low], [0.1, 0.03], [0.1, 0.0]])
+        assert outcome(_check_line, moved(scale * line, seed)) is found
+
+
+@tries
+@given(seeds)
+def test_points_of_a_line_are_a_straight_run(seed):
+    """Two lines at any angle that does not fold them; parts of one line have no corner between them."""
+    rng = np.random.default_rng(seed)
+    first, turn = rng.uniform(-1.0, 1.0), rng.choice([-1.5, -0.01, 0.01, 1.5])
+    steps = rng.uniform(0.005, 0.03, 8)
+    angles = first + np.where(np.arange(8) < 4, 0.0, turn)
+    path = np.cumsum(np.concatenate([[[0.1, 0.5]], steps[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)]), 0)
+    assert straight_runs(moved(path, seed)) == [(0, 4, True), (4, 8, True)]
+    assert straight_runs(moved(path[:5], seed)) == [(0, 4, True)]
+    assert _corner(moved(path[:5], seed), (0, 2, True), (2, 4, True), 0.002) is None
+    assert _corner(moved(path, seed), (0, 4, True), (4, 8, True), 0.002) is not None
+
+
+HEIGHTS = -0.0437, 0.0811
+BENT = of_sections([Section(HEIGHTS[0], 0.03), Section(0.021, 0.02), Section(HEIGHTS[1], 0.025)])
+
+
+@tries
+@given(seeds)
+def test_an_end_of_the_wall_has_a_place_on_it(seed):
+    low, high = moved(HEIGHTS, seed)
+    assert BENT.station(low) == pytest.approx(BENT.wall[0], abs=1e-9)
+    assert BENT.station(high) == pytest.approx(BENT.wall[1], abs=1e-9)
+    assert outcome(BENT.station, low - 1e-8) is ValueError
+    assert outcome(BENT.station, high + 1e-8) is ValueError
+
+
+# --- symmetry ---------------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds)
+def test_sections_are_round_up_to_rounding(seed):
+    rng, n = np.random.default_rng(seed), 4
+    z = np.linspace(0.0, 0.1, n) * rng.uniform(0.5, 2.0)
+    noise, rise = rng.choice(ULPS, n), np.abs(rng.choice(ULPS, n))
+
+    def order(off=0.0, exponent=0.0, symmetric=(True, True)):
+        curve = SimpleNamespace(derivative=lambda s: np.stack([s, 0.03 + 0 * s], axis=1))
+        ratio, n = _by_height(z, 1 + noise + off), _by_height(z, 2.0 + 2 * rise + exponent)
+        outer = SimpleNamespace(symmetric=symmetric, wall=z[[0, -1]], curve=curve, ratio=ratio, exponent=n)
+        return Stacked(outer).axis_symmetry
+
+    assert (order(), order(off=1e-6), order(exponent=1e-6), order(symmetric=(False, True))) == (0, 2, 2, 1)
+
+
+@tries
+@given(seeds, st.integers(-9, 9))
+def test_planes_of_symmetry_turn_by_quarters(seed, quarters):
+    lopsided = SimpleNamespace(symmetric=(True, False))
+    angle = moved(0.5 * np.pi * np.array([quarters, 9]), seed)[0]
+    assert Turned(lopsided, angle, False).symmetric == ((True, False) if quarters % 2 == 0 else (False, True))
+    assert Turned(lopsided, angle + 1e-8, False).symmetric == (False, False)
+    assert Turned(lopsided, angle + 1e-8, True).symmetric == (True, True)
+
+
+@tries
+@given(seeds)
+def test_a_grasp_of_a_round_body_has_both_planes_at_every_angle(seed):
+    """The pads' long sides up or down; nothing is left of a plane once a pad is off it by 1 um."""
+    rng = np.random.default_rng(seed)
+    phi, z, up = rng.uniform(-4, 4), rng.uniform(0.02, 0.08), rng.choice([-1.0, 1.0])
+
+    def pose(angle, along, off):
+        out, side = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
+        R = np.stack([[0.0, 0.0, along], np.cross(-out, [0.0, 0.0, along]), -out], axis=1)
+        return Pose(moved(R, seed), moved(0.03 * out + off * side + [0.0, 0.0, z], seed))
+
+    one, two, off = pose(phi, up, 0.0), pose(phi + np.pi, up, 0.0), pose(phi + np.pi, up, 1e-6)
+    held = grasp(BODY, (one, two))
+    assert held.mirrors == (True, True)
+    assert len(held.poses) == 1
+    assert held.flipped == (bool(one.rotation[:, 1] @ [-np.sin(phi), np.cos(phi), 0.0] < 0),)
+    assert grasp(BODY, (one, off)).mirrors == (False, False)
+
+
+@tries
+@given(seeds)
+def test_semi_axes_that_are_equal_up_to_rounding_make_a_circle(seed):
+    a, b, c = moved(np.full(3, np.random.default_rng(seed).uniform(0.01, 0.1)), seed)
+    assert EllipticCylinder(a, b, c).axis_symmetry == 0
+    assert EllipticCylinder(a, b * (1 + 1e-6), c).axis_symmetry == 2
+    assert Box((a, b, c), 0.0).axis_symmetry == 4
+
+
+# --- walls ------------------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds)
+def test_a_wall_as_thick_as_its_outline_is_bent_is_refused(seed):
+    t = np.random.default_rng(seed).uniform(1e-4, 1e-2)
+
+    def bent(by):
+        curve = SimpleNamespace(
+            derivative=lambda s: np.stack([s, 0 * s + 0.03], 1), curvature=lambda s: moved(0 * s + by / t, seed)
+        )
+        return outcome(_wall, SimpleNamespace(curve=curve), t, None, np.linspace(0.0, 0.1, 5))
+
+    assert bent(1.0) is ValueError
+    assert bent(1.0 - 1e-5) == pytest.approx(t)
+
+
+@tries
+@given(seeds)
+def test_the_lines_of_the_flat_bottom_are_clamped(seed):
+    """With the line on its edge, which the mesh and the outline know to rounding."""
+    scale = np.random.default_rng(seed).uniform(0.3, 3.0)
+    s = scale * np.linspace(0.0, 0.1, 11)
+    number, held = np.arange(44).reshape(4, 11), np.zeros((44, 6), dtype=bool)
+    flat = moved([s[3], s[-1]], seed)
+    _clamped(SimpleNamespace(s=moved(s, seed), surface=SimpleNamespace(flat=flat), number=number), held)
+    assert np.unique(np.flatnonzero(held.any(axis=1)) % 11).tolist() == [0, 1, 2, 3]
+
+
+def cylinder(ends, seed=None):
+    """Splines through points of a cylinder of radius 1, between two heights."""
+    theta, s = np.linspace(0.0, 2 * np.pi, 25), np.linspace(*ends, 5)
+    T, S = np.meshgrid(theta, s, indexing="ij")
+    X = np.stack([np.cos(T), np.sin(T), S], axis=-1)
+    return spline_surface(theta, s, X if seed is None else moved(X, seed), closed=True)
+
+
+SURFACE = cylinder((0.0, 2.0))
+
+
+@tries
+@given(seeds)
+def test_a_point_at_the_end_of_a_wall_faces_it(seed):
+    """A point 1e-6 of the wall's length beyond faces nothing; so it is at the first and last angle of half a wall."""
+    rng = np.random.default_rng(seed)
+    number = np.arange(13 * 5, dtype=np.int32).reshape(13, 5)
+    wall = Wall(SURFACE, np.linspace(0.0, np.pi, 13), np.linspace(0.0, 2.0, 5), number, np.full(65, 1e-3))
+    out, z = 1.0 + rng.uniform(0.0, 1e-3), np.array([0.0, 2.0, -2e-6, 2.0 + 2e-6, 1.0, 1.0, 1.0, 1.0])
+    phi = np.array([1.0, 2.0, 1.0, 2.0, 0.0, np.pi, -1e-6, np.pi + 1e-6])
+    x = moved(np.stack([out * np.cos(phi), out * np.sin(phi), z], axis=1), seed)
+    found = face(wall, x, wall.places(x), np.zeros((65, 3)), np.zeros((65, 3)))
+    assert (found.gap < FAR).tolist() == [True, True, False, False, True, True, False, False]
+
+
+@tries
+@given(seeds)
+def test_a_surface_ends_where_it_began(seed):
+    assert cylinder((0.0, 2.0), seed=seed).closed
+    turn = moved([0.5, 2 * np.pi + 0.5], seed)
+    table = np.zeros((2, 2), np.int32)
+    assert Wall(SURFACE, turn, np.array([0.0, 2.0]), table, np.ones(1)).closed
+    assert not Wall(SURFACE, turn * [1.0, 1.0 - 1e-5], np.array([0.0, 2.0]), table, np.ones(1)).closed
+    X = np.zeros((5, 5, 3))
+    X[-1] = 1e-6
+    X[1:-1] = 1.0
+    assert outcome(spline_surface, np.arange(5.0), np.arange(5.0), X, True) is ValueError
+
+
+@tries
+@given(seeds)
+def test_lines_of_a_surface_that_rounding_doubles_are_one(seed):
+    """Ends of the wall that fall on breaks of its outline but for rounding."""
+    rng = np.random.default_rng(seed)
+    breaks = np.array([0.0, 0.01, 0.05, 0.09, 0.1]) * rng.uniform(0.5, 2.0)
+    outer = SimpleNamespace(
+        wall=(breaks[1], breaks[3]), curve=SimpleNamespace(breaks=moved(breaks, seed)),
+        jets=lambda T, S: np.stack([np.cos(T), np.sin(T), S], -1).reshape(-1, 1, 3),
+    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("softjaw.fem.objects.spline_surface.spline_surface", lambda theta, s, X, closed: s)
+        s = wall_surface(outer, *moved(breaks[[0, 4]], seed))
+    assert len(s) == 256 + 2 * 15 + 3
+    assert np.diff(s).min() > 1e-9
+
+
+# --- shapes -----------------------------------------------------------------------------------------------------------
+
+
+@tries
+@given(seeds)
+def test_the_side_of_a_box_is_its_nearest_one_or_one_of_the_nearest(seed):
+    """On its diagonals two normals are as good: the gap is the same, and the normal one of theirs."""
+    half = np.random.default_rng(seed).uniform(0.01, 0.05)
+    x = moved(half * np.array([[0.5, 0.5, 0.1], [0.9, 0.2, 0.9], [0.0, 0.0, 0.0], [1.0, 0.3, 0.2]]), seed)
+    g, normal, _ = Box((2 * half,) * 3, 0.0).gap(x)
+    assert g == pytest.approx(half * np.array([-0.5, -0.1, -1.0, 0.0]), abs=1e-15)
+    assert np.sort(np.abs(normal), axis=1).tolist() == [[0.0, 0.0, 1.0]] * 4

@@ -1,0 +1,136 @@
+"""A result file as a dataset: dimensions, coordinates and attributes; no value where a case has none."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import softjaw
+from softjaw.study.exits import OTHER_FILE, StudyError
+from softjaw.study.flags import Flag
+from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.result.read import FIELDS, STATES
+from softjaw.study.result.record import record
+from softjaw.study.result.store import ResultWriter, create, open_result
+from tests.study.fake_run import fake_plan, fake_result
+from tests.study.formula_results import ANGLES, FORCES, STATIONS, grid_axes, make, window, without_result
+
+
+@pytest.fixture(scope="module")
+def half(tmp_path_factory):
+    """A file with patches in which rows 0 to 9 are solved, 10 failed, and the others are missing."""
+    path, plan = tmp_path_factory.mktemp("read") / "half.hdf", fake_plan()
+    create(path, plan.layout, plan.header)
+    writer = ResultWriter(path, plan.layout, None)
+    for row in range(10):
+        writer.write(row, record(plan.layout, fake_result(row)))
+    writer.fail(10, "no contact at this force")
+    writer.close()
+    return path
+
+
+def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):
+    ds = softjaw.open(make(tmp_path / "a.hdf"))
+    assert isinstance(ds, xr.Dataset)
+    assert ds.e_n.dims == ("station", "angle", "normal_force", "model")
+    assert ds.finger_f_x_max.dims == ("station", "angle", "normal_force", "finger", "model")
+    for name, values in zip(ds.e_n.dims, (STATIONS, ANGLES, FORCES), strict=False):
+        assert ds[name].values.tolist() == values.tolist()
+    here = ds.e_n.sel(station=0.02, angle=0, normal_force=4.0, method="nearest")
+    assert here.sel(model="flat") == pytest.approx(1.1 * float(here.sel(model="curved")))
+    assert (ds.e_n.units, ds.station.units, ds.angle.units, ds.normal_force.units) == ("m", "m", "rad", "N")
+    for name, variable in ds.data_vars.items():
+        assert variable.attrs["long_name"], name
+        assert isinstance(variable.attrs["units"], str), name
+    assert ds.attrs["digest"] == "d" * 64
+    assert "elliptic_cylinder" in ds.attrs["scene"]
+
+
+def test_every_dataset_of_the_file_is_reached_and_has_its_numbers(half):
+    ds = softjaw.open(half)
+    with open_result(half) as result:
+        done = result.status == DONE
+        for d in result.layout.datasets:
+            path = d.path.removeprefix("/study/")
+            group, _, name = path.partition("/")
+            if group in ("map", "checksums", "status", "wrenches", "patch", "derived") or path in FIELDS:
+                continue
+            one = name if group not in ("fingers", "checks", "effects") else f"{group[:-1]}_{name}"
+            if name in ("curved", "flat", "projected"):
+                found = ds[group].sel(model=name)
+            else:
+                found = ds[one if one in ds and group not in ("limit_surface", "work") else f"{group}_{name}"]
+            values = result.read(path)
+            assert np.array_equal(found.values[done], np.nan_to_num(values)[done] if name == "flags" else values[done],
+                                  equal_nan=True), path  # fmt: skip
+
+
+def test_cases_without_a_result_have_no_values_but_a_state_and_a_message(half):
+    ds = softjaw.open(half)
+    status = ds.status.values.ravel()
+    assert status.tolist() == [DONE] * 10 + [FAILED] + [MISSING] * (status.size - 11)
+    assert ds.status.attrs["flag_meanings"] == STATES
+    for name, variable in ds.data_vars.items():
+        if variable.dtype.kind == "f" and variable.dims[:3] == ds.status.dims:
+            assert np.isnan(variable.values.reshape(status.size, -1)[10:]).all(), name
+    assert ds.message.values.ravel()[10] == "no contact at this force"
+    assert ds.message.values.ravel()[3] == "a note"
+    assert (ds.flags.values.ravel()[10:] == 0).all()
+
+
+def test_flags_are_bits_that_the_attributes_name(tmp_path):
+    ds = softjaw.open(make(tmp_path / "a.hdf", flags__flags=float(Flag.SLIPS | Flag.COARSE)))
+    words = dict(zip(ds.flags.attrs["flag_masks"], ds.flags.attrs["flag_meanings"], strict=True))
+    assert {words[m] for m in words if int(ds.flags[0, 0, 0]) & m} == {"slips", "coarse"}
+
+
+def test_failures_and_what_is_derived(tmp_path):
+    axes = grid_axes()
+    path = make(tmp_path / "a.hdf", axes=axes, derived=window(axes), derived__force_high=4.0, **without_result(2, "no"))
+    ds = softjaw.open(path)
+    assert ds.force_high.dims == ("station", "angle")
+    assert bool(np.isnan(ds.quality[2, 1, 1]).all())
+    assert int(np.isnan(ds.quality).sum()) == 3
+
+
+def test_patches_are_read_on_demand_at_positions(half):
+    one = softjaw.read_patch(half, station=1, angle=0, normal_force=1)
+    with open_result(half) as result:
+        stored = result.patch(result.row(1, 0, 1))
+    for name, values in stored.items():
+        assert np.array_equal(one[name].values, values, equal_nan=True)
+    assert one.pressure.dims == ("finger", "face")
+    some = softjaw.read_patch(half, angle=0, normal_force=slice(1, 3))
+    assert some.normal.dims == ("station", "normal_force", "finger", "face", "component")
+    assert np.array_equal(some.normal.values[1, 0], one.normal.values)
+    assert np.isnan(some.pressure.values[3:]).all()
+    assert some.pressure.units == "Pa"
+
+
+def test_what_is_no_sound_result_file_is_refused(half, tmp_path):
+    with pytest.raises(StudyError) as refused:
+        softjaw.open(tmp_path / "none.hdf")
+    assert refused.value.code == OTHER_FILE
+    torn = tmp_path / "torn.hdf"
+    torn.write_bytes(half.read_bytes())
+    with h5py.File(torn, "r+") as file:
+        file["study/e_n/flat"][0, 0, 0] += 1
+    with pytest.raises(StudyError) as refused:
+        softjaw.open(torn)
+    assert refused.value.code == OTHER_FILE
+    with pytest.raises(KeyError):
+        softjaw.read_field(half, "wall/place")
+
+
+@pytest.mark.launches
+def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
+    code = (
+        "import sys, softjaw; from softjaw.study.cli import main; main(['status', sys.argv[1]]);"
+        "sys.exit(bool({'xarray', 'pandas', 'mpi4py', 'petsc4py'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code, half], check=False, capture_output=True).returncode == 0
