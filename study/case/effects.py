@@ -38,7 +38,7 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 @dataclass(frozen=True)
 class SheetLevel:
-    """Level of the sheets of a scene; ``reason`` is one of `study.result.quantities.REASONS`.
+    """Level of the sheets of a scene; ``reason`` is one of `study.quantities.REASONS`.
 
     ``compliance`` is the mean deflection of the sheet under an even pressure over that of the pad.
     """
