@@ -20,10 +20,10 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.polytope import polytope_volume
-from softjaw.study.case import coupling_level, model, sheet_level, wall
+from softjaw.study.case import effects, model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.limit_surface import Bound, bound
+from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
 from softjaw.study.case.solving import Solver, solver
 from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
@@ -65,9 +65,9 @@ SHELLS = "object: linear or nonlinear shell"
 PANELS = {  # of an effect: threshold, and what the axis says
     "object: rigid or shell": (wall.STIFF, "dent / travel"),
     SHELLS: (wall.SMALL_DENT, "dent / wall thickness"),
-    "sheet": (sheet_level.STIFF, "compliance over that of the pad"),
+    "sheet": (effects.STIFF_SHEET, "compliance over that of the pad"),
     "friction": (TARGET, "1 - F_N / S"),
-    "friction-pressure coupling": (coupling_level.SMALL, "traction left out / pressure"),
+    "friction-pressure coupling": (effects.SMALL_TRACTION, "traction left out / pressure"),
     "limit surface": (0.0, "radial misfit"),  # quality, not e_n; the quartic is never skipped
 }
 EXACT = "model size"
@@ -116,7 +116,7 @@ def off(low: float, high: float) -> float:
     return abs(low / high - 1.0)
 
 
-def volume(contact: Contact, found: Bound) -> float:
+def volume(contact: Contact, found: SurfaceFit) -> float:
     """Quality of two such contacts face to face with a fitted surface over that with the exact one."""
     w = friction_wrench(contact.local, fibonacci_twists(HULL, contact.rho), 1.0)[:, [0, 1, 5]]
     V, A = polytope_volume(np.vstack([w, -w]) / contact.limits["curved"].S / [1, 1, contact.rho])
@@ -129,7 +129,7 @@ def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
     yield "friction", name, 1.0 - F_N / S, off(e_n(contacts, "flat"), e_n(contacts))
     c = contacts[0]
     for level in SURFACES:
-        found = bound(c.local, c.rho, c.unit_limits["curved"], "curved", LimitSurface(model=level))
+        found = fit_surface(c, "curved", LimitSurface(model=level))
         yield "limit surface", f"{name}, {level}", found.own.Erad, off(volume(c, found), 1.0)
 
 
@@ -145,7 +145,7 @@ def rigid_scenes() -> Iterator[tuple[str, Scene]]:
 def rigid_rows() -> Iterator[Row]:
     """Every effect but the object's."""
     for label, scene in rigid_scenes():
-        compliance = sheet_level.sheet_level(scene).compliance
+        compliance = effects.sheet_level(scene).compliance
         plain = {"sheet": "rigid"}
         foam, plate = climb(scene, **plain), climb(scene, sheet="elastic")
         coupled = climb(scene, **plain, friction_pressure_coupling="tangential")
@@ -157,7 +157,7 @@ def rigid_rows() -> Iterator[Row]:
             if key in plate:
                 yield "sheet", name, compliance, off(e_n(contacts), e_n(plate[key]))
             if key in coupled:
-                left = max(coupling_level.neglected_traction(c.state, scene.friction.mu) for c in contacts)
+                left = max(effects.neglected_traction(c.state, scene.friction.mu) for c in contacts)
                 yield "friction-pressure coupling", name, left, off(e_n(contacts), e_n(coupled[key]))
             if key in part and key in whole:
                 yield EXACT, name, 0.0, off(e_n(part[key]), e_n(whole[key]))

@@ -88,7 +88,7 @@ def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
     from softjaw.study.accuracy.cost.stored import overrides
     from softjaw.study.case.build import warnings
-    from softjaw.study.case.reach import check_poses
+    from softjaw.study.case.model import check_poses
     from softjaw.study.run.plan import make_plan
 
     _check_petsc(dict(scene.petsc))

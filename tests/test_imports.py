@@ -19,7 +19,8 @@ ALLOWED = {
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
-    "study": {"pydantic", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules", "xarray"} | NUMERICS,
+    "study": {"pydantic", "jinja2", "plotly", "rich", "matplotlib", "shtab", "mpi4py", "h5py", "pyvista", "vtkmodules",
+              "xarray"} | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
@@ -38,10 +39,10 @@ DOORS = {
         "study/result/result_writer.py",
         "study/result/guarded.py",
         "study/result/vtkhdf.py",
-        "study/accuracy/cost/file.py",
+        "study/accuracy/cost/study.py",
     },
-    "pyvista": PICTURES,
-    "vtkmodules": PICTURES | {"study/patch/vtk_file.py"},
+    "pyvista": PICTURES | {"study/patch/reading.py"},
+    "vtkmodules": PICTURES | {"study/patch/reading.py"},
 }
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
-from softjaw.friction.wrench import FrictionLimits, friction_wrench
+from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.flag import FitError
 from softjaw.lsfit.misfit import Misfit, misfit
@@ -26,8 +26,8 @@ from softjaw.lsfit.span import CollapsedFitError, sphere_motions
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.lsfit.tilted import TiltedEllipsoid
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
+from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
-from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import LimitSurface as Choice
 
 FloatArray = NDArray[np.float64]
@@ -37,7 +37,7 @@ ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.quantities says
 
 
-class Bound(NamedTuple):
+class SurfaceFit(NamedTuple):
     """Limit surface of a contact in one friction model, with what it was fitted to.
 
     ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``own`` is the misfit on those
@@ -54,44 +54,55 @@ class Bound(NamedTuple):
     misfit: Misfit
     ellipsoid_misfit: Misfit
 
+    def body(self, mu: float) -> LimitSurface:
+        """The surface in ``(f_x, f_y, tau_z)`` per unit of S [-, -, m]."""
+        return self.surface.scaled(mu * np.array([1.0, 1.0, self.rho]))
 
-def bound(patch: ContactPatch, rho: float, limits: FrictionLimits, model: str, choice: Choice) -> Bound:
-    """Fit the surface that a scene asks for to a contact's wrenches.
+
+def fit_surface(contact: Contact, model: str, choice: Choice) -> SurfaceFit:
+    """Fit the surface that a scene's section ``[limit_surface]`` asks for to a contact's wrenches."""
+    return fit_surfaces(contact, model, [choice.model], choice.objective, choice.samples)[choice.model]
+
+
+def fit_surfaces(
+    contact: Contact, model: str, kinds: Sequence[str], objective: str, samples: int
+) -> dict[str, SurfaceFit]:
+    """Fit limit surfaces to the wrenches of a contact in one friction model.
 
     Parameters
     ----------
-    patch : ContactPatch
-        ``n`` faces in the contact frame.
-    rho : float
-        Length of the contact [m].
-    limits : FrictionLimits
-        Largest friction for mu = 1.
+    contact : Contact
     model : str
         Friction model.
-    choice : LimitSurface
-        Section ``[limit_surface]`` of the scene.
+    kinds : sequence of str
+        As a scene names them in ``limit_surface.model``.
+    objective : str
+        ``least_squares`` or ``zhou``.
+    samples : int
+        Motions that are fitted to; others, as many as `INDEPENDENT`, judge the fits.
     """
-    k = choice.samples
-    twist = _motions(k) / [1.0, 1.0, rho]
-    wrench = friction_wrench(patch, twist, 1.0, model)
+    rho, limits = contact.rho, contact.unit_limits[model]
+    twist = _motions(samples) / [1.0, 1.0, rho]
+    wrench = friction_wrench(contact.local, twist, 1.0, model)
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
-    surface, certificate = fitted(ellipsoid, W[:k], T[:k], choice.model, choice.objective)
-    judged = [_misfit(s, W[part], T[part]) for s, part in ((surface, slice(k)), (surface, slice(k, None)))]
-    again = judged[1] if surface is ellipsoid else _misfit(ellipsoid, W[k:], T[k:])
-    return Bound(rho, ellipsoid, surface, certificate, wrench[:k], *judged, again)
-
-
-def judging_twists(fitted_to: int, rho: float) -> FloatArray:
-    """Motions that are not among those of a fit to ``fitted_to`` motions, evenly spread too."""
-    return fibonacci_twists(INDEPENDENT + (fitted_to == INDEPENDENT), rho)
+    own, others = slice(samples), slice(samples, None)
+    reference = _misfit(ellipsoid, W[others], T[others])
+    found = {}
+    for kind in kinds:
+        surface, certificate = fitted(ellipsoid, W[own], T[own], kind, objective)
+        judged = reference if surface is ellipsoid else _misfit(surface, W[others], T[others])
+        on_own = _misfit(surface, W[own], T[own])
+        found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], on_own, judged, reference)
+    return found
 
 
 @lru_cache(maxsize=8)
 def _motions(fitted_to: int) -> FloatArray:
-    """Motions of the fit and those that it is judged by, for a contact of length 1."""
-    return np.vstack([fibonacci_twists(fitted_to, 1.0), judging_twists(fitted_to, 1.0)])
+    """Motions of the fit and those, evenly spread too, that it is judged by, for a contact of length 1."""
+    judging = INDEPENDENT + (fitted_to == INDEPENDENT)
+    return np.vstack([fibonacci_twists(fitted_to, 1.0), fibonacci_twists(judging, 1.0)])
 
 
 def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objective: str) -> tuple[LimitSurface, int]:
@@ -114,9 +125,9 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
         return ellipsoid, STANDS_IN
 
 
-def fit_flag(bounds: Sequence[Mapping[str, Bound]]) -> Flag:
+def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> Flag:
     """`Flag.NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
-    return Flag.NO_FIT * any(b.certificate == STANDS_IN for own in bounds for b in own.values())
+    return Flag.NO_FIT * any(b.certificate == STANDS_IN for own in fits for b in own.values())
 
 
 def matrix(surface: LimitSurface) -> FloatArray:
@@ -131,12 +142,6 @@ def coefficients(surface: LimitSurface) -> FloatArray:
     return surface.coefficients if isinstance(surface, Quartic) else np.full(15, np.nan)
 
 
-def dropped_share(wrench: FloatArray, rho: float) -> float:
-    """Mean share of a wrench that its three components f_z, tau_x and tau_y make up, of ``wrench (m, 6)``."""
-    w = wrench / [1, 1, 1, rho, rho, rho]
-    return float((np.linalg.norm(w[:, 2:5], axis=1) / np.linalg.norm(w, axis=1)).mean())
-
-
 def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
     """Misfit with the angle in rad; NaN where a flat body has no value at the samples."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -145,9 +150,11 @@ def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
     return Misfit(*found) if np.isfinite(found).all() else Misfit(np.nan, np.nan, np.nan)
 
 
-def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[str, Bound]]) -> dict[str, Any]:
+def surface_values(
+    contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], sampled: bool, six: bool
+) -> dict[str, Any]:
     """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
-    every = [[b for b in own.values()] for own in bounds]
+    every = [list(own.values()) for own in fits]
     per_model = {
         "matrix": lambda b: matrix(b.surface),
         "coefficients": lambda b: coefficients(b.surface),
@@ -158,11 +165,13 @@ def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[
         "misfit_ellipsoid": lambda b: b.ellipsoid_misfit,
     }
     found = {f"limit_surface/{name}": [[of(b) for b in own] for own in every] for name, of in per_model.items()}
-    curved = [own["curved"] for own in bounds]
-    if scene.effects.wrench == "6-D":
+    curved = [own["curved"] for own in fits]
+    if six:
         found |= six_values(contacts)
-    if scene.sampled:
-        found["wrenches/wrench"] = [[scene.friction.mu * b.wrench[:, [0, 1, 5]] for b in own] for own in every]
+    if sampled:
+        found["wrenches/wrench"] = [
+            [c.mu * b.wrench[:, [0, 1, 5]] for b in own] for c, own in zip(contacts, every, strict=True)
+        ]
     return found | {
         "limit_surface/rho": [b.rho for b in curved],
         "maps/misfit": np.max([b.misfit.Erad for b in curved]),
@@ -170,7 +179,7 @@ def surface_values(scene: Scene, contacts: Sequence[Any], bounds: Sequence[dict[
     }
 
 
-def six_values(contacts: Sequence[Any]) -> dict[str, Any]:
+def six_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
     found = [six_ellipsoid(c.local, c.rho, c.unit_limits["curved"].S) for c in contacts]
     names = ("matrix_6d", "rank_6d", "misfit_6d")

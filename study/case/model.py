@@ -1,23 +1,31 @@
-"""From a scene to the finite element model of one finger: object, pad, place of first touch, symmetry."""
+"""From a scene to the finite element model of one finger: pad, place of first touch, symmetry, contact solver."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.contact.friction_coupling import CoupledProblem, way
+from softjaw.fem.contact.load_stepping import Settings, Stepping
+from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
+from softjaw.fem.objects.gap import Gap as PointGap
 from softjaw.fem.objects.gap import GapFunction, GapObject
 from softjaw.fem.objects.pose import Pose
-from softjaw.fem.objects.touch import first_touch
+from softjaw.fem.objects.touch import NoContactError, first_touch
 from softjaw.fem.pad.mesh import Pad
-from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.case.build import build_object, pad_material, pad_shape, sheet
+from softjaw.study.case.candidates import candidates
+from softjaw.study.case.effects import sheet_level
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
+MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known
 
 
@@ -114,3 +122,92 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     if wanted == "half" and all(usable):
         return False, True
     return usable
+
+
+def settings(scene: Scene) -> Settings:
+    """When a solve ends and a step is given up."""
+    return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
+
+
+def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
+    """Pad on its sheet; ``rule`` collocates the gaps."""
+    return pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
+
+
+def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    """Pad on its object, with friction where the scene wants it to act back."""
+    elements, rule = pad_shape(scene.gripper, coarser).elements, scene.accuracy.contact
+    symmetry = usable_symmetry(scene, finger, elements)
+    wanted, nodal = (pad_of(scene, symmetry, r, coarser) for r in (rule, "nodal"))
+    fallback = None if nodal is wanted else nodal
+    if scene.effects.friction_pressure_coupling == "tangential":
+        problem = partial(CoupledProblem, mu=scene.friction.mu)
+        steps = {"problem_of": problem, "way": way, "stepping": Stepping}
+        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), **steps)
+    return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))
+
+
+@dataclass(frozen=True, eq=False)
+class _AsItIs:
+    """An object that is touched and not pressed: the region that a mesh would sample for a contact is not needed."""
+
+    object: GapObject
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Corners ``(2, 3)`` [m]."""
+        return self.object.bounds
+
+    def gap(self, x: np.ndarray) -> PointGap:
+        """Signed distance with its derivatives."""
+        return self.object.gap(x)
+
+    def near(self, pose: Pose, lower: np.ndarray, upper: np.ndarray) -> _AsItIs:
+        """Return the object itself."""
+        return self
+
+
+def check_poses(scene: Scene, points: list[Scene]) -> None:
+    """Refuse explicit poses of which a pad passes the object; stations lie on the object anyway.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene as it stands in the file.
+    points : list of Scene
+        The scenes of all points of the sweep.
+
+    Raises
+    ------
+    StudyError
+        With the labels of the poses.
+    """
+    if not scene.candidates.poses:
+        return
+    places = candidates(scene)[: MOST_TRIED // 2]
+    missed: dict[int, str] = {}
+    tried = 0
+    for shape, size in dict.fromkeys((point.object, point.gripper.pad_size) for point in points):
+        obj = _AsItIs(build_object(shape))
+        for number, place in enumerate(places):
+            if number not in missed and tried < MOST_TRIED:
+                tried += 2
+                passing = [k + 1 for k, pose in enumerate(place.poses) if _passes(obj, pose, size)]
+                if passing:
+                    missed[number] = f"finger {passing[0]} passes" if len(passing) == 1 else "both fingers pass"
+    if missed:
+        lines = [
+            f"candidates.poses[{i}]: found '{places[i].label}', where {who} the object; expected a line of"
+            " approach on which both pads meet it; change point_mm (in mm, in the object's frame) or approach"
+            for i, who in list(missed.items())[:MOST_NAMED]
+        ]
+        more = [f"and {len(missed) - MOST_NAMED} more poses pass the object"] if len(missed) > MOST_NAMED else []
+        raise StudyError(USAGE, "\n".join(lines + more))
+
+
+def _passes(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> bool:
+    try:
+        approach(obj, pose, size)
+    except NoContactError:
+        return True
+    return False

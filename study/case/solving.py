@@ -1,17 +1,17 @@
-"""Solvers of one candidate: both fingers on a rigid object, each by itself, or on a thin wall, together.
+"""Solvers of one candidate and the contacts that they give: each finger by itself, or both on a thin wall.
 
 Either climbs the ladder of forces and gives the contacts of every force; what comes after does not ask which it was.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
-from softjaw.fem.contact.extract import half_turned, mirrored
+from softjaw.fem.contact.extract import extract, half_turned, mirrored
 from softjaw.fem.contact.press import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.pad.spring_bed import SpringBed
@@ -21,13 +21,70 @@ from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.candidates import turn_of_pose
-from softjaw.study.case.contact import Contact
-from softjaw.study.case.model import Finger
-from softjaw.study.case.pressing import pad_of, press_of, settings
+from softjaw.study.case.contact import ALIKE, Contact
+from softjaw.study.case.model import Finger, pad_of, press_of, settings
 from softjaw.study.case.wall import LINEAR, RIGID, Level, choose_level, thin_body, wall_values
+from softjaw.study.flags import Flag
 from softjaw.study.scene import Scene
 
+OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
+FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
+LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+
+
+class PressedContact(Contact):
+    """A contact that was solved: one finger at one force, its patch in the pad's frame.
+
+    ``seen`` brings the patch of the state into the finger's own frame where another one was solved.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        finger: Finger,
+        state: Pressed,
+        seen: Callable[[ContactPatch], ContactPatch] | None = None,
+    ) -> None:
+        patch = extract(state.pad, state)
+        super().__init__(seen(patch) if seen else patch, scene.friction.mu, finger.pose, whole_face=True)
+        self.finger, self.state = finger, state
+        self.nodal_instead = state.pad.contact != scene.accuracy.contact
+
+    def of(self, finger: Finger) -> PressedContact:
+        """The same contact of another finger, which stands where the object looks the same."""
+        _ = self.ellipsoids, self.tau_pure  # computed once for both
+        other = self.at(finger.pose)
+        other.finger = finger
+        return other
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
+        shape, law = self.state.pad.shape, self.state.pad.material
+        (n, m, _), k = shape.elements, shape.per_side
+        loaded = self.loaded.reshape(n, k, m, k)
+        widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
+        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
+        overlaps = self.state.checks.overlap > OVERLAP * self.state.travel
+        return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
+
+    @property
+    def free_front(self) -> float:
+        """How far the unloaded part of the front has come beyond first touch [m]."""
+        return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
+
+
+def state_flags(contacts: Sequence[PressedContact]) -> Flag:
+    """Flags of the solved states of both fingers."""
+    one, two = contacts
+    between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
+    found = Flag.OVERLAP * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
+    found |= Flag.UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
+    found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
+    for c in contacts:
+        found |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
+    return found
 
 
 @dataclass(frozen=True)
@@ -37,7 +94,7 @@ class Solved:
     ``spent`` are the states whose work was done for it; ``grips`` those of both fingers on the wall, if it has one.
     """
 
-    contacts: list[list[Contact]]
+    contacts: list[list[PressedContact]]
     spent: list[Pressed]
     grips: list[Gripped]
 
@@ -88,9 +145,8 @@ class OnRigid:
         """See `Solver`."""
         ladders = (zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses)
         for states in zip(*ladders, strict=True):
-            contacts = [
-                [Contact(self.scene, f, state) for state in own] for f, own in zip(self.fingers, states, strict=False)
-            ]
+            pairs = zip(self.fingers, states, strict=False)
+            contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
             if self.shared:  # an image finger has its partner's states; only its place differs
                 contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
             yield Solved(contacts, [s for own in states for s in own], [])
@@ -124,10 +180,10 @@ class OnWall:
         shell = self.grips[0].problem.model.shell
         return wall_values(self.scene, self.held[0], solved.grips[0], shell)
 
-    def _contacts(self, held: Grasp, state: Gripped) -> list[Contact]:
+    def _contacts(self, held: Grasp, state: Gripped) -> list[PressedContact]:
         """Contacts of both fingers in their own frames."""
         contacts = [
-            Contact(self.scene, f, own, half_turned if turned else None)
+            PressedContact(self.scene, f, own, half_turned if turned else None)
             for f, own, turned in zip(self.fingers, state.fingers, held.flipped, strict=False)
         ]
         if len(state.fingers) == 1:
@@ -136,7 +192,7 @@ class OnWall:
             def image(patch: ContactPatch) -> ContactPatch:
                 return mirrored(own.pad, half_turned(patch) if held.flipped[0] else patch)
 
-            contacts.append(Contact(self.scene, self.fingers[1], own, image))
+            contacts.append(PressedContact(self.scene, self.fingers[1], own, image))
         return contacts
 
     def destroy(self) -> None:

@@ -1,20 +1,45 @@
-"""The answer about patches from elsewhere: one record in SI units, for programs, that the text is made from."""
+"""What patches from elsewhere can carry: one record in SI units, for programs, that the text is made from."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from softjaw.fem.objects.pose import Pose
 from softjaw.friction.frame import FrameFlag
-from softjaw.friction.orientation import wound
-from softjaw.study.patch.evaluate import SPACE, Judged, minority, told_of
-from softjaw.study.patch.grasp import ANTIPODAL, Grasp
+from softjaw.friction.orientation import behind, wound
+from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
+from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.body import ExactSurface
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.grasp import grasp_score
+from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
+from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
+from softjaw.study.flags import Flag
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.patch.reading import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
+from softjaw.study.scene.problems import Problem
 
+SURFACES = {  # as a scene names them, and in the text
+    "three_motions": "ellipsoid, three motions",
+    "axis_aligned": "ellipsoid, axis-aligned",
+    "full": "ellipsoid, full",
+    "quartic": "convex quartic",
+}
+FITTED_ON = 500  # motions; a fit is judged on others
+EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
+EQUAL = 1e-6  # relative difference of extents, and difference of cosines, that decide nothing
+SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
+FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands
+FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", "e_n": "e_n",
+            "e_n_projected": "e_n_projected"}  # fmt: skip
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",
     "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", "e_n": "m", "e_n_projected": "m",
@@ -37,6 +62,7 @@ DEFINITIONS = {
     "epsilon": "radius of the largest ball round 0 in it, for a centre of mass halfway between the contacts; lower and"
     " upper bound, which a quartic leaves apart",
 }
+SCORES = ("quality", "epsilon")
 FRAME = {
     FrameFlag.CYCLE: "the contact normal is a mean, because its search went in a circle between faces",
     FrameFlag.HOLE: "the centre of pressure lies over a hole of the loaded faces, so the nearest face gave the contact"
@@ -47,147 +73,281 @@ FRAME = {
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """Patches, the grasp by them if there is one, and how they were judged."""
+class JudgedPatch:
+    """A patch from a file and all that friction can carry there.
 
-    mu: float
-    patches: Sequence[Judged]
-    grasp: Grasp | None
+    Parameters
+    ----------
+    read : ReadPatch
+        The patch in the file's coordinates.
+    contact : Contact
+        With its contact frame and friction limits.
+    x_given : bool
+        Whether the user gave the direction of x.
+    tau_pure : mapping
+        For each friction model the largest torque without a net force [N m].
+    fits : mapping
+        For each friction model the fitted surfaces by kind.
+    exact : mapping
+        For each friction model the limit surface itself, per unit of S.
+    """
+
+    read: ReadPatch
+    contact: Contact
+    x_given: bool
+    tau_pure: Mapping[str, float]
+    fits: Mapping[str, Mapping[str, SurfaceFit]]
+    exact: Mapping[str, ExactSurface]
+
+    @property
+    def rank(self) -> int:
+        """Dimension of the loads that the contact can carry, 3 if nothing is missing."""
+        return self.exact["curved"].rank
+
+    def surface(self, model: str, kind: str) -> Any:
+        """A limit surface in ``(f_x, f_y, tau_z)`` per unit of S; ``kind`` is ``exact`` or one of `SURFACES`."""
+        return self.exact[model] if kind == "exact" else self.fits[model][kind].body(self.contact.mu)
 
 
-def remarks(answer: Answer) -> list[str]:
-    """What the reader should know, in sentences."""
-    told = []
-    several = len(answer.patches) > 1
-    for judged in answer.patches:
-        name = f"{judged.read.file}: " if several else ""
-        told += [note if note.startswith(judged.read.file) else name + note for note in _patch_remarks(judged)]
-    if answer.grasp is not None:
-        told += _grasp_remarks(answer.grasp, several)
-    return told
+def judge(read: ReadPatch, mu: float, long_side: FloatArray | None = None) -> JudgedPatch:
+    """Frame, friction and limit surfaces of a patch.
+
+    Parameters
+    ----------
+    read : ReadPatch
+        Loaded faces in the file's coordinates.
+    mu : float
+        Coulomb friction coefficient [-].
+    long_side : (3,) array, optional
+        Direction that becomes x after projection on the contact plane; by default the longer direction of the patch.
+
+    Raises
+    ------
+    StudyError
+        If the normals point to opposite sides, or ``long_side`` along them.
+    """
+    x_hint = principal_direction(read.patch) if long_side is None else long_side
+    try:
+        contact = Contact(read.patch, mu, x_hint=x_hint)
+    except NoContactError as error:
+        raise StudyError(USAGE, f"{read.file}: {error}") from error
+    except ValueError as error:
+        raise StudyError(USAGE, f"{read.file}: --long-side: {str(error).replace('x_hint', 'the direction')}") from error
+    if contact.frame.flag & FrameFlag.ORIENTATION:
+        turned = _minority(behind(read.patch.normal, contact.frame.axes[2]))
+        found = f"normals in {_count(read, turned)} that oppose their neighbours"
+        remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
+        refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
+
+    def exact(model: str) -> ExactSurface:
+        share = mu / contact.limits[model].S
+        return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, EXACT)
+
+    return JudgedPatch(
+        read, contact, long_side is not None,
+        tau_pure={m: pure_torque(contact.local, mu, m) for m in MODELS},
+        fits={m: fit_surfaces(contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS},
+        exact={m: exact(m) for m in MODELS},
+    )  # fmt: skip
 
 
-def _patch_remarks(judged: Judged) -> list[str]:
-    frame, told = judged.frame, list(judged.read.notes)
-    if not judged.x_given:
-        told.append("x follows the longer direction of the patch, because no --long-side was given")
-    for flag, sentence in FRAME.items():
-        if frame.flag & flag:
-            share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
-            told.append(sentence + share * (flag == FrameFlag.OVERHANG))
-    if frame.flag & FrameFlag.WINDING:
-        against = told_of(judged.read, minority(wound(judged.read.patch) < 0))
-        told.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
+def _minority(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The chosen ones, or the others where the chosen ones are more than half."""
+    return ~chosen if 2 * chosen.sum() > len(chosen) else chosen
+
+
+def _count(read: ReadPatch, chosen: NDArray[np.bool_]) -> str:
+    """How many of the loaded faces ``(n,)`` are chosen, and where the first of them stands in the file."""
+    first = f", the first in {read.place(int(np.argmax(chosen)))}" if chosen.any() else ""
+    return f"{int(chosen.sum())} of {len(chosen)} loaded faces{first}"
+
+
+def principal_direction(patch: ContactPatch) -> FloatArray:
+    """Direction ``(3,)`` in which the loaded faces extend most, across their mean normal.
+
+    Where no direction is longer it is the file's axis that lies most nearly in the contact plane. Its largest component
+    is positive; of equally large ones the first.
+    """
+    faces = patch.loaded
+    N = faces.load @ faces.normal
+    N = N / max(np.linalg.norm(N), np.finfo(float).tiny)
+    across = np.eye(3) - np.outer(N, N)
+    offset = (faces.centroid - faces.area @ faces.centroid / faces.area.sum()) @ across
+    spread, directions = np.linalg.eigh(offset.T @ (faces.area[:, None] * offset))
+    if spread[2] - spread[1] <= EQUAL * spread[2]:
+        return np.eye(3)[np.argmax(np.abs(N) <= np.abs(N).min() + EQUAL)]
+    longest = directions[:, 2]
+    return longest * np.sign(longest[np.argmax(np.abs(longest) >= np.abs(longest).max() - EQUAL)])
+
+
+# --- grasp ------------------------------------------------------------------------------------------------------------
+
+
+def grasp_record(
+    one: JudgedPatch,
+    two: JudgedPatch | None,
+    kind: str,
+    distance: float | None = None,
+    object_length: float | None = None,
+    contact_length: float | None = None,
+) -> dict[str, Any]:
+    """Score of a grasp by two patches, for unit normal forces (S = 1), in SI units.
+
+    Parameters
+    ----------
+    one, two : JudgedPatch
+        The contacts, in the coordinates of one object; without ``two`` the second is like the first, half a turn
+        about x away from it.
+    kind : str
+        Limit surface, one of `SURFACES`.
+    distance : float, optional
+        Between the contacts, where ``two`` is not given [m].
+    object_length, contact_length : float, optional
+        Lengths by which torques of forces and torques about normals are divided; by default the distance, and the
+        longer side of the larger contact [m].
+    """
+    both = one, two or one
+    contacts = one.contact, two.contact if two else _opposite(one.contact, float(distance or 0.0))
+    if two is not None:
+        check_facing(contacts, (one.read.file, two.read.file))
+    O1, O2 = (c.origin for c in contacts)
+    d = float(np.linalg.norm(O2 - O1))
+    lengths = object_length or d, contact_length or max(c.rho for c in contacts), (O1 + O2) / 2
+    scores = {}
     for model in MODELS:
-        failed = [name for name, fit in judged.surfaces[model].items() if fit.stands_in]
-        if failed:
-            told.append(f"{model} model: no {' and no '.join(failed)} surface could be fitted, the ellipsoid of three "
-                        "motions stands in")  # fmt: skip
-    if judged.rank < SPACE:
-        space = {1: "one line", 2: "a plane"}.get(judged.rank, "a point")
-        told.append(f"the loads that friction can carry fill {space} only (rank {judged.rank}): the limit surface has "
-                    "no volume and no fit is judged")  # fmt: skip
-    return told
-
-
-def _grasp_remarks(grasp: Grasp, two_files: bool) -> list[str]:
-    told = []
-    if grasp.misalignment > ANTIPODAL:
-        told.append(f"the contacts are {np.degrees(grasp.misalignment):.2g} deg from antipodal")
-    if grasp.slips:
-        told.append("the line that joins the contacts leaves a friction cone: the grasp slips as it stands")
-    if not two_files:
-        told.append("the second contact of the grasp is the same patch facing the first, because no --other was given")
-    return told
-
-
-def as_record(answer: Answer) -> dict[str, Any]:
-    """Everything as plain numbers, lists and texts, in SI units; what is not there is None."""
-    grasp = answer.grasp
+        soft = [c.soft(judged.surface(model, kind)) for c, judged in zip(contacts, both, strict=True)]
+        volume, ball = grasp_score(soft, *lengths, with_epsilon=False), epsilon(soft, *lengths)
+        scores[model] = {"quality": volume.quality, "quality_l1": volume.quality_l1}
+        scores[model]["epsilon"] = [ball.lower, ball.upper]
     return {
-        "mu": answer.mu,
-        "patches": [_patch_record(judged) for judged in answer.patches],
-        "grasp": None if grasp is None else _grasp_record(grasp),
-        "remarks": remarks(answer),
+        "surface": kind, "distance": d, "object_length": lengths[0], "contact_length": lengths[1],
+        "misalignment": max(angles(*contacts)), "slips": bool(pose_flags(contacts) & Flag.SLIPS), "score": scores,
+    }  # fmt: skip
+
+
+def _opposite(contact: Contact, distance: float) -> Contact:
+    """The same contact facing this one, half a turn about its x away."""
+    axes, origin = contact.frame.axes, contact.frame.origin
+    turn = axes.T @ FACING @ axes
+    return contact.at(Pose(turn, origin + distance * axes[2] - turn @ origin))
+
+
+def check_facing(contacts: Sequence[Contact], files: Sequence[str]) -> None:
+    """Refuse contacts at one place, and normals that point away from the other contact."""
+    line = contacts[1].origin - contacts[0].origin
+    distance = float(np.linalg.norm(line))
+    if distance <= 1e-9 * max(c.rho for c in contacts):
+        raise StudyError(
+            USAGE,
+            f"--other: {files[1]} has its contact at the same place as {files[0]}; both files have to use the "
+            "coordinates of one object",
+        )
+    pairs = zip(contacts, files, (line, -line), strict=True)
+    away = [file for c, file, to in pairs if c.normal @ to < -EQUAL * distance]
+    expected = "expected the direction in which each finger presses, into the object"
+    if len(away) == 2:
+        found = f"the normals of {away[0]} and {away[1]} point away from each other"
+        raise StudyError(USAGE, f"--other: {found}, {expected}; add --flip-normals")
+    if away:
+        found = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
+        raise StudyError(USAGE, f"--other: {found}, {expected}; turn the normals of {away[0]}")
+
+
+# --- record -----------------------------------------------------------------------------------------------------------
+
+
+def as_record(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> dict[str, Any]:
+    """Everything as plain numbers, lists and texts, in SI units; what is not there is None."""
+    return {
+        "mu": patches[0].contact.mu,
+        "patches": [_patch_record(judged) for judged in patches],
+        "grasp": grasp,
+        "remarks": _remarks(patches, grasp),
         "units": UNITS,
         "definitions": DEFINITIONS,
     }
 
 
-def as_json(answer: Answer) -> str:
+def as_json(record: dict[str, Any]) -> str:
     """The record as one JSON object."""
-    return json.dumps(_plain(as_record(answer)), indent=2, allow_nan=False)
+    return json.dumps(_plain(record), indent=2, allow_nan=False)
 
 
-def _patch_record(judged: Judged) -> dict[str, Any]:
-    patch, frame, limits = judged.read.patch, judged.frame, judged.limits
+def _patch_record(judged: JudgedPatch) -> dict[str, Any]:
+    patch, contact, frame = judged.read.patch, judged.contact, judged.contact.frame
+    names = ("origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share")
+    friction = {}
+    for model, limits in contact.limits.items():
+        friction[model] = {key: getattr(limits, name) for key, name in FRICTION.items() if name}
+        friction[model] = {key: friction[model].get(key, judged.tau_pure[model]) for key in FRICTION}
     return {
         "file": judged.read.file,
         "faces": judged.read.faces,
         "loaded_faces": len(patch.area),
         "area": patch.area.sum(),
         "pressure": patch.pressure.max(),
-        "S": limits["curved"].S,
-        "F_N": limits["curved"].F_N,
-        "rho": judged.rho,
-        "frame": {
-            "origin": frame.origin,
-            "axes": frame.axes,
-            "centre_of_pressure": frame.centre_of_pressure,
-            "flag": int(frame.flag),
-            "overhang_count": frame.overhang_count,
-            "overhang_share": frame.overhang_share,
-        },
+        "S": contact.limits["curved"].S,
+        "F_N": contact.limits["curved"].F_N,
+        "rho": contact.rho,
+        "frame": {name: getattr(frame, name) for name in names} | {"flag": int(frame.flag)},
         "rank": judged.rank,
-        "friction": {
-            model: {
-                "f_x_max": limits[model].f_x,
-                "f_y_max": limits[model].f_y,
-                "tau_z_max": limits[model].tau_z,
-                "tau_pure": judged.tau_pure[model],
-                "e_n": limits[model].e_n,
-                "e_n_projected": limits[model].e_n_projected,
-            }
-            for model in MODELS
-        },
-        "limit_surface": {model: _surface_record(judged, model) for model in MODELS},
+        "friction": friction,
+        "limit_surface": {model: _surfaces_record(judged, model) for model in MODELS},
     }
 
 
-def _surface_record(judged: Judged, model: str) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "exact": {"volume": judged.exact[model].volume, "semi_axes": judged.exact[model].semi_axes}
-    }
-    for name, fit in judged.surfaces[model].items():
-        errors = fit.misfit
-        found[name] = {
-            "volume": fit.surface.volume,
-            "semi_axes": fit.surface.semi_axes,
-            "stands_in": fit.stands_in,
-            "E_1": None if errors is None else errors.E1,
-            "E_rad": None if errors is None else errors.Erad,
-            "E_dir": None if errors is None else np.radians(errors.Edir),
-        }
+def _surfaces_record(judged: JudgedPatch, model: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for kind in ("exact", *SURFACES):
+        surface = judged.surface(model, kind)
+        found[kind] = {"volume": surface.volume, "semi_axes": surface.semi_axes}
+        if kind != "exact":
+            fit = judged.fits[model][kind]
+            errors = fit.misfit if judged.exact[model].rank == SPACE else (None, None, None)
+            found[kind] |= {"stands_in": fit.certificate == STANDS_IN}
+            found[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))
     return found
 
 
-def _grasp_record(grasp: Grasp) -> dict[str, Any]:
-    return {
-        "surface": grasp.surface,
-        "distance": grasp.distance,
-        "object_length": grasp.object_length,
-        "contact_length": grasp.contact_length,
-        "misalignment": grasp.misalignment,
-        "slips": grasp.slips,
-        "score": {
-            model: {
-                "quality": scored.quality,
-                "quality_l1": scored.quality_l1,
-                "epsilon": [scored.epsilon.lower, scored.epsilon.upper],
-            }
-            for model, scored in grasp.scores.items()
-        },
-    }
+def _remarks(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> list[str]:
+    """What the reader should know, in sentences."""
+    remarks = []
+    for judged in patches:
+        name = f"{judged.read.file}: " if len(patches) > 1 else ""
+        remarks += [note if note.startswith(judged.read.file) else name + note for note in _patch_remarks(judged)]
+    if grasp is None:
+        return remarks
+    if grasp["misalignment"] > ANTIPODAL - ALIKE:
+        remarks.append(f"the contacts are {np.degrees(grasp['misalignment']):.2g} deg from antipodal")
+    if grasp["slips"]:
+        remarks.append("the line that joins the contacts leaves a friction cone: the grasp slips as it stands")
+    if len(patches) == 1:
+        remarks.append("the second contact of the grasp is the same patch facing the first, because no --other was "
+                       "given")  # fmt: skip
+    return remarks
+
+
+def _patch_remarks(judged: JudgedPatch) -> list[str]:
+    frame, remarks = judged.contact.frame, list(judged.read.notes)
+    if not judged.x_given:
+        remarks.append("x follows the longer direction of the patch, because no --long-side was given")
+    for flag, sentence in FRAME.items():
+        if frame.flag & flag:
+            share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
+            remarks.append(sentence + share * (flag == FrameFlag.OVERHANG))
+    if frame.flag & FrameFlag.WINDING:
+        against = _count(judged.read, _minority(wound(judged.read.patch) < 0))
+        remarks.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
+    for model, fits in judged.fits.items():
+        failed = [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]
+        if failed:
+            remarks.append(f"{model} model: no {' and no '.join(failed)} surface could be fitted, the ellipsoid of "
+                           "three motions stands in")  # fmt: skip
+    if judged.rank < SPACE:
+        space = {1: "one line", 2: "a plane"}.get(judged.rank, "a point")
+        remarks.append(f"the loads that friction can carry fill {space} only (rank {judged.rank}): the limit surface "
+                       "has no volume and no fit is judged")  # fmt: skip
+    return remarks
 
 
 def _plain(value: Any) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import Any
 
 from softjaw.study.messages import USAGE, StudyError
 
@@ -45,32 +44,22 @@ def answer_text(options: argparse.Namespace) -> str:
     if options.picture and not options.picture.lower().endswith(PICTURES):
         text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
         raise StudyError(USAGE, f"{text}; for numbers write --json and lead the output into a file")
+    from softjaw.study.patch.answer import as_json, as_record, grasp_record, judge
     from softjaw.study.patch.reading import Reading, read_patch
+    from softjaw.study.patch.text import as_text, write_picture
 
     reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
     files = [options.file, *([options.other] if options.other else [])]
-    patches = [read_patch(file, reading) for file in files]
-    return _told(options, patches)
-
-
-def _told(options: argparse.Namespace, patches: list[Any]) -> str:
-    from softjaw.study.patch.answer import Answer, as_json
-    from softjaw.study.patch.evaluate import judge
-    from softjaw.study.patch.grasp import grasp_of
-    from softjaw.study.patch.text import as_text
-
-    judged = [judge(patch, options.mu, options.long_side) for patch in patches]
+    patches = [judge(read, options.mu, options.long_side) for read in [read_patch(file, reading) for file in files]]
     grasp = None
-    if options.other or options.distance:
-        lengths = [None if mm is None else 1e-3 * mm for mm in (options.distance, options.object_length,
-                                                                 options.contact_length)]  # fmt: skip
-        grasp = grasp_of(judged[0], judged[1] if options.other else None, options.mu, options.surface, *lengths)
+    if scored:
+        lengths = (options.distance, options.object_length, options.contact_length)
+        metres = [None if mm is None else 1e-3 * mm for mm in lengths]
+        grasp = grasp_record(patches[0], patches[1] if options.other else None, options.surface, *metres)
     if options.picture:
-        from softjaw.study.patch.picture import write_picture
-
-        write_picture(judged, options.mu, options.surface, Path(options.picture))
-    answer = Answer(options.mu, judged, grasp)
-    return as_json(answer) if options.json else as_text(answer)
+        write_picture(patches, options.surface, Path(options.picture))
+    record = as_record(patches, grasp)
+    return as_json(record) if options.json else as_text(record)
 
 
 def _positive(text: str) -> float:

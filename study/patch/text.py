@@ -1,46 +1,48 @@
-"""The answer about patches as people read it: lengths in mm, angles in degrees, flags as sentences."""
+"""The answer about patches as people read it: the record with lengths in mm and angles in degrees, and a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softjaw.study.patch.answer import DEFINITIONS, UNITS, Answer, as_record
+from softjaw.friction.patch import FloatArray
+from softjaw.study.patch.answer import DEFINITIONS, FRICTION, SCORES, SURFACES, UNITS
 from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
+from softjaw.study.writing import write_file
 
-FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
-SCORES = ("quality", "epsilon")
-NAMES = {
-    "three_motions": "ellipsoid, three motions",
-    "axis_aligned": "ellipsoid, axis-aligned",
-    "full": "ellipsoid, full",
-    "quartic": "convex quartic",
+if TYPE_CHECKING:
+    from softjaw.study.patch.answer import JudgedPatch
+
+AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
+PLANES = ((0, 1), (0, 2), (1, 2))
+LOOK = {
+    "exact": {"color": "#1d2429", "linewidth": 2.2},
+    "three_motions": {"color": "#c05a00", "linestyle": "--"},
+    "axis_aligned": {"color": "#8a5a9e", "linestyle": "-."},
+    "full": {"color": "#2a8c82", "linestyle": ":"},
+    "quartic": {"color": "#12436d", "linestyle": (0, (6, 2))},
 }
 
 
-def as_text(answer: Answer) -> str:
+def as_text(record: dict[str, Any]) -> str:
     """A block for each patch, one for the grasp, what the words mean and what the reader should know."""
-    record = as_record(answer)
-    blocks = [_patch_block(patch, answer.mu) for patch in record["patches"]]
     grasp = record["grasp"]
-    if grasp is None:
-        blocks.append(["no grasp is scored: add --distance MM for two such contacts that face each other, "
-                       "or --other FILE"])  # fmt: skip
-    else:
-        blocks.append(_grasp_block(grasp))
+    blocks = [_patch_block(patch, record["mu"]) for patch in record["patches"]]
+    blocks.append(_grasp_block(grasp) if grasp else ["no grasp is scored: add --distance MM for two such contacts that "
+                                                     "face each other, or --other FILE"])  # fmt: skip
     blocks.append([line for text in record["remarks"] for line in _wrapped(f"note: {text}")])
-    told = {word: text for word, text in DEFINITIONS.items() if grasp or word not in SCORES}
-    blocks.append([line for word, text in told.items() for line in _wrapped(f"{word}: {text}")])
+    words = {word: text for word, text in DEFINITIONS.items() if grasp or word not in SCORES}
+    blocks.append([line for word, text in words.items() for line in _wrapped(f"{word}: {text}")])
     return "\n\n".join("\n".join(lines) for lines in blocks if lines)
 
 
 def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
-    lost = 100 * (1 - patch["F_N"] / patch["S"])
-    frame = patch["frame"]
+    lost, frame = 100 * (1 - patch["F_N"] / patch["S"]), patch["frame"]
     rows = [
         ("S", f"{patch['S']:.4g} N"),
         ("F_N", f"{patch['F_N']:.4g} N, {lost:.3g} % less than S"),
@@ -66,8 +68,8 @@ def _friction_table(patch: dict[str, Any]) -> list[str]:
 def _surface_table(surfaces: dict[str, Any]) -> list[str]:
     exact = surfaces["exact"]["volume"]
     rows = [["limit surface (curved)", "volume / exact", "E_rad [%]", "E_dir [deg]"]]
-    for name, title in NAMES.items():
-        found = surfaces[name]
+    for kind, title in SURFACES.items():
+        found = surfaces[kind]
         errors = [("E_rad", 100.0), ("E_dir", np.degrees(1.0))]
         volume = "-" if not exact else f"{found['volume'] / exact:.4f}"
         rows.append([title, volume, *("-" if found[key] is None else f"{f * found[key]:.3g}" for key, f in errors)])
@@ -76,10 +78,10 @@ def _surface_table(surfaces: dict[str, Any]) -> list[str]:
 
 def _grasp_block(grasp: dict[str, Any]) -> list[str]:
     apart, whole, own = (f"{1e3 * grasp[key]:.4g} mm" for key in ("distance", "object_length", "contact_length"))
-    rows = [[f"grasp ({NAMES[grasp['surface']]})", *MODELS]]
-    found = [grasp["score"][model] for model in MODELS]
-    rows += [["quality", *(_number(scored["quality"]) for scored in found)]]
-    rows += [["epsilon", *(_between(*scored["epsilon"]) for scored in found)]]
+    scores = [grasp["score"][model] for model in MODELS]
+    rows = [[f"grasp ({SURFACES[grasp['surface']]})", *MODELS],
+            ["quality", *(_number(score["quality"]) for score in scores)],
+            ["epsilon", *(_between(*score["epsilon"]) for score in scores)]]  # fmt: skip
     return [*_aligned(rows), f"  contacts {apart} apart, torques over object length {whole} and contact length {own}"]
 
 
@@ -93,7 +95,7 @@ def _wrapped(text: str) -> list[str]:
     return wrap(text, 110, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
-def _vector(v: np.ndarray) -> str:
+def _vector(v: FloatArray) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in np.where(np.abs(v) < 1e-9, 0.0, v)) + ")"
 
 
@@ -103,3 +105,59 @@ def _between(lower: float, upper: float) -> str:
 
 def _number(value: float) -> str:
     return "-" if not np.isfinite(value) else f"{value:.4g}"
+
+
+# --- picture ----------------------------------------------------------------------------------------------------------
+
+
+def write_picture(patches: Sequence[JudgedPatch], kind: str, path: Path) -> None:
+    """Sections of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format.
+
+    Raises
+    ------
+    StudyError
+        With code 5 if the file cannot be written.
+    """
+    from softjaw.study.show import pictures  # loads matplotlib, which the text does not need
+
+    with pictures.style():
+        drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))
+        for row, judged in zip(axes, patches, strict=True):
+            for place, plane in zip(row, PLANES, strict=True):
+                place.axhline(0, color=pictures.SOFT, linewidth=0.4)
+                place.axvline(0, color=pictures.SOFT, linewidth=0.4)
+                for name in dict.fromkeys(["exact", "three_motions", kind]):
+                    curve = section(judged, name, plane) * [1e3 if k == 2 else 1.0 for k in plane]
+                    place.plot(*curve.T, label=name.replace("_", " "), **LOOK[name])
+                place.set_xlabel(AXES[plane[0]])
+                place.set_ylabel(AXES[plane[1]])
+            row[0].set_title(f"{Path(judged.read.file).name}, curved model, mu = {judged.contact.mu:g}")
+        axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center")
+        data = {".png": pictures.as_png, ".svg": pictures.as_svg}[path.suffix.lower()](drawn)
+    write_file(path, data)
+
+
+def section(judged: JudgedPatch, kind: str, plane: tuple[int, int], n: int = 361) -> FloatArray:
+    """Curve in which a plane of two of ``(f_x, f_y, tau_z)`` meets a limit surface of the curved model, per unit of S.
+
+    Parameters
+    ----------
+    judged : JudgedPatch
+    kind : str
+        ``exact`` or a fitted surface.
+    plane : (int, int)
+    n : int
+        Points of the curve.
+
+    Returns
+    -------
+    (n, 2) array
+        Loads in the plane [-, m].
+    """
+    phi = np.linspace(0, 2 * np.pi, n)
+    u = np.zeros((n, 3))
+    u[:, plane[0]], u[:, plane[1]] = np.cos(phi), np.sin(phi)
+    u *= [1.0, 1.0, judged.contact.rho]  # torque in proportion to force, for even steps
+    with np.errstate(invalid="ignore", divide="ignore"):
+        curve = judged.surface("curved", kind).radius(u)[:, None] * u
+    return curve[:, list(plane)]

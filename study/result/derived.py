@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from softjaw.study.accuracy.cost import stored
-from softjaw.study.accuracy.uncertainty import stored as uncertainty
-from softjaw.study.case import curvature, window
+from softjaw.study.accuracy.uncertainty import interval
+from softjaw.study.case import sweep, window
 from softjaw.study.result.layout import Derived
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
     from softjaw.study.result.store import ResultWriter
 
-KINDS = (curvature, window, uncertainty)
+KINDS = (sweep, window, interval)
 
 
 def derived(scene: Scene) -> list[Derived]:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import EFFECTS, MODELS
 from softjaw.study.result.layout import Layout
-from softjaw.study.result.result import CaseResult
 
 
 def text_bytes(text: str, length: int) -> bytes:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.record import record
-from softjaw.study.result.result import CaseFailure, CaseResult
 from softjaw.study.run.lock import Standing
 from softjaw.study.run.memory import is_out_of_memory
 from softjaw.study.run.schedule import LostRanks

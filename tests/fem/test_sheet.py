@@ -130,7 +130,7 @@ def test_refuses_sheets_that_nothing_holds():
 @pytest.mark.long
 @pytest.mark.parametrize("gap", [OVAL, BALL, reference.plane], ids=["cylinder", "sphere", "plane"])
 def test_what_a_rigid_sheet_neglects_stays_below_eight_tenths_of_its_relative_compliance(gap):
-    """What `study.case.sheet_level` chooses by, up to 13 N."""
+    """What `study.case.effects` chooses by, up to 13 N."""
     forces = [1.0, 5.0, 13.0]
     rigid = [reference.e_n(state) for state in Press(pad_of(None, elements=(16, 8, 5)), gap).ladder(forces)]
     lines = (tuple(np.linspace(0.0, side / 2, n // 2 + 1)) for side, n in zip(SIZE, (16, 8), strict=False))

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from softjaw.study.result.quantities import quantities
-from softjaw.study.result.quantity import NEEDS
-from softjaw.study.scene.loading import ALTERNATIVES
 
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object, check_object
-from softjaw.study.case.reach import check_poses
+from softjaw.study.case.model import check_poses
+from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.sweep import units
 from softjaw.study.messages import StudyError
-from softjaw.study.result.result import CaseFailure, CaseResult
+from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene import Scene, SceneError, parse_scene
+from softjaw.study.scene.load import ALTERNATIVES
 from softjaw.study.scene.text import toml_text
 
 FOLDER = Path(__file__).parent
@@ -44,7 +43,7 @@ class Same:
     def factor(self, name: str) -> float:
         """Value of a quantity in this case over that in the other, by its unit."""
         powers = {"N": (0, 1), "m": (1, 0), "m^2": (2, 0), "N m": (1, 1), "Pa": (-2, 1), "": (0, 0)}
-        of_length, of_force = powers[MAPS[name].units]
+        of_length, of_force = powers[MAPS[name].unit]
         return self.length**of_length * self.force**of_force
 
 

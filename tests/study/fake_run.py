@@ -47,7 +47,7 @@ def fake_plan(digest="scene", stations=6, derived=True):
 
 def fake_result(row):
     """Every value from the row alone."""
-    from softjaw.study.result.result import CaseResult
+    from softjaw.study.case.result import CaseResult
 
     random = np.random.default_rng(row)
     values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n", "f_x_max", "tau_z_max")}
@@ -59,7 +59,7 @@ def fake_result(row):
 
 def fake_ladder(options):
     """The injected solver; rows are named by the first candidate that a unit serves."""
-    from softjaw.study.result.result import CaseFailure
+    from softjaw.study.case.result import CaseFailure
 
     def solve_unit(unit):
         for k, row in enumerate(unit.rows[0]):

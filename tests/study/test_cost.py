@@ -50,7 +50,7 @@ def scene(text=CYLINDER, overrides=()):
 
 @pytest.mark.parametrize("order", [0.8, 1.5, 2.0, 2.9])
 def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     h, scale = np.array([3.0, 2.1, 1.0]), np.array([0.1, -0.02, 0.3])
     exact = np.array([1.0, 2.0, 0.5])
@@ -71,7 +71,7 @@ def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
     ],
 )
 def test_an_order_that_is_not_there_is_not_seen(values, why):
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     found = limit([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
     assert math.isnan(found.order)
@@ -80,7 +80,7 @@ def test_an_order_that_is_not_there_is_not_seen(values, why):
 
 
 def test_an_order_above_the_formal_one_is_not_trusted():
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     h = np.array([4.0, 2.0, 1.0])
     found = limit(h, (1.0 + 0.01 * h**4)[:, None], formal=2.0)
@@ -89,7 +89,7 @@ def test_an_order_above_the_formal_one_is_not_trusted():
 
 
 def test_the_front_is_what_nothing_beats():
-    from softjaw.study.accuracy.cost.pareto import front
+    from softjaw.study.accuracy.cost.errors import front
 
     random = np.random.default_rng(3)
     t, e = random.random((2, 50))
@@ -112,7 +112,7 @@ def finger_on(obj, gripper):
 def test_springs_on_a_plane_carry_alike():
     """Uniform pressure, travel F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
     from softjaw.fem.objects.shapes import Plane
-    from softjaw.study.accuracy.cost.winkler import winkler_pad
+    from softjaw.study.accuracy.cost.probes import winkler_pad
 
     gripper = scene().gripper
     pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
@@ -124,7 +124,7 @@ def test_springs_on_a_plane_carry_alike():
 def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     """p = k (d - y^2 / 2R): F = 2/3 k L a^3 / R for narrow contacts, order 2 in the spacing of the springs."""
     from softjaw.fem.objects.shapes import EllipticCylinder
-    from softjaw.study.accuracy.cost.winkler import stiffness, winkler_pad
+    from softjaw.study.accuracy.cost.probes import stiffness, winkler_pad
 
     gripper, R, force = scene().gripper, 0.2, 1.0
     finger = finger_on(EllipticCylinder(R, R, 1.0), gripper)
@@ -207,8 +207,8 @@ def formula_study(own):
 
 
 def test_a_study_comes_back_from_its_file(tmp_path):
-    from softjaw.study.accuracy.cost.file import load, save
     from softjaw.study.accuracy.cost.knobs import Skipped
+    from softjaw.study.accuracy.cost.study import load, save
 
     _, study, *_ = formula_study(scene(overrides=COARSE))
     study.skipped.append(Skipped("pad mesh, hex8", "huge", "would take 3 h; raise --time-limit"))
@@ -224,7 +224,7 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 
 def test_another_file_is_refused(tmp_path):
-    from softjaw.study.accuracy.cost.file import load
+    from softjaw.study.accuracy.cost.study import load
     from softjaw.study.messages import OTHER_FILE, StudyError
 
     (tmp_path / "text.hdf").write_text("no HDF5")
@@ -298,7 +298,7 @@ def test_a_second_choice_solves_nothing_and_chooses_the_same():
 
 
 def test_a_run_without_a_study_climbs_no_further_than_needed():
-    from softjaw.study.accuracy.cost.quick import ladder, quick_choice
+    from softjaw.study.accuracy.cost.target import ladder, quick_choice
 
     own = scene(overrides=["accuracy.e_n=0.02"])
     _, study, probes, solve, calls = formula_study(own)
@@ -316,8 +316,7 @@ def test_a_run_without_a_study_climbs_no_further_than_needed():
 
 
 def test_a_given_mesh_leaves_nothing_to_choose():
-    from softjaw.study.accuracy.cost.quick import quick_choice
-    from softjaw.study.accuracy.cost.target import with_choice
+    from softjaw.study.accuracy.cost.target import quick_choice, with_choice
 
     own = scene(overrides=[*COARSE, "accuracy.e_n=0.02"])
     _, study, probes, solve, _ = formula_study(own)
@@ -329,8 +328,7 @@ def test_a_given_mesh_leaves_nothing_to_choose():
 
 @pytest.mark.long
 def test_words_tell_price_and_need():
-    from softjaw.study.accuracy.cost.page import cost_page
-    from softjaw.study.accuracy.cost.words import sentences
+    from softjaw.study.accuracy.cost.page import cost_page, sentences
 
     what, study, *_ = formula_study(scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL]))
     tables = what.errors(study)
@@ -406,7 +404,7 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
 
 @pytest.mark.long
 def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
-    from softjaw.study.accuracy.cost.file import load
+    from softjaw.study.accuracy.cost.study import load
     from softjaw.study.cli import main
     from softjaw.study.messages import DONE, OTHER_FILE, USAGE
 

@@ -98,7 +98,7 @@ def test_a_difference_above_the_errors_is_still_one():
 @tries
 @given(seeds)
 def test_a_band_of_a_probe_is_that_of_its_images(seed):
-    from softjaw.study.accuracy.uncertainty.carrying import at_least_own
+    from softjaw.study.accuracy.uncertainty.interval import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
     band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
@@ -137,18 +137,17 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
-    from softjaw.study.case import coupling_level, sheet_level, wall
-    from softjaw.study.case.margin import surely_below
+    from softjaw.study.case import effects, wall
     from softjaw.study.scene import parse_scene
 
     scene = parse_scene(SPHERE)
     on = 1.0 + ulp
-    assert not surely_below(on, 1.0)
-    monkeypatch.setattr(sheet_level, "_compliance", lambda gripper: sheet_level.STIFF * on)
-    assert sheet_level.sheet_level(scene).elastic
-    monkeypatch.setattr(coupling_level, "neglected_traction", lambda state, mu: coupling_level.SMALL * on)
-    reason = coupling_level.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
-    assert coupling_level.REASONS[reason].startswith("left out")
+    assert not effects.surely_below(on, 1.0)
+    monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_SHEET * on)
+    assert effects.sheet_level(scene).elastic
+    monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
+    reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
+    assert effects.REASONS[reason].startswith("left out")
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
     for dent, ratio, level in (
         (wall.STIFF * on, 0.1, wall.LINEAR),
@@ -162,7 +161,7 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
 # --- flags ------------------------------------------------------------------------------------------------------------
 
 
-def facing(turn, lean, distance=0.06, free=0.0):
+def facing(turn, lean, mu, distance=0.06, free=0.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
     from softjaw.friction.frame import FrameFlag
 
@@ -172,7 +171,7 @@ def facing(turn, lean, distance=0.06, free=0.0):
         origin = turn.apply([0.0, 0.0, -0.5 * side * distance])
         pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
         made.append(SimpleNamespace(
-            normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
+            mu=mu, normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
             frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose),
             state=SimpleNamespace(checks=SimpleNamespace(acoustic=1.0), path_dependent=False),
         ))  # fmt: skip
@@ -183,16 +182,15 @@ def facing(turn, lean, distance=0.06, free=0.0):
 @given(seeds)
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
-    from softjaw.scoring.score import ScoreFlag
-    from softjaw.study.case.contact import ANTIPODAL, flags
+    from softjaw.study.case.contact import ANTIPODAL, pose_flags
+    from softjaw.study.case.solving import state_flags
     from softjaw.study.flags import Flag
 
-    none = ScoreFlag(0)
     turn = Rotation.random(random_state=seed)
-    assert flags(facing(turn, 0.0), 0.0, none) == 0
-    assert flags(facing(turn, ANTIPODAL), 1.0, none) == Flag.ASKEW
-    assert flags(facing(turn, 0.0, 0.06, 0.03), 1.0, none) == Flag.OVERLAP
-    assert flags(facing(turn, 0.0, 0.06, 0.0299), 1.0, none) == 0
+    assert pose_flags(facing(turn, 0.0, 0.0)) == 0
+    assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.ASKEW
+    assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.OVERLAP
+    assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.0299)) == 0
 
 
 @tries

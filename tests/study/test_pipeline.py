@@ -14,11 +14,11 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import solving
 from softjaw.study.case.build import build_object
+from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.sweep import units
 from softjaw.study.environment import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
-from softjaw.study.result.result import CaseFailure
 from softjaw.study.scene import parse_scene
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.result.layout import Derived, Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
-from softjaw.study.result.result import CaseResult
 from softjaw.study.result.store import ResultWriter, create, open_result
 from softjaw.study.scene.objects import EllipticCylinder, Sphere
 from softjaw.study.show import pictures

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
 from softjaw.study.result.grid import Surface
@@ -20,7 +21,6 @@ from softjaw.study.result.layout import Derived, Header, Layout, layout_from_opt
 from softjaw.study.result.plots import axes_of, groups, view_slice
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import blank, record, text_bytes
-from softjaw.study.result.result import CaseResult
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
 from softjaw.study.run.lock import Lock, holder
 from tests.study.fake_run import fake_result

@@ -34,7 +34,7 @@ def measured(e_n, flags=None, label="probe"):
 
 
 def test_the_doubt_of_a_limit_holds_the_truth_where_the_order_is_seen():
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     h, scale = np.array([2.0, 1.4, 1.0]), np.array([0.1, -0.02, 0.3])
     found = limit(h, 1.0 + scale * h[:, None] ** 2, formal=2.0)
@@ -46,7 +46,7 @@ def test_the_doubt_of_a_limit_holds_the_truth_where_the_order_is_seen():
 @pytest.mark.parametrize("seed", range(20))
 def test_one_lucky_step_does_not_make_a_limit_certain(seed):
     """Errors that fall with the order 1.5 and have any sign, of which the last two are the same by chance."""
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     random = np.random.default_rng(seed)
     h = np.array([2.0, 1.4, 1.0])
@@ -60,7 +60,7 @@ def test_one_lucky_step_does_not_make_a_limit_certain(seed):
 
 
 def test_levels_without_a_size_end_in_what_is_exact():
-    from softjaw.study.accuracy.cost.extrapolate import limit
+    from softjaw.study.accuracy.cost.errors import limit
 
     assert limit([math.nan, math.nan], [[1.1], [1.0]]).doubt == 0.0
 
@@ -70,7 +70,7 @@ def test_levels_without_a_size_end_in_what_is_exact():
 
 def test_the_doubt_of_the_reference_counts():
     """The last two meshes agree by chance: nothing shows that the error of the first of them is 1 % and not more."""
-    from softjaw.study.accuracy.cost.quick import judge
+    from softjaw.study.accuracy.cost.target import judge
 
     found = [[measured([v])] for v in (1.04, 1.0101, 1.01)]
     judged = judge(levels(3), found, 0.01)
@@ -80,7 +80,7 @@ def test_the_doubt_of_the_reference_counts():
 
 def test_a_mesh_that_is_good_by_chance_is_not_taken():
     """Errors of 0.1, 3, 0.75 and 0.19 %: the coarsest is right for no reason that the finer ones share."""
-    from softjaw.study.accuracy.cost.quick import judge
+    from softjaw.study.accuracy.cost.target import judge
 
     found = [[measured([1.0 + e])] for e in (0.001, 0.03, 0.0147, 0.0072, 0.0035)]
     judged = judge(levels(), found, 0.01)
@@ -91,7 +91,7 @@ def test_a_mesh_that_is_good_by_chance_is_not_taken():
 
 @pytest.mark.parametrize("flag", [COARSE_FLAG, ASKEW, 8])
 def test_a_mesh_with_a_flag_that_the_finest_has_not_is_not_taken(flag):
-    from softjaw.study.accuracy.cost.quick import judge
+    from softjaw.study.accuracy.cost.target import judge
 
     values = [1.0 + 0.004 * h**2 for h in SIZES]
     free = judge(levels(), [[measured([v])] for v in values], 0.01)
@@ -104,7 +104,7 @@ def test_a_mesh_with_a_flag_that_the_finest_has_not_is_not_taken(flag):
 
 
 def test_a_case_that_is_coarse_on_the_finest_mesh_leaves_the_target_open():
-    from softjaw.study.accuracy.cost.quick import judge
+    from softjaw.study.accuracy.cost.target import judge
 
     values = [[1.0 + 0.004 * h**2, 1.0 + h] for h in SIZES]
     judged = judge(levels(), [[measured(v, [0, COARSE_FLAG])] for v in values], 0.01)
@@ -131,7 +131,7 @@ def test_the_hardest_contact_is_a_probe():
 @pytest.mark.parametrize("forces", [[2], [2, 8], [1, 2, 4, 8, 12]])
 @pytest.mark.parametrize("stations", [[0], list(range(-20, 21, 4))])
 def test_cases_held_out_are_none_of_the_probes(stations, forces):
-    from softjaw.study.accuracy.cost.quick import quick_probes
+    from softjaw.study.accuracy.cost.target import quick_probes
 
     text = CYLINDER.replace("stations_mm = [0]", f"stations_mm = {stations}").replace("[2, 8]", str(forces))
     found, others, cases = quick_probes(scene(text))
@@ -146,8 +146,8 @@ def test_cases_held_out_are_none_of_the_probes(stations, forces):
 def made_up(e_n_of, flags_of=lambda point, label: 0):
     """A climb of meshes on made-up numbers: how it chooses for a target on one probe and one case held out."""
     from softjaw.study.accuracy.cost.knobs import with_level
-    from softjaw.study.accuracy.cost.quick import quick_choice
     from softjaw.study.accuracy.cost.study import new_study, plain
+    from softjaw.study.accuracy.cost.target import quick_choice
 
     own = scene(overrides=["accuracy.e_n=0.01"])
     found, others = ([SimpleNamespace(label=name, forces=(1.0, 2.0))] for name in ("probe", "other"))
@@ -280,8 +280,8 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
     from softjaw.study.accuracy.cost.knobs import Level
     from softjaw.study.accuracy.cost.measure import measure_once
     from softjaw.study.accuracy.cost.probes import Probe
-    from softjaw.study.accuracy.cost.quick import quick_choice, quick_probes
     from softjaw.study.accuracy.cost.study import new_study
+    from softjaw.study.accuracy.cost.target import quick_choice, quick_probes
     from softjaw.study.case.sweep import units
 
     own = scene(text, [f"accuracy.e_n={target}"])

@@ -9,9 +9,9 @@ import pytest
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.volume import volume_linf
-from softjaw.study.accuracy.uncertainty import carrying, probing
-from softjaw.study.accuracy.uncertainty.rescoring import _volume
-from softjaw.study.accuracy.uncertainty.stored import derived
+from softjaw.study.accuracy.uncertainty import interval, probing
+from softjaw.study.accuracy.uncertainty.interval import derived
+from softjaw.study.accuracy.uncertainty.probing import _volume
 from softjaw.study.accuracy.uncertainty.variations import by_formula, moved_poses, variations
 from softjaw.study.accuracy.uncertainty.verdict import Sure, sure, verdict
 from softjaw.study.case import sweep
@@ -51,7 +51,7 @@ def scene(*overrides):
 
 
 def facing(distance):
-    """Two contacts that face each other, as `study.accuracy.uncertainty.rescoring` reads them from a file."""
+    """Two contacts that face each other, as `study.accuracy.uncertainty.probing` reads them from a file."""
     turned = np.diag([1.0, -1.0, -1.0])
     return {
         "frame_origin": np.zeros((2, 3)), "frame_axes": np.array([np.eye(3)] * 2),
@@ -66,16 +66,16 @@ def test_the_quality_goes_with_the_fifth_power_of_mu_where_contacts_face_each_ot
         volume_linf(*(x for a in axes * t for x in (Ellipsoid(a).volume, Ellipsoid(a).shadow_area)), d)
         for t in (1.0, 1 + share, 1 - share)
     ]
-    assert carrying.change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
+    assert interval.facing_change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
     stored = [_volume(facing(d), t * axes, 1.0, 1.0) for t in (1.0, 1 + share, 1 - share)]
-    assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(carrying.change_by_mu(share), rel=1e-6)
+    assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(interval.facing_change_by_mu(share), rel=1e-6)
     assert stored[0] == pytest.approx(volumes[0], rel=1e-6)
 
 
 @pytest.mark.parametrize("power", [-1.0, 0.0, 0.7])
 def test_a_stiffer_pad_is_a_smaller_force(power):
     force = np.array([1.0, 2.0, 3.0, 7.0])
-    changed = carrying.change_by_modulus(force, np.array([3 * force**power, np.full(4, np.nan)]), 0.05)
+    changed = interval.change_by_modulus(force, np.array([3 * force**power, np.full(4, np.nan)]), 0.05)
     assert np.allclose(changed[0], -0.05 * power, atol=1e-14)
     assert np.isnan(changed[1]).all()
 
@@ -93,9 +93,9 @@ def test_moved_pads_still_face_each_other():
 
 def test_a_mesh_error_falls_with_the_contact_area_and_a_probe_keeps_its_own():
     change, area = np.array([[0.02, 0.01]]), np.array([[1.0, 2.0]])
-    assert np.allclose(carrying.carried(change, area, np.array([[1.0, 4.0]])), [[0.04, 0.01]])
+    assert np.allclose(interval.carried(change, area, np.array([[1.0, 4.0]])), [[0.04, 0.01]])
     values = np.array([[1.0, 2.0], [5.0, 6.0], [1.0, 2.0]])  # the third is an image of the first
-    share = carrying.at_least_own(np.full((3, 2), 0.01), np.array([[-0.3, np.nan]]), (0,), values)
+    share = interval.at_least_own(np.full((3, 2), 0.01), np.array([[-0.3, np.nan]]), (0,), values)
     assert share.tolist() == [[0.3, 0.01], [0.01, 0.01], [0.3, 0.01]]
 
 
@@ -157,7 +157,7 @@ def test_files_of_scenes_without_bands_keep_their_digest():
 
 
 def test_named_probes_are_those_that_are_solved():
-    from softjaw.study.accuracy.uncertainty.probes import probe_candidates, with_probes
+    from softjaw.study.accuracy.uncertainty.variations import probe_candidates, with_probes
 
     given = scene(*ALL, 'uncertainty.probes=["20 mm, 90 deg", 0]')
     units = sweep.units(given, lambda point: point.axis_symmetry)
@@ -266,8 +266,8 @@ def test_a_file_without_errors_knows_none():
 
 def solved(given, name):
     """A map ``(units, forces)`` of a scene, NaN where a case fails, and the units."""
+    from softjaw.study.case.result import CaseFailure
     from softjaw.study.pipeline import solve_unit
-    from softjaw.study.result.result import CaseFailure
 
     units = sweep.units(given, lambda point: point.axis_symmetry)
     found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)
@@ -294,12 +294,12 @@ def test_the_change_by_the_modulus_is_that_of_further_solves():
     own, _ = solved(scene(*where), names)
     up, down = (solved(scene(*where, f"gripper.shear_modulus_kpa={40 * t}"), names)[0] for t in (1.03, 0.97))
     expected = ((up - down) / (2 * own))[..., 1]
-    assert np.allclose(carrying.change_by_modulus(force, own, 0.03)[..., 1], expected, rtol=2e-3, atol=0)
+    assert np.allclose(interval.change_by_modulus(force, own, 0.03)[..., 1], expected, rtol=2e-3, atol=0)
 
 
 @pytest.mark.long
 def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
-    from softjaw.study.accuracy.uncertainty.probes import probe_candidates
+    from softjaw.study.accuracy.uncertainty.variations import probe_candidates
     from softjaw.study.scene import load_scene
     from softjaw.study.show.tables.ranking import LOST
 
@@ -316,6 +316,6 @@ def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
     assert np.allclose(np.abs(np.array(again) / found[4][probes[2]] - 1), error[0][probes[2]], rtol=1e-5)
     for own in error:
         change = np.where(sound[probes], own[probes], np.nan)
-        band = carrying.carried(change, area[probes], area)
+        band = interval.carried(change, area[probes], area)
         assert np.mean(own[others] <= band[others]) >= 0.9
         assert np.median(band[others]) < 6 * np.median(own[others])  # and it is no empty promise

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from softjaw.study.case.result import CaseResult
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
-from softjaw.study.result.result import CaseResult
 from softjaw.study.result.store import ResultWriter, create
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes

@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.accuracy.cost.errors import KnobErrors, best_known, flagged, flags_of, places, unsure
-from softjaw.study.accuracy.cost.file import CostStudy
+from softjaw.study.accuracy.cost.errors import KnobErrors, best_known, flagged, flags_of, front, places, unsure
 from softjaw.study.accuracy.cost.knobs import Level
 from softjaw.study.accuracy.cost.measure import Measured, measure
-from softjaw.study.accuracy.cost.pareto import front
-from softjaw.study.accuracy.cost.study import Costs, same, setting_of
+from softjaw.study.accuracy.cost.study import Costs, CostStudy, same, setting_of
 from softjaw.study.scene import Scene
+from softjaw.study.scene.text import value_text
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.probes import Probe
@@ -33,8 +32,38 @@ FloatArray = NDArray[np.float64]
 NO_LOSS = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
 NOT_CHOSEN = (*NO_LOSS, "effect: friction pressure coupling")  # which is another model than the paper's
 HOPE, CHEAPEST = 2.0, 5  # predicted errors up to so many targets are tried, and so many of the cheapest
+BELOW = 1e-6  # errors below this are none
 SMALL, ALIKE = 1e-4, 1e-6  # differences of e_n, and relative ones of work and error, that are none
 Solve = Callable[[str, "Probe", Level], Measured]
+
+
+def percent(error: float) -> str:
+    """A relative error for people.
+
+    >>> percent(0.0213), percent(0.00123), percent(3e-8), percent(0.34)
+    ('2.1 %', '0.12 %', '< 0.0001 %', '34 %')
+    """
+    if not math.isfinite(error):
+        return "–"
+    if error < BELOW:
+        return "< 0.0001 %"
+    return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
+
+
+def seconds_text(seconds: float) -> str:
+    """A CPU time per case.
+
+    >>> seconds_text(0.0234), seconds_text(0.6), seconds_text(12.3)
+    ('23 ms', '0.6 s', '12 s')
+    """
+    if not math.isfinite(seconds):
+        return "–"
+    return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{seconds:.2g} s"
+
+
+def values_text(values: dict) -> str:
+    """Scene keys and values, as in ``gripper.elements = [20, 10, 6]``."""
+    return ", ".join(f"{key} = {value_text(value)}" for key, value in values.items()) or "as in the scene"
 
 
 @dataclass(frozen=True)
@@ -82,6 +111,16 @@ class Choice:
     remark: str
     held_out: float = math.nan
     met: bool = False
+
+    def __str__(self) -> str:
+        """What was chosen, in one sentence."""
+        measured = "" if math.isnan(self.measured) else f", measured on the probes {percent(self.measured)}"
+        measured += "" if math.isnan(self.held_out) else f", on cases held out {percent(self.held_out)}"
+        verdict = "" if self.met else "; THE TARGET IS NOT MET"
+        return (
+            f"accuracy.e_n = {self.target:g}: {values_text(self.values)}; predicted error {percent(self.predicted)}"
+            f"{measured}, about {seconds_text(self.seconds)} CPU per case ({self.remark}){verdict}"
+        )
 
 
 def nothing(target: float, remark: str, seconds: float = math.nan) -> Choice:

@@ -35,9 +35,8 @@ def run(options: Namespace, scene: Any) -> None:
     path = Path(options.output or f"results/{Path(options.scene).stem}-cost.hdf")
     if path.suffix != ".hdf":
         raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in .hdf; write -o {path}.hdf")
-    from softjaw.study.accuracy.cost.file import load
     from softjaw.study.accuracy.cost.probes import probes
-    from softjaw.study.accuracy.cost.study import Measuring, costs, new_study
+    from softjaw.study.accuracy.cost.study import Measuring, costs, load, new_study
     from softjaw.study.case.build import check_object
 
     check_object(scene)
@@ -59,8 +58,7 @@ def run(options: Namespace, scene: Any) -> None:
 
 def _conclude(study: Any, what: Any, path: Path) -> None:
     """Write page and picture, print the answer."""
-    from softjaw.study.accuracy.cost.page import cost_page
-    from softjaw.study.accuracy.cost.words import sentences
+    from softjaw.study.accuracy.cost.page import cost_page, sentences
 
     if all(m.message for m in study.of(study.base)):
         text = f"no probe could be solved with the scene as it is: {study.of(study.base)[0].message}"

@@ -1,21 +1,149 @@
-"""From measurements to errors: the limit that every knob's ladder leads to, and how far each level is from it."""
+"""From measurements to errors: the limit that the levels of a parameter lead to, and how far each level is from it.
+
+Richardson extrapolation of several cases at once, with the order that the finest three levels show.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
-from softjaw.study.accuracy.cost.extrapolate import Limit, limit
-from softjaw.study.accuracy.cost.file import CostStudy
 from softjaw.study.accuracy.cost.knobs import Knob, Level
 from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured
+from softjaw.study.flags import Flag
+
+if TYPE_CHECKING:
+    from softjaw.study.accuracy.cost.study import CostStudy
 
 FloatArray = NDArray[np.float64]
-COARSE, NODAL = 4096, 512  # flags, as study.quantities says
-ALIKE = 1e-9  # relative difference of values that is none: the same state by another order of sums
+SAME_WAY = 0.75  # share of the change in which both steps must go the same way
+LOWEST, HIGHEST = 0.5, 6.0  # orders that are believed
+NOISE = 1e-9  # relative changes below this tell nothing
+SAFETY = 0.25  # of the correction by an observed order, which may be off by so much: Roache's factor of 1.25
+ASSUMED = 1.5  # order with which the last step is taken to shrink where none is seen: that of a contact's edge
+SAME = 1e-9  # relative difference of values that is none: the same state by another order of sums
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where a ladder of levels leads.
+
+    Attributes
+    ----------
+    value : (cases,) array
+        The limit: extrapolated where the order was seen, else the finest level.
+    uncertainty : (cases,) array
+        How far the finest level is from its limit, or from the level before it where no order was seen (absolute).
+    doubt : (cases,) array
+        How far ``value`` itself may be off (absolute); NaN where a single level tells nothing, 0 where the last of
+        discrete levels is exact by definition.
+    order : float
+        Observed order; NaN where none was seen.
+    remark : str
+        Why no order was seen; empty where one was.
+    """
+
+    value: FloatArray
+    uncertainty: FloatArray
+    doubt: FloatArray
+    order: float
+    remark: str
+
+
+def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
+    """Limit of values at falling sizes, Roache's generalised Richardson extrapolation.
+
+    Parameters
+    ----------
+    size : (levels,) array
+        What the error is a power of, falling; NaN where no order is expected.
+    values : (levels, cases) array
+        NaN where a case has no value at a level.
+    formal : float
+        Highest order that is used: a larger observed one is not believed to go on.
+
+    Examples
+    --------
+    >>> found = limit([4, 2, 1], [[1.16], [1.04], [1.01]], formal=2.0)
+    >>> round(found.order, 6), found.value.round(6).tolist()
+    (2.0, [1.0])
+    """
+    h, f = np.asarray(size, float), np.asarray(values, float)
+    finest = f[-1].copy()
+    step = np.abs(f[-1] - f[-2]) if len(f) > 1 else np.full(finest.shape, np.nan)
+    if not np.isfinite(h).all():
+        return Limit(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
+    order, remark = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
+    used = ASSUMED if remark else order if np.isnan(formal) else min(order, formal)
+    correction, before = (_correction(h[k - 2 : k or None], f[k - 2 : k or None], used) for k in (0, -1))
+    if remark:
+        shrunk = np.abs(before) * (h[-1] / h[-2]) ** used if len(h) > 1 else before
+        return Limit(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, remark)
+    known = np.isfinite(correction)
+    value = np.where(known, finest + np.where(known, correction, 0.0), finest)
+    doubt = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))
+    return Limit(value, np.where(known, np.abs(value - finest), step), doubt, order, "")
+
+
+def _correction(h: FloatArray, f: FloatArray, order: float) -> FloatArray:
+    """From the finer of two levels to their limit; NaN where there are fewer."""
+    if len(h) < 2:
+        return np.full(f.shape[-1:], np.nan)
+    return (f[-1] - f[-2]) / ((h[-2] / h[-1]) ** order - 1.0)
+
+
+def observed_order(h: FloatArray, f: FloatArray) -> tuple[float, str]:
+    """Order ``p`` of ``f = f* + c h^p`` over all cases, and why it is not believed (empty if it is).
+
+    Parameters
+    ----------
+    h : (3,) array
+        Falling sizes, in any ratio.
+    f : (3, cases) array
+    """
+    f = f[:, np.isfinite(f).all(axis=0) & (np.abs(f[-1]) > 0)]
+    if not f.size:
+        return np.nan, "no case was solved on the three finest levels"
+    coarse, fine = (f[0] - f[1]) / f[-1], (f[1] - f[2]) / f[-1]
+    if np.abs(coarse).max() < NOISE or np.abs(fine).max() < NOISE:
+        return np.nan, "the finest levels do not differ"
+    change = np.abs(coarse) + np.abs(fine)
+    alike = change[coarse * fine > 0].sum() / change.sum()
+    if alike < SAME_WAY:
+        return np.nan, f"the last two steps go the same way for only {alike:.0%} of the change"
+    ratio = float(np.linalg.norm(coarse) / np.linalg.norm(fine))
+
+    def excess(p: float) -> float:
+        return (h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - ratio
+
+    if excess(LOWEST) > 0:
+        return np.nan, f"the last two steps shrink too little for an order of {LOWEST:g}"
+    if excess(HIGHEST) < 0:
+        return np.nan, f"the last step is {ratio:.3g} times smaller than the one before, more than any order gives"
+    return float(brentq(excess, LOWEST, HIGHEST, xtol=1e-10)), ""
+
+
+def front(seconds: ArrayLike, error: ArrayLike) -> list[int]:
+    """Numbers of the settings on the Pareto front, the cheapest first; those without a value are left out.
+
+    Examples
+    --------
+    >>> front([1.0, 2.0, 3.0, 4.0], [0.1, 0.2, 0.05, float("nan")])
+    [0, 2]
+    """
+    t, e = np.asarray(seconds, float), np.asarray(error, float)
+    known = [int(i) for i in np.lexsort((e, t)) if np.isfinite(t[i]) and np.isfinite(e[i])]
+    kept: list[int] = []
+    for i in known:
+        if not kept or e[i] < e[kept[-1]]:
+            kept.append(i)
+    return kept
 
 
 @dataclass(frozen=True)
@@ -25,10 +153,9 @@ class LevelErrors:
     Attributes
     ----------
     seconds, own : float
-        CPU time of one case, the mean over the probes, and the part that is the knob's own [s].
-    worst, middle : (4,) arrays
-        Largest and median relative error over all cases, for `QUANTITIES`; NaN where a case has no value.
+        CPU time of one case, the mean over the probes, and the part that the knob itself takes [s].
     by_case : (4, cases) array
+        Relative errors for `QUANTITIES`; NaN where a case has no value.
     message : str
         What failed.
     flags : (cases,) array
@@ -37,24 +164,42 @@ class LevelErrors:
     name: str
     seconds: float
     own: float
-    worst: FloatArray
-    middle: FloatArray
     by_case: FloatArray
     message: str
     flags: NDArray[np.int64]
 
+    @property
+    def worst(self) -> FloatArray:
+        """Largest error over all cases ``(4,)``."""
+        return self.by_case.max(axis=1)
+
+    @property
+    def middle(self) -> FloatArray:
+        """Median error over all cases ``(4,)``."""
+        return np.median(self.by_case, axis=1)
+
 
 @dataclass(frozen=True)
 class KnobErrors:
-    """Errors of the measured levels of one knob, the cheapest setting first; ``own`` is the scene's own level or -1."""
+    """Errors of the measured levels of one knob, the cheapest setting first.
+
+    ``found[level][probe]`` is what was measured, ``settings`` are the levels of a knob of the contact solve; one that
+    leaves the contact as it is has none. ``own`` is the scene's own level or -1, ``reference`` the limits that errors
+    are measured against where another knob of the family knows them better.
+    """
 
     name: str
-    long_name: str
-    levels: tuple[LevelErrors, ...]
-    settings: tuple[Level, ...]
-    own: int
-    limits: tuple[Limit, ...]
-    family: str = ""
+    names: tuple[str, ...]
+    found: Sequence[Sequence[Measured]]
+    knob: Knob | None = None
+    settings: tuple[Level, ...] = ()
+    own: int = -1
+    reference: tuple[Limit, ...] | None = None
+
+    @property
+    def family(self) -> str:
+        """Knobs of one family lead to the same limit."""
+        return self.knob.family if self.knob else ""
 
     @property
     def judging(self) -> bool:
@@ -65,6 +210,32 @@ class KnobErrors:
     def ladder(self) -> bool:
         """Whether finer levels lead on to a limit, or the last of discrete levels is exact by definition."""
         return bool(self.settings) and not any(np.isnan(s.size) for s in self.settings)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Measured values ``(level, case, 4)``."""
+        return np.array([np.concatenate([m.values for m in own]) for own in self.found])
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        """The knob's own limit of each of `QUANTITIES`."""
+        sizes = [s.size for s in self.settings] or [np.nan] * len(self.names)
+        formal = self.knob.formal if self.knob else np.nan
+        return tuple(limit(sizes, self.values[:, :, q], formal) for q in range(len(QUANTITIES)))
+
+    @cached_property
+    def levels(self) -> tuple[LevelErrors, ...]:
+        """Errors of every level; the finest is at least as uncertain as its own limit says."""
+        ends = self.reference or self.limits
+        made = []
+        for i, (name, own) in enumerate(zip(self.names, self.found, strict=True)):
+            errors = np.array([np.abs(self.values[i, :, q] - e.value) / np.abs(e.value) for q, e in enumerate(ends)])
+            if i == len(self.names) - 1 and self.ladder:
+                errors = np.fmax(errors, np.array([e.uncertainty / np.abs(e.value) for e in self.limits]))
+            seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
+            message = "; ".join(dict.fromkeys(m.message for m in own if m.message))
+            made.append(LevelErrors(name, seconds, part, errors, message, flags_of(own)))
+        return tuple(made)
 
     @property
     def doubts(self) -> FloatArray:
@@ -77,60 +248,10 @@ class KnobErrors:
         return float(self.doubts.max())
 
 
-def knob_errors(knob: Knob, found: Sequence[Sequence[Measured]], levels: Sequence[Level]) -> KnobErrors:
-    """Errors of the levels of a contact knob that were measured, ``found[level][probe]``, the finest last."""
-    return _errors(knob.name, knob.long_name, found, [v.name for v in levels], [v.size for v in levels], knob.formal,
-                   tuple(levels), knob.family)  # fmt: skip
-
-
-def judging_errors(name: str, found: Sequence[Sequence[Measured]], levels: Sequence[str]) -> KnobErrors:
-    """Errors of the levels of a knob that leaves the contact as it is."""
-    return _errors(name, "", found, levels, [np.nan] * len(levels), np.nan, (), "")
-
-
-def _errors(name, long_name, found, names, sizes, formal, settings, family) -> KnobErrors:
-    values = np.array([np.concatenate([m.values for m in own]) for own in found])  # level, case, quantity
-    limits = tuple(limit(sizes, values[:, :, q], formal) for q in range(len(QUANTITIES)))
-    levels = tuple(_level(text, own) for text, own in zip(names, found, strict=True))
-    return _with_limits(KnobErrors(name, long_name, levels, settings, -1, limits, family), values, limits)
-
-
-def _level(name: str, own: Sequence[Measured]) -> LevelErrors:
-    nothing = np.full(len(QUANTITIES), np.nan)
-    seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
-    told = "; ".join(dict.fromkeys(m.message for m in own if m.message))
-    return LevelErrors(name, seconds, part, nothing, nothing, nothing[:, None], told, flags_of(own))
-
-
-def _with_limits(table: KnobErrors, values: FloatArray, limits: Sequence[Limit]) -> KnobErrors:
-    """Errors against given limits; the finest level is at least as uncertain as its own limit says."""
-    last = len(table.levels) - 1
-    made = []
-    for i, level in enumerate(table.levels):
-        errors = np.array([
-            np.abs(values[i, :, q] - found.value) / np.abs(found.value) for q, found in enumerate(limits)
-        ])  # fmt: skip
-        if i == last and table.ladder:
-            errors = np.fmax(errors, np.array([f.uncertainty / np.abs(f.value) for f in table.limits]))
-        made.append(replace(level, worst=errors.max(axis=1), middle=np.median(errors, axis=1), by_case=errors))
-    return replace(table, levels=tuple(made))
-
-
 def best_known(tables: Sequence[KnobErrors], family: str) -> KnobErrors:
     """The knob of a family, or of this name, whose limit is known best."""
     own = [t for t in tables if (t.family or t.name) == family]
     return min([t for t in own if t.ladder] or own, key=lambda t: t.doubt)
-
-
-def share_limits(tables: list[KnobErrors], values: dict[str, FloatArray]) -> list[KnobErrors]:
-    """Give knobs of one family the limit of the one that is known best; ``values[name]`` are ``(level, case, 4)``."""
-    made = list(tables)
-    for family in {t.family for t in tables if t.family}:
-        best = best_known(tables, family)
-        for i, table in enumerate(made):
-            if table.family == family and table is not best:
-                made[i] = replace(_with_limits(table, values[table.name], best.limits), limits=table.limits)
-    return made
 
 
 def flags_of(found: Sequence[Measured]) -> NDArray[np.int64]:
@@ -150,7 +271,7 @@ def flagged(flags: NDArray[np.int64], reference: NDArray[np.int64]) -> NDArray[n
 
 def unsure(reference: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which cases of a reference say themselves that their mesh is not to be trusted."""
-    return (reference & (COARSE | NODAL)) != 0
+    return (reference & (Flag.COARSE | Flag.NODAL)) != 0
 
 
 def _own(settings: list[str], values: FloatArray, study: CostStudy) -> int:
@@ -158,27 +279,29 @@ def _own(settings: list[str], values: FloatArray, study: CostStudy) -> int:
     if study.base in settings:
         return settings.index(study.base)
     base = np.concatenate([m.values for m in study.of(study.base)])
-    alike = (i for i, v in enumerate(values) if np.allclose(v, base, rtol=ALIKE, atol=0.0))
+    alike = (i for i, v in enumerate(values) if np.allclose(v, base, rtol=SAME, atol=0.0))
     return next(alike, -1)
 
 
 def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],
            judging: dict[str, list[str]]) -> list[KnobErrors]:  # fmt: skip
     """Errors of every knob with at least two measured levels; ``settings`` by knob and level."""
-    made, values = [], {}
+    made = []
     for knob in knobs:
-        levels = [v for v in knob.levels if study.has(settings[knob.name, v.name])]
-        found = [study.of(settings[knob.name, v.name]) for v in levels]
-        pairs = [(v, f) for v, f in zip(levels, found, strict=True) if np.isfinite([m.values for m in f]).any()]
-        if len(pairs) < 2:
-            continue
-        levels, found = [v for v, _ in pairs], [f for _, f in pairs]
-        table = knob_errors(knob, found, levels)
-        values[knob.name] = np.array([np.concatenate([m.values for m in f]) for f in found])
-        made.append(replace(table, own=_own([settings[knob.name, v.name] for v in levels], values[knob.name], study)))
-    made = share_limits(made, values)
+        known = [v for v in knob.levels if study.has(settings[knob.name, v.name])]
+        pairs = [(v, study.of(settings[knob.name, v.name])) for v in known]
+        pairs = [(v, found) for v, found in pairs if np.isfinite([m.values for m in found]).any()]
+        if len(pairs) > 1:
+            levels, found = zip(*pairs, strict=True)
+            table = KnobErrors(knob.name, tuple(v.name for v in levels), found, knob, levels)
+            own = _own([settings[knob.name, v.name] for v in levels], table.values, study)
+            made.append(replace(table, own=own))
+    for i, table in enumerate(made):
+        best = best_known(made, table.family) if table.family else table
+        if best is not table:
+            made[i] = replace(table, reference=best.limits)
     for name, levels in judging.items():
         known = [v for v in levels if study.has(f"{name}: {v}")]
         if len(known) > 1:
-            made.append(judging_errors(name, [study.of(f"{name}: {v}") for v in known], known))
+            made.append(KnobErrors(name, tuple(known), [study.of(f"{name}: {v}") for v in known]))
     return made

@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from softjaw.friction.frame import contact_frame, contact_length, in_frame
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.lsfit.ellipsoid import three_motion_ellipsoid
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
+from softjaw.friction.wrench import friction_wrench
+from softjaw.scoring.contact import EllipsoidBody, PolytopeBody
 from softjaw.scoring.graspit import linearised_contacts
 from softjaw.scoring.polytope import hull_volume
-from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import score
-from softjaw.study.accuracy.cost.levels import HULL, POINTS, SURFACES, WINKLER
-from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured, cpu_seconds, least_seconds
-from softjaw.study.accuracy.cost.probes import Probe
-from softjaw.study.accuracy.cost.winkler import winkler_pad
+from softjaw.study.accuracy.cost.knobs import HULL, POINTS, SURFACES, WINKLER
+from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured, cpu_seconds, from_maps, least_seconds
+from softjaw.study.accuracy.cost.probes import Probe, winkler_pad
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.contact import X_OF_PAD, Contact
-from softjaw.study.case.grasp import grasp_values, lengths
-from softjaw.study.case.limit_surface import bound
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, volume_in_pose
 from softjaw.study.case.solving import solver
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -48,6 +42,11 @@ class Solved:
     def scene(self) -> Scene:
         """The probe's scene."""
         return self.probe.unit.scene
+
+    @property
+    def settings(self) -> EvaluationSettings:
+        """Lengths and limit surface of the scene, and nothing else that a scene may ask for."""
+        return EvaluationSettings(*lengths(self.scene, self.obj), self.scene.limit_surface)
 
 
 def solved(probe: Probe) -> Solved:
@@ -125,24 +124,23 @@ def _score(found: Solved, level: str) -> Callable:
         return lambda contacts, _: _with_quality(found, contacts, ellipsoids(contacts))
 
     def hull(contacts: list[Contact], _: float) -> FloatArray:
-        size, count = lengths(found.scene, found.obj, contacts), POINTS[level]
-        soft = [SoftContact(c.origin, c.axes, body) for c, body in zip(contacts, ellipsoids(contacts), strict=True)]
+        settings = found.settings
+        soft = [c.soft(body) for c, body in zip(contacts, ellipsoids(contacts), strict=True)]
         cones = []
-        for contact in linearised_contacts(soft, count, size.torques):
+        for contact in linearised_contacts(soft, POINTS[level], settings.torques):
             V = contact.body.vertices
-            load = np.hstack([np.ones((len(V), 1)), V]) @ contact.wrench_map(size.arms, size.torques, np.zeros(3)).T
-            cones.append(np.vstack([np.zeros(6), load]))
+            loads = contact.wrench_map(settings.arms, settings.torques, np.zeros(3))
+            cones.append(np.vstack([np.zeros(6), np.hstack([np.ones((len(V), 1)), V]) @ loads.T]))
         sums = (cones[0][:, None] + cones[1][None]).reshape(-1, 6)
         return np.array([*_limits(contacts, "curved"), hull_volume(sums)])
 
     return hull
 
 
-def _judged(found: Solved, contacts: list[Contact], choice: Any, number: int, quality: str = "quality") -> FloatArray:
+def _judged(found: Solved, contacts: list[Contact], choice: Any, number: int, score: str = "quality") -> FloatArray:
     """`QUANTITIES` with a limit surface fitted as ``choice`` says."""
-    bounds = [{m: bound(c.local, c.rho, c.unit_limits[m], m, choice) for m in MODELS} for c in contacts]
-    scores, _ = grasp_values(found.scene, found.obj, contacts, bounds)
-    return np.array([*_limits(contacts, MODELS[number]), scores[f"maps/{quality}"][number]])
+    values, _ = evaluate(contacts, replace(found.settings, surface=choice))
+    return from_maps(values, number, score)
 
 
 def _limits(contacts: list[Contact], name: str) -> tuple[float, float, float]:
@@ -153,10 +151,7 @@ def _limits(contacts: list[Contact], name: str) -> tuple[float, float, float]:
 
 def _with_quality(found: Solved, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
     """`QUANTITIES` with the exact quality of any bodies in the pose that the contacts have."""
-    size = lengths(found.scene, found.obj, contacts)
-    soft = [SoftContact(c.origin, c.axes, body) for c, body in zip(contacts, bodies, strict=True)]
-    quality = pose_volume(*soft, size.arms, size.torques, with_l1=False).linf
-    return np.array([*_limits(contacts, "curved"), quality])
+    return np.array([*_limits(contacts, "curved"), volume_in_pose(contacts, bodies, found.settings)])
 
 
 def _wrench_hull(scene: Scene, contact: Contact) -> PolytopeBody:
@@ -172,19 +167,8 @@ def _wrench_hull(scene: Scene, contact: Contact) -> PolytopeBody:
 
 def winkler_case(found: Solved, force: float) -> FloatArray:
     """`QUANTITIES` of a rigid object between two Winkler foundations, from the scene alone."""
-    scene, ellipsoids, limits, origins = found.scene, [], [], []
+    scene, contacts = found.scene, []
     for pose in found.probe.unit.candidate.poses:
         finger = model.approach(found.obj, pose, scene.gripper.pad_size)
-        patch = winkler_pad(scene.gripper, finger).patch(force)
-        frame = contact_frame(patch, X_OF_PAD)
-        local = in_frame(patch, frame)
-        own = friction_limits(local, scene.friction.mu, "flat")
-        limits.append(own)
-        ellipsoids.append(three_motion_ellipsoid(*own.per_unit_force, contact_length(local)).semi_axes)
-        origins.append(finger.pose.to_object(frame.origin[None])[0])
-    distance = float(np.linalg.norm(origins[1] - origins[0]))
-    arms = scene.score.object_length or float(np.ptp(found.obj.bounds, axis=0).max())
-    torques = scene.score.contact_length or scene.gripper.pad_length
-    torques = arms if scene.score.torque_scale == "object" else torques
-    e_n, force_x, force_y, torque = (min(getattr(x, n) for x in limits) for n in ("e_n", "f_x", "f_y", "tau_z"))
-    return np.array([e_n, max(force_x, force_y), torque, score(*ellipsoids, distance, arms, torques).quality])
+        contacts.append(Contact(winkler_pad(scene.gripper, finger).patch(force), scene.friction.mu, finger.pose))
+    return np.array([*_limits(contacts, "flat"), quality(contacts, found.settings, "flat")])

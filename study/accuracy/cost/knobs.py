@@ -22,7 +22,7 @@ HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
 STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
-OWN = ("friction", "limit_surface")  # effects with knobs of their own in study.accuracy.cost.judging
+OWN = ("friction", "limit_surface")  # effects with knobs of their own, see `judging_knobs`
 EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
 # Time over that of the level which is taken for granted, about; more than the unknowns tell.
@@ -30,6 +30,15 @@ DEARER = {
     "gripper.element": {"hex27": 1.25}, "effects.sheet": {"elastic": 1.3},
     "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
 }  # fmt: skip
+SAMPLES = (50, 100, 200, 500, 1000, 2000, 4000)
+SURFACES = (
+    ("three motions", "three_motions", "least_squares"), ("axis-aligned ellipsoid", "axis_aligned", "least_squares"),
+    ("full ellipsoid", "full", "least_squares"), ("full ellipsoid, zhou", "full", "zhou"),
+    ("quartic", "quartic", "least_squares"), ("quartic, zhou", "quartic", "zhou"),
+)  # fmt: skip
+HULL = 3000  # wrenches whose hull stands for the limit surface itself
+POINTS = {"hull of 20 points": None, "hull of 50 points": 50}
+WINKLER = "Winkler foundation, planar contact"
 
 
 @dataclass(frozen=True)
@@ -218,3 +227,23 @@ def _effects(scene: Scene) -> Iterable[Knob]:
             ranked.insert(-1, "auto")
         steps = [Level(v.replace("_", " "), ((f"effects.{name}", v),)) for v in ranked]
         yield Knob(f"effect: {name.replace('_', ' ')}", "level of the effect", tuple(steps), -1)
+
+
+# --- knobs that change what is made of a contact, and not the contact ------------------------------------------------
+
+
+def judging_knobs(scene: Scene) -> dict[str, list[str]]:
+    """Levels of every knob, the cheapest first; the last is the reference."""
+    samples = sorted({*SAMPLES, scene.limit_surface.samples})
+    return {
+        "contact model": [WINKLER, "finite elements, planar", "finite elements, curved"],
+        "motions sampled": [str(n) for n in samples],
+        "limit surface": [*(name for name, *_ in SURFACES), f"hull of {HULL} wrenches"],
+        "score": [*POINTS, "exact"],
+    }
+
+
+def expected_seconds(knob: str, level: str) -> float:
+    """Rough time of one case [s], before anything is measured."""
+    slow = {"hull of 20 points": 0.5, "hull of 50 points": 5.0}
+    return slow.get(level, 0.03) * (1 if knob == "score" else 2)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.accuracy.cost.knobs import EACH_ALONE, Level, with_level
-from softjaw.study.result.result import CaseFailure
+from softjaw.study.case.result import CaseFailure
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.probes import Probe
@@ -149,11 +149,11 @@ def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, Case], str]:
     return found, message
 
 
-def from_maps(values: dict[str, Any]) -> FloatArray:
-    """`QUANTITIES` of a case in the curved model."""
-    names = ("e_n", "f_x_max", "f_y_max", "tau_z_max", "quality")
-    e_n, f_x, f_y, tau_z, score = (float(values[f"maps/{name}"][0]) for name in names)
-    return np.array([e_n, max(f_x, f_y), tau_z, score])
+def from_maps(values: dict[str, Any], number: int = 0, score: str = "quality") -> FloatArray:
+    """`QUANTITIES` of a case in a friction model, by default the curved one."""
+    names = ("e_n", "f_x_max", "f_y_max", "tau_z_max", score)
+    e_n, f_x, f_y, tau_z, volume = (float(values[f"maps/{name}"][number]) for name in names)
+    return np.array([e_n, max(f_x, f_y), tau_z, volume])
 
 
 def warm_up(probe: Probe) -> None:

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import GapObject
-from softjaw.friction.patch import NoContactError
-from softjaw.study.accuracy.cost.winkler import POINTS, WinklerPad, winkler_pad
+from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.study.case import model, sweep
 from softjaw.study.case.build import build_object
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import Gripper
 
+FloatArray = NDArray[np.float64]
+POINTS = (50, 22)  # along length and width
+STEPS, FLAT = 8, 0.2  # Newton steps along the approach, and the least cosine that they divide by
 MOST_LOOKED_AT = 60  # units of work, evenly spread, among which the candidates are chosen
 FINGER_POINTS = (25, 11)
 COARSE_POINTS = ((10, 5), (14, 7))
@@ -128,7 +131,7 @@ def _seen(unit: Any) -> _Seen | None:
     """None where a pad passes the object."""
     gripper, forces = unit.scene.gripper, unit.scene.load.normal_force
     try:
-        finger = first_finger(build_object(unit.scene.object), unit)
+        finger = model.approach(build_object(unit.scene.object), unit.candidate.poses[0], gripper.pad_size)
         arm = _arm(winkler_pad(gripper, finger, FINGER_POINTS), forces[-1])
         fine, *coarse = (_arm(winkler_pad(gripper, finger, points), forces[0]) for points in (POINTS, *COARSE_POINTS))
     except (ValueError, RuntimeError, NoContactError):
@@ -143,11 +146,6 @@ def _arm(pad: WinklerPad, force: float) -> float:
     return float(patch.load @ np.linalg.norm(patch.centroid - centre, axis=1) / patch.load.sum())
 
 
-def first_finger(obj: GapObject, unit: Any) -> model.Finger:
-    """Finger 1 at first touch."""
-    return model.approach(obj, unit.candidate.poses[0], unit.scene.gripper.pad_size)
-
-
 def _point(scene: Scene, unit: Any) -> str:
     """The unit's point of the sweep, in words."""
     if not scene.sweep:
@@ -155,3 +153,72 @@ def _point(scene: Scene, unit: Any) -> str:
     values = unit.scene.effective()
     told = [f"{key} = {values[key.partition('.')[0]][key.partition('.')[2]]}" for key in scene.sweep]
     return f" ({', '.join(told)})"
+
+
+# --- Winkler foundation -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class WinklerPad:
+    """A pad of independent springs and a planar contact patch: the milliseconds baseline.
+
+    Every point of the pad's face is a spring of the foam's stiffness in confined compression, ``E_oed / thickness``,
+    and feels nothing of its neighbours; all normals are those of the undeformed pad. The travel at a force is exact.
+
+    Parameters
+    ----------
+    place : (n, 2) array
+        Middles of equal cells of the pad's face [m].
+    area : float
+        Of each cell [m^2].
+    height : (n,) array
+        Travel at which each cell touches [m]; infinite where there is no object before it.
+    stiffness : float
+        Pressure over shortening [Pa/m].
+    """
+
+    place: FloatArray
+    area: float
+    height: FloatArray
+    stiffness: float
+
+    def travel(self, force: float) -> float:
+        """Travel that carries a normal force [m]: the force is piecewise linear in it, with a knee at every height."""
+        h = np.sort(self.height[np.isfinite(self.height)])
+        count = np.arange(1, len(h) + 1)
+        wanted = (force / (self.stiffness * self.area) + np.cumsum(h)) / count
+        return float(wanted[np.flatnonzero(wanted >= h)[-1]])
+
+    def patch(self, force: float) -> ContactPatch:
+        """Planar patch in the pad's frame at a normal force [N]."""
+        pressure = self.stiffness * np.maximum(self.travel(force) - self.height, 0.0)
+        place = np.column_stack([self.place, np.zeros(len(self.place))])
+        side = 0.5 * np.array([np.ptp(np.unique(x)) / max(len(np.unique(x)) - 1, 1) for x in self.place.T])
+        ring = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*side, 0.0]
+        normal = np.broadcast_to([0.0, 0.0, 1.0], place.shape)
+        return ContactPatch(place, np.full(len(place), self.area), normal, pressure, place[:, None] + ring)
+
+
+def winkler_pad(gripper: Gripper, finger: model.Finger, points: tuple[int, int] = POINTS) -> WinklerPad:
+    """Bed of springs of a pad at first touch with an object."""
+    length, width, thickness = gripper.pad_size
+    nx, ny = points
+    x, y = ((np.arange(n) + 0.5) / n - 0.5 for n in (nx, ny))
+    place = np.stack(np.meshgrid(length * x, width * y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return WinklerPad(place, length * width / (nx * ny), _heights(finger, place, thickness), stiffness(gripper))
+
+
+def stiffness(gripper: Gripper) -> float:
+    """Modulus of confined compression over the pad's thickness [Pa/m]."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
+
+
+def _heights(finger: model.Finger, place: FloatArray, thickness: float) -> FloatArray:
+    """Distance along the approach from points of the face to the object ``(n,)`` [m]."""
+    x = np.column_stack([place, np.zeros(len(place))])
+    for _ in range(STEPS):
+        gap, normal, _ = finger.gap(x)
+        x[:, 2] = np.clip(x[:, 2] + gap / np.maximum(-normal[:, 2], FLAT), 0.0, thickness)
+    gap = finger.gap(x)[0]
+    return np.where(np.abs(gap) < 1e-3 * thickness, x[:, 2], np.inf)

@@ -1,4 +1,4 @@
-"""What a result file says of the settings that ``accuracy.e_n`` chose: prediction, error on probes, time."""
+"""What a result file says of the settings that ``accuracy.e_n`` chose; imports next to nothing, as a plan needs it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from softjaw.study.result.layout import Derived
 from softjaw.study.scene import Scene
+from softjaw.study.scene.text import toml_text
 
 if TYPE_CHECKING:
     from softjaw.study.accuracy.cost.choose import Choice
@@ -43,9 +44,6 @@ def overrides(choice: Choice | None) -> list[str]:
     """The chosen values as overrides that say where they come from."""
     if choice is None:
         return []
-    from softjaw.study.accuracy.cost.words import choice_text
-    from softjaw.study.scene.text import toml_text
-
     texts = [toml_text({"x": {"x": value}}).splitlines()[1].partition(" = ")[2] for value in choice.values.values()]
     made = [f"{key}={text}  # chosen" for key, text in zip(choice.values, texts, strict=True)]
-    return [*made, f"# {choice_text(choice)}"]
+    return [*made, f"# {choice}"]

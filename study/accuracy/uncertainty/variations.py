@@ -1,16 +1,18 @@
-"""What is changed in the solves of a probe: an input moved by its half-width, the mesh, or where the gripper stands."""
+"""Probes: which candidates they are, and what is changed when they are solved again.
+
+An input is moved by its half-width, the mesh is made coarser, or the gripper stands elsewhere.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from softjaw.fem.objects.pose import Pose
 from softjaw.study.case.build import has_wall, pad_shape
-from softjaw.study.case.sheet_level import sheet_level
 from softjaw.study.scene import Scene
 
 COARSEST_WALL, FEWEST = 50.0, 2  # mm, and elements along a side, as scenes allow
@@ -49,6 +51,8 @@ def by_formula(scene: Scene) -> tuple[str, ...]:
     mu. A pad on a rigid object and a rigid sheet is in a state that depends only on the force over its modulus, so a
     stiffer pad is a smaller force.
     """
+    from softjaw.study.case.effects import sheet_level  # loads PETSc, and most scenes ask for no uncertainty
+
     wall = has_wall(scene.object) and scene.effects.object != "rigid"
     alike = not wall and not sheet_level(scene).elastic and len(scene.load.normal_force) > 1
     holds = {
@@ -128,3 +132,39 @@ def moved_poses(poses: Sequence[Pose], shift: float, turn: float) -> tuple[Pose,
         return Pose(turning @ pose.rotation, origin)
 
     return tuple(moved(pose) for pose in poses)
+
+
+def probe_candidates(scene: Scene, units: Sequence[Any]) -> tuple[int, ...]:
+    """Numbers of the candidates that are probes, rising; none where no further solve is asked for.
+
+    Unless they are named they are units at quantiles of the e_n that a Winkler foundation gives, so they do not depend
+    on how many ranks there are.
+    """
+    own = scene.uncertainty
+    if not own.parts or not changes(scene):
+        return ()
+    from softjaw.study.accuracy.cost.probes import spread  # loads PETSc, as above
+
+    forces = len(scene.load.normal_force)
+    first = {unit.index: unit.rows[0][0] // forces for unit in units}
+    if isinstance(own.probes, int):
+        return tuple(sorted(first[unit.index] for unit in spread(units, own.probes)))
+    named = own.numbers(scene.candidates.labels)
+    serving = {rows[0] // forces: first[unit.index] for unit in units for rows in unit.rows}
+    return tuple(sorted({serving[number] for number in named}))
+
+
+def changes(scene: Scene) -> tuple[str, ...]:
+    """What is changed in the further solves of a probe, in words."""
+    return tuple(variation.name for variation in variations(scene))
+
+
+def with_probes(scene: Scene, units: Sequence[Any], chosen: Sequence[int]) -> tuple[Any, ...]:
+    """The units of work, those of the probes marked, and as much more expensive as they are."""
+    if not chosen:
+        return tuple(units)
+    forces, times = len(scene.load.normal_force), 1 + len(changes(scene))
+    return tuple(
+        replace(unit, probe=True, cost=times * unit.cost) if unit.rows[0][0] // forces in chosen else unit
+        for unit in units
+    )

@@ -1,4 +1,7 @@
-"""Bands in a result file: what they are, and how they follow from the cases and the probes once all are solved."""
+"""95 % intervals in a result file: what they are, and how they follow from cases and probes once all are solved.
+
+What has a closed form is taken from it; errors of a few probes are carried to all cases.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.accuracy.uncertainty import carrying
+from softjaw.study.accuracy.uncertainty.variations import by_formula, variations
 from softjaw.study.case.sweep import axes
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
@@ -36,6 +39,9 @@ RULES = {
     "probes": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
               " larger).",
 }  # fmt: skip
+TIE = 1e-6  # relative difference of values that is none: images of one grasp
+TIMES = 2.0  # root mean squares of the probes that a band is wide: about 95 of 100 cases lie within
+POWER = 5  # of mu in the quality of contacts that face each other: three axes of one finger's surface, two of the other
 
 
 def band(name: str) -> str:
@@ -53,7 +59,7 @@ def derived(scene: Scene) -> list[Derived]:
     own = scene.uncertainty
     if not own.parts:
         return []
-    known, over = _by_formula(scene), tuple(axis.name for axis in axes(scene))
+    known, over = by_formula(scene), tuple(axis.name for axis in axes(scene))
     made = []
     for name, units in NAMES.items():
         text = (
@@ -70,12 +76,6 @@ def derived(scene: Scene) -> list[Derived]:
     return made
 
 
-def _by_formula(scene: Scene) -> tuple[str, ...]:
-    from softjaw.study.accuracy.uncertainty.variations import by_formula
-
-    return by_formula(scene)
-
-
 def _rule(of: str, known: tuple[str, ...]) -> str:
     if of == "mesh":
         return "map" if of in known else "mesh"
@@ -87,7 +87,7 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
     own = scene.uncertainty
     if not own.parts:
         return
-    known = _by_formula(scene)
+    known = by_formula(scene)
     for name in NAMES:
         values = _done(writer, f"{name}/curved")
         total = np.zeros(values.shape)
@@ -115,18 +115,16 @@ def _share(
         return _done(writer, f"{name}_error/{name}_error")
     if of == "modulus":
         force = np.asarray(scene.load.normal_force)
-        return carrying.change_by_modulus(force, values, own.shear_modulus_percent / 100)
+        return change_by_modulus(force, values, own.shear_modulus_percent / 100)
     if name == "e_n":
         return np.zeros(values.shape)
-    from softjaw.study.accuracy.uncertainty.rescoring import change_by_mu
+    from softjaw.study.accuracy.uncertainty.probing import change_by_mu
 
     return change_by_mu(writer.result(), scene, values)
 
 
 def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArray, of: str) -> FloatArray:
     """What the further solves of the probes say of every case."""
-    from softjaw.study.accuracy.uncertainty.variations import variations
-
     layout, solves = writer.layout, variations(scene)
     mine = [i for i, v in enumerate(solves) if v.part == of]
     flat = values.reshape(-1, values.shape[-1])
@@ -135,16 +133,16 @@ def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArr
         changes = (
             writer.read(f"probes/{name}").reshape(len(at), flat.shape[-1], -1)[..., mine] / flat[at][..., None] - 1
         )
-    change = carrying.largest_side(changes, [solves[i].pair for i in mine])
+    change = largest_side(changes, [solves[i].pair for i in mine])
     sound = _sound(writer, at, change)
     if of == "mesh":
         area = _done(writer, "contact_area/contact_area").reshape(flat.shape)
-        share = carrying.carried(sound, area[at], area)
+        share = carried(sound, area[at], area)
     else:
-        share = carrying.carried_by_force(sound, flat.shape)
+        share = carried_by_force(sound, flat.shape)
     if of == "pose":
         share = np.fmax(share, _slope(scene, values).reshape(flat.shape))
-    return carrying.at_least_own(share, change, layout.probes, flat).reshape(values.shape)
+    return at_least_own(share, change, layout.probes, flat).reshape(values.shape)
 
 
 def _slope(scene: Scene, values: FloatArray) -> FloatArray:
@@ -152,7 +150,7 @@ def _slope(scene: Scene, values: FloatArray) -> FloatArray:
     where = scene.candidates
     if where.poses or where.roll or len(where.station_values) < 2:
         return np.zeros(values.shape)
-    return carrying.change_along(np.array(where.station_values), values, scene.uncertainty.pose)
+    return change_along(np.array(where.station_values), values, scene.uncertainty.pose)
 
 
 def _sound(writer: ResultWriter, at: list[int], change: FloatArray) -> FloatArray:
@@ -160,3 +158,138 @@ def _sound(writer: ResultWriter, at: list[int], change: FloatArray) -> FloatArra
     flags: Any = np.nan_to_num(writer.read("flags/flags").reshape(-1, change.shape[-1])[at]).astype(int)
     sound = np.where(flags & LOST, np.nan, change)
     return sound if np.isfinite(sound).any() else change
+
+
+# --- sensitivities, on plain arrays -----------------------------------------------------------------------------------
+
+
+def carried(change: FloatArray, area: FloatArray, all_areas: FloatArray) -> FloatArray:
+    """Error of the mesh of every case from that of the probes: it falls with the number of loaded faces.
+
+    Parameters
+    ----------
+    change : (p, k) array
+        Relative differences between two meshes at the probes, for each force; NaN where there are none.
+    area : (p, k) array
+        Their contact areas.
+    all_areas : (..., k) array
+        Those of all cases.
+
+    Returns
+    -------
+    (..., k) array
+        Twice the root mean square of change x area over probes and forces, over the area of each case.
+
+    Examples
+    --------
+    >>> carried(np.array([[0.02, 0.01]]), np.array([[1.0, 2.0]]), np.array([[1.0, 2.0, 4.0]])).tolist()
+    [[0.04, 0.02, 0.01]]
+    """
+    return TIMES * _rms(change * area, None) / all_areas
+
+
+def carried_by_force(change: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Relative change of every case from that of the probes: twice its root mean square at each force.
+
+    Parameters
+    ----------
+    change : (p, k) array
+        NaN where there is none.
+    shape : tuple of int
+        Of all cases, the last one being the force.
+
+    Examples
+    --------
+    >>> carried_by_force(np.array([[0.1, 0.3], [-0.1, np.nan]]), (1, 2)).round(12).tolist()
+    [[0.2, 0.6]]
+    """
+    return np.broadcast_to(TIMES * _rms(change, 0), shape).copy()
+
+
+def _rms(values: FloatArray, axis: int | None) -> FloatArray:
+    known = np.isfinite(values)
+    count = known.sum(axis=axis)
+    mean = np.where(known, values, 0.0) ** 2
+    return np.sqrt(np.divide(mean.sum(axis=axis), count, out=np.full(np.shape(count), np.nan), where=count > 0))
+
+
+def at_least_own(share: FloatArray, change: FloatArray, probes: tuple[int, ...], values: FloatArray) -> FloatArray:
+    """The band of a probe, and of its images, is no narrower than what was seen there.
+
+    ``share`` and ``values`` are ``(candidates, k)``, ``change`` ``(p, k)``.
+    """
+    found = share.copy()
+    for own, number in zip(np.abs(change), probes, strict=True):
+        alike = np.isclose(values, values[number], rtol=TIE, atol=0.0, equal_nan=True).all(axis=-1)
+        found[alike] = np.fmax(found[alike], own)
+    return found
+
+
+def largest_side(changes: FloatArray, pairs: list[int]) -> FloatArray:
+    """Several inputs of one part together: of each the larger side, added as independent ones.
+
+    ``changes`` is ``(..., v)``, ``pairs`` tells the input of each of the ``v`` solves.
+
+    >>> largest_side(np.array([0.3, -0.1, 0.4]), [0, 0, 1]).round(12).tolist()
+    0.5
+    """
+    sides = [np.abs(changes[..., [p == pair for p in pairs]]) for pair in dict.fromkeys(pairs)]
+    return np.sqrt(sum(side.max(axis=-1) ** 2 for side in sides))
+
+
+def _log(values: FloatArray) -> FloatArray:
+    """Logarithm; NaN where there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(np.where(values > 0, values, np.nan))
+
+
+def change_by_modulus(force: FloatArray, values: FloatArray, share: float) -> FloatArray:
+    """Relative change of values for a modulus larger by ``share``, where they depend on force over modulus only.
+
+    It is minus the slope of ln(value) over ln(force), times the share.
+
+    Parameters
+    ----------
+    force : (k,) array
+        At least two [N].
+    values : (..., k) array
+        Positive; NaN where there is none.
+    share : float
+
+    Examples
+    --------
+    >>> change_by_modulus(np.array([1.0, 2.0, 4.0]), np.array([1.0, 2.0, 4.0]), 0.1).round(12).tolist()
+    [-0.1, -0.1, -0.1]
+    """
+    return -share * np.gradient(_log(values), np.log(force), axis=-1)
+
+
+def change_along(station: FloatArray, values: FloatArray, shift: float) -> FloatArray:
+    """Relative change of a map for a shift along its stations, as its own slope tells, without sign.
+
+    Parameters
+    ----------
+    station : (s,) array
+        At least two [m].
+    values : (s, ...) array
+        Positive; NaN where there is none.
+    shift : float
+        [m].
+
+    Examples
+    --------
+    >>> change_along(np.array([0.0, 1.0, 2.0]), np.exp([0.0, 3.0, 6.0]), 0.1).round(12).tolist()
+    [0.3, 0.3, 0.3]
+    """
+    return np.abs(shift * np.gradient(_log(values), station, axis=0))
+
+
+def facing_change_by_mu(share: float) -> float:
+    """Relative change of the quality of contacts that face each other for a mu larger by ``share``.
+
+    Half the difference between both sides.
+
+    >>> round(facing_change_by_mu(0.01), 6)
+    0.05001
+    """
+    return ((1 + share) ** POWER - (1 - share) ** POWER) / 2

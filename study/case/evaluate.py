@@ -1,0 +1,311 @@
+"""Friction, fit and score in one function: two contact patches in, all values of a case out.
+
+The study, the cost study and the uncertainty call `evaluate` or `quality`; ``softjaw patch`` fits and scores with the
+same `Contact` and `fit_surfaces`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softjaw.friction.motion import cor_grid
+from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.scoring.contact import PolytopeBody
+from softjaw.scoring.epsilon_search import epsilon
+from softjaw.scoring.polytope import graspit_vertices, polytope_volume
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.score import Score, score
+from softjaw.scoring.task import hold_task, weight_wrench
+from softjaw.scoring.volume import volume_linf
+from softjaw.study.case.contact import Contact, angles, pose_flags
+from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
+from softjaw.study.flags import raised
+from softjaw.study.quantities import MODELS
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import LimitSurface as Choice
+
+FloatArray = NDArray[np.float64]
+FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
+NEAR = 1e-2  # relative gap between the bounds of epsilon
+LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
+PLANAR = (("flat", ""), ("projected", "_projected"))  # planar model, suffix of the quantities that compare with it
+Fits = Mapping[str, SurfaceFit]  # by friction model
+
+
+@dataclass(frozen=True)
+class EvaluationSettings:
+    """What is computed from two contacts.
+
+    Parameters
+    ----------
+    arms, torques : float
+        Lengths by which arms of forces and torques about the normals are divided [m].
+    surface : LimitSurface
+        Section ``[limit_surface]`` of a scene.
+    weight : (6,) array, optional
+        Wrench of the object's weight [N, N m]; with it safety factors are computed.
+    cor_grid : tuple
+        Grid of centres of rotation whose wrenches are computed; none where it is empty.
+    epsilon_everywhere, graspit, six, sampled : bool
+        Whether to find epsilon in any pose, GraspIt!'s volume, 6-D ellipsoids, and to keep the sampled wrenches.
+    """
+
+    arms: float
+    torques: float
+    surface: Choice = field(default_factory=Choice)
+    weight: ArrayLike | None = None
+    cor_grid: Any = ()
+    epsilon_everywhere: bool = False
+    graspit: bool = False
+    six: bool = False
+    sampled: bool = False
+
+
+def lengths(scene: Scene, obj: Any) -> tuple[float, float]:
+    """Lengths of arms and of torques about the normals [m], as ``[score]`` and the object give them."""
+    arms = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
+    return (
+        arms,
+        arms if scene.score.torque_scale == "object" else scene.score.contact_length or scene.gripper.pad_length,
+    )
+
+
+def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
+    """What a scene asks for."""
+    weight = None
+    if scene.object.mass is not None:
+        centre = scene.task.centre_of_mass or np.mean(obj.bounds, axis=0)
+        weight = weight_wrench(scene.object.mass, scene.task.weight_direction, centre)
+    return EvaluationSettings(
+        *lengths(scene, obj), scene.limit_surface, weight, scene.friction.cor_grid,
+        epsilon_everywhere=scene.score.epsilon == "everywhere", graspit=scene.score.graspit,
+        six=scene.effects.wrench == "6-D", sampled=bool(scene.sampled),
+    )  # fmt: skip
+
+
+def evaluate(
+    contacts: Sequence[Contact], settings: EvaluationSettings
+) -> tuple[dict[str, Any], list[dict[str, SurfaceFit]]]:
+    """Friction limits, limit surfaces and scores of a grasp by two contacts.
+
+    Parameters
+    ----------
+    contacts : two Contact
+        With poses in the object's frame.
+    settings : EvaluationSettings
+
+    Returns
+    -------
+    values : dict
+        Keyed ``group/name`` as in ``study.quantities``, in SI units; ``maps/flags`` has the flags that follow
+        from patches alone.
+    fits : list of dict
+        For each contact its limit surface in every friction model.
+    """
+    fits = _per_patch(contacts, lambda c: {m: fit_surface(c, m, settings.surface) for m in MODELS})
+    scores, best = _scores(contacts, fits, settings)
+    values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.sampled, settings.six)
+    values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
+    if settings.cor_grid:
+        values["fingers/cor_wrench"] = _per_patch(contacts, lambda c: _cor_wrenches(c, settings.cor_grid))
+    if settings.weight is not None:
+        values["maps/safety_factor"] = _safety_factors(contacts, fits, settings.weight)
+    return values, fits
+
+
+def _per_patch(contacts: Sequence[Contact], work: Callable[[Contact], Any]) -> list[Any]:
+    """A result for each contact, computed once where the second one is an image with the patch of the first."""
+    first = work(contacts[0])
+    return [first, first if contacts[1].patch is contacts[0].patch else work(contacts[1])]
+
+
+def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
+    """Friction limits of each contact, and of the weaker one."""
+    limits = {
+        name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
+        for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
+    }
+    S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
+    tau_pure = [c.tau_pure for c in contacts]
+    values = {
+        "maps/tau_pure": min(tau_pure),
+        "maps/S": S.mean(),
+        "maps/F_N": F_N.mean(),
+        "maps/contact_area": np.mean([float(c.patch.area[c.loaded].sum()) for c in contacts]),
+        "maps/p_max": max(float(c.patch.pressure.max()) for c in contacts),
+        "maps/contact_distance": float(np.linalg.norm(contacts[1].origin - contacts[0].origin)),
+        "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
+        "maps/misalignment": max(angles(*contacts)),
+        "fingers/tau_pure": tau_pure,
+        "fingers/S": S,
+        "fingers/F_N": F_N,
+        "fingers/frame_origin": [c.frame.origin for c in contacts],
+        "fingers/frame_axes": [c.frame.axes for c in contacts],
+        "fingers/frame_flag": [int(c.frame.flag) for c in contacts],
+        "fingers/pose_rotation": np.array([c.pose.rotation for c in contacts]),
+        "fingers/pose_origin": np.array([c.pose.origin for c in contacts]),
+    }
+    for name in ("semi_axes", "rank"):
+        values[f"limit_surface/{name}"] = [[getattr(c.ellipsoids[m], name) for m in MODELS] for c in contacts]
+    for name, key in LIMITS:
+        values |= {f"maps/{key}": limits[name].min(axis=0), f"fingers/{key}": limits[name]}
+    values |= {f"maps/{key}": limits[key].min(axis=0) for key in ("e_n", "e_n_projected")}
+    return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
+
+
+def _cor_wrenches(contact: Contact, grid: Any) -> FloatArray:
+    """Friction wrenches ``(f_x, f_y, tau_z)`` for the paper's grid of centres of rotation."""
+    return friction_wrench(contact.local, cor_grid(grid, contact.rho), contact.mu)[:, [0, 1, 5]]
+
+
+def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
+    """Share of each planar model's claim that the curved contact cannot carry, for both forces and the torque."""
+    shares = {}
+    for name, _ in LIMITS:
+        for planar, suffix in PLANAR:
+            pairs = [(getattr(c.limits["curved"], name), getattr(c.limits[planar], name)) for c in contacts]
+            shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)
+    return shares
+
+
+def mesh_errors(
+    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], settings: EvaluationSettings
+) -> dict[str, float]:
+    """Differences of the curved model's results to those of the mesh half as fine; ``values`` are of the fine one."""
+    errors = {}
+    for name, key in (("e_n", "e_n"), *LIMITS):
+        pairs = [tuple(getattr(c.limits["curved"], name) for c in pair) for pair in zip(fine, coarse, strict=True)]
+        errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
+    for key, value in _overestimates(coarse).items():
+        errors[f"maps/{key}_error"] = abs(values[f"maps/{key}"] - value)
+    best, other = values["maps/quality"][0], quality(coarse, settings)
+    return errors | {"maps/quality_error": abs(other - best) / best if best > 0 else np.nan}
+
+
+# --- score ------------------------------------------------------------------------------------------------------------
+
+
+def _scores(
+    contacts: Sequence[Contact], fits: Sequence[Fits], settings: EvaluationSettings
+) -> tuple[dict[str, Any], Score]:
+    """Maps of the grasp's quality, one value for each friction model, and the score of the curved one.
+
+    In closed form where the contacts face each other, exactly in any pose elsewhere.
+    """
+    facing = max(angles(*contacts)) <= FACING
+    found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
+    if settings.graspit:
+        found["quality_graspit"] = [_graspit(contacts, m, settings, facing) for m in MODELS]
+    closed = {m: _closed(contacts, m, settings) for m in MODELS}
+    tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
+    for m in MODELS:
+        both = _closed_volume(
+            [(c.mu**3 * own[m].rho / settings.torques * own[m].surface.volume, c.mu**2 * own[m].surface.shadow_area)
+             for own, c in zip(fits, contacts, strict=True)], contacts, settings)  # fmt: skip
+        if facing or closed[m].quality == 0:
+            values = closed[m].quality, both, closed[m].epsilon
+        else:
+            bodies = [own[m].body(c.mu) for own, c in zip(fits, contacts, strict=True)]
+            if not any(isinstance(body, Quartic) for body in bodies):
+                both = _volume(contacts, bodies, settings)
+            else:
+                tilt = _tilt(contacts, bodies, settings) if math.isnan(tilt) else tilt
+                both *= tilt
+            ellipsoids = [c.ellipsoids[m] for c in contacts]
+            least = _epsilon(contacts, ellipsoids, settings) if settings.epsilon_everywhere else math.nan
+            values = _volume(contacts, ellipsoids, settings), both, least
+        for name, value in zip(("quality", "quality_fitted", "epsilon"), values, strict=True):
+            found[name].append(value)
+    return {f"maps/{name}": values for name, values in found.items()}, closed[MODELS[0]]
+
+
+def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: str = MODELS[0]) -> float:
+    """The map ``quality`` of one friction model alone."""
+    closed = _closed(contacts, model, settings).quality
+    if max(angles(*contacts)) <= FACING or closed == 0:
+        return closed
+    return _volume(contacts, [c.ellipsoids[model] for c in contacts], settings)
+
+
+def _closed(contacts: Sequence[Contact], model: str, settings: EvaluationSettings) -> Score:
+    """Score of the ellipsoids of contacts that face each other."""
+    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
+    return score(*(c.ellipsoids[model].semi_axes for c in contacts), distance, settings.arms, settings.torques)
+
+
+def _closed_volume(
+    sizes: Sequence[tuple[float, float]], contacts: Sequence[Contact], settings: EvaluationSettings
+) -> float:
+    """Volume of the grasp wrench space of contacts that face each other, from volume and shadow of both surfaces."""
+    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
+    return volume_linf(*sizes[0], *sizes[1], distance / settings.arms)
+
+
+def _graspit(contacts: Sequence[Contact], model: str, settings: EvaluationSettings, facing: bool) -> float:
+    """Volume with GraspIt!'s 20 points on each ellipsoid; torques over their length decide where the points lie."""
+    scale = np.array([1.0, 1.0, settings.torques])
+    axes = [c.ellipsoids[model].semi_axes / scale for c in contacts]
+    if any((a == 0).any() for a in axes):
+        return 0.0
+    points = [graspit_vertices(a) for a in axes]
+    if facing:
+        return _closed_volume([polytope_volume(p) for p in points], contacts, settings)
+    return volume_in_pose(contacts, [PolytopeBody(p * scale) for p in points], settings)
+
+
+def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], settings: EvaluationSettings) -> float:
+    """Volume in the pose by that of the same contacts face to face, for ellipsoids near the bodies.
+
+    It hardly depends on the shape: within 1e-3 it is that of the quartics themselves, whose volume in any pose takes
+    several times as long.
+    """
+    near = [body.ellipsoid if isinstance(body, Quartic) else body for body in bodies]
+    if any(body.rank < 3 for body in near):
+        return 0.0
+    sizes = [(body.volume / settings.torques, body.shadow_area) for body in near]
+    return _volume(contacts, near, settings) / _closed_volume(sizes, contacts, settings)
+
+
+def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
+    """Volume of the grasp wrench space in any pose; 0 for a contact that carries no load in some direction."""
+    return 0.0 if any(body.rank < 3 for body in bodies) else volume_in_pose(contacts, bodies, settings)
+
+
+def volume_in_pose(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
+    """Volume of the grasp wrench space of any full bodies in the pose that the contacts have."""
+    soft = [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
+    return pose_volume(*soft, settings.arms, settings.torques, with_l1=False).linf
+
+
+def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
+    """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
+    middle = 0.5 * (contacts[0].origin + contacts[1].origin)
+    soft = [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
+    return epsilon(soft, settings.arms, settings.torques, middle, tolerance=NEAR).upper
+
+
+def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: ArrayLike) -> list[float]:
+    """Largest multiple of the object's weight that the grasp holds, for each friction model.
+
+    Each finger presses with at most the normal force of this case. Its friction is the hull of the sampled wrenches,
+    which lies inside the exact limit surface: the factor errs on the safe side, by about 1 % with 500 samples.
+    """
+    if contacts[0].mu == 0 or any(fit.surface.rank < 3 for own in fits for fit in own.values()):
+        return [np.nan] * len(MODELS)
+    grip = [c.limits[MODELS[0]].F_N for c in contacts]
+    factors = []
+    for m in MODELS:
+        soft = []
+        for c, own in zip(contacts, fits, strict=True):
+            wrench = c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]]
+            soft.append(c.soft(PolytopeBody(np.vstack([wrench, -wrench]))))
+        factors.append(hold_task(soft, grip, weight).safety_factor)
+    return factors
