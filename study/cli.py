@@ -15,10 +15,8 @@ from collections.abc import Callable, Sequence
 from typing import IO, Any
 
 from softjaw.study import commands
-from softjaw.study.accuracy.cost.command import add_options as add_cost_options
 from softjaw.study.environment import keep_compiled_loops, pin_threads
 from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError, complain, first_rank
-from softjaw.study.patch.command import add_options as add_patch_options
 from softjaw.study.run.memory import is_out_of_memory, no_room
 from softjaw.study.show.figures.command import add_options as add_figure_options
 from softjaw.study.show.tables.watch import add_options as add_watch_options
@@ -32,6 +30,7 @@ KINDS = {
     "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
+SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
 SHELLS = ("bash", "zsh", "fish")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words
     "prepare": (
@@ -197,8 +196,8 @@ def program() -> Program:
             epilog=f"example:\n  {ranks}softjaw {example}",
         )  # fmt: skip
         made[name].set_defaults(command=getattr(commands, name))
-    for name, add_options in (("init", _add_init_options), ("cost", add_cost_options), ("watch", add_watch_options),
-                              ("view", add_view_options), ("figure", add_figure_options), ("patch", add_patch_options),
+    for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", add_watch_options),
+                              ("view", add_view_options), ("figure", add_figure_options), ("patch", _add_patch_options),
                               ("scale", _add_scale_options)):  # fmt: skip
         add_options(made[name])
     _add_scene_options(made)
@@ -224,8 +223,8 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_scene_options(made: dict[str, Any]) -> None:
-    """What ``check``, ``plan`` and ``run`` take."""
-    for parser in (made["check"], made["plan"], made["run"]):
+    """What the commands take that read a scene."""
+    for parser in (made["check"], made["plan"], made["cost"], made["run"]):
         parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
         parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
                             help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
@@ -256,6 +255,35 @@ def _add_result_options(made: dict[str, Any]) -> None:
     made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
     add_choice(made["report"])
     made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+
+
+def _add_cost_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("-o", metavar="FILE", dest="output", help="file of the study (default: results/<scene>-cost.hdf); the page is "
+        "written beside it")  # fmt: skip
+    add("--candidate", metavar="NAME", action="append", default=[], dest="candidates", help="candidate to measure, by "
+        "number or label; repeatable (default: three of them)")  # fmt: skip
+    add("--time-limit", metavar="SECONDS", type=_positive, default=300.0, help="CPU seconds of the whole study; "
+        "finer levels are left out (default 300)")  # fmt: skip
+
+
+def _add_patch_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; see the README for the columns")
+    add("--mu", type=_positive, default=0.8, help="friction coefficient (default 0.8)")
+    add("--long-side", type=_direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the pad's long "
+        "side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)")  # fmt: skip
+    add("--unit", choices=("m", "cm", "mm"), help="of lengths and areas that carry none in the file")
+    add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="of a pressure that carries none in the file")
+    add("--pressure-name", metavar="NAME", help="column or data array that holds the pressure (default: pressure)")
+    add("--flip-normals", action="store_true", help="turn all normals; they point into the object, as the finger does")
+    add("--other", metavar="FILE", help="the other contact of the grasp, in the same coordinates, units and options")
+    add("--distance", type=_positive, metavar="MM", help="between two such contacts that face each other")
+    add("--object-length", type=_positive, metavar="MM", help="divides torques of forces (default: the distance)")
+    add("--contact-length", type=_positive, metavar="MM", help="divides torques about the normals (default: rho)")
+    add("--surface", choices=SURFACES, default="quartic", help="limit surface that is scored (default: quartic)")
+    add("-o", metavar="PICTURE", dest="picture", help="also write sections of the limit surface (.png or .svg)")
+    add("--json", action="store_true", help="as JSON, SI units")
 
 
 def _add_scale_options(parser: argparse.ArgumentParser) -> None:
@@ -295,3 +323,13 @@ def _positive(text: str) -> float:
     if not 0 < (value := float(text)) < math.inf:
         raise argparse.ArgumentTypeError(f"found {text}, expected a number above 0")
     return value
+
+
+def _direction(text: str) -> list[float]:
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
+        raise argparse.ArgumentTypeError(f"found {text}, expected three numbers such as 1,0,0, not all of them 0")
+    return found

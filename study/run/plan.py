@@ -16,7 +16,6 @@ from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.run.progress import duration
 from softjaw.study.scene.grasp_checks import half_extent_mm
-from softjaw.study.show.tables.overview import aligned
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -182,7 +181,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
     }
-    return "\n".join(aligned(rows))
+    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items())
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:

@@ -1,32 +1,16 @@
-"""``softjaw cost``: its options, and the study from scene to page."""
+"""``softjaw cost``: the study from scene to page."""
 
 from __future__ import annotations
 
-import math
 import os
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
 from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError
 from softjaw.study.writing import write_file
 
-TIME_LIMIT = 300.0  # CPU seconds
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS")
-
-
-def add_options(parser: ArgumentParser) -> None:
-    """The options of the command."""
-    add = parser.add_argument
-    add("scene", metavar="SCENE", help="scene file (TOML)")
-    add("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides", help="replace one value of the "
-        "scene, as in object.radius_mm=20; repeatable")  # fmt: skip
-    add("-o", metavar="FILE", dest="output", help="file of the study (default: results/<scene>-cost.hdf); the page is "
-        "written beside it")  # fmt: skip
-    add("--candidate", metavar="NAME", action="append", default=[], dest="candidates", help="candidate to measure, by "
-        "number or label; repeatable (default: three of them)")  # fmt: skip
-    add("--time-limit", metavar="SECONDS", type=_seconds, default=TIME_LIMIT, help="CPU seconds of the whole study; "
-        f"finer levels are left out (default {TIME_LIMIT:g})")  # fmt: skip
 
 
 def run(options: Namespace, scene: Any) -> None:
@@ -92,9 +76,3 @@ def refuse_ranks() -> None:
             USAGE, f"cost: found {ranks} ranks, expected one: ranks that share a machine disturb each other's times;"
             " start it without mpirun"
         )  # fmt: skip
-
-
-def _seconds(text: str) -> float:
-    if not 0 < (value := float(text)) < math.inf:
-        raise ArgumentTypeError(f"found {text}, expected seconds > 0")
-    return value
