@@ -152,13 +152,6 @@ class ThinWalled:
     base_thickness: float | None = None
     springs: float = 1e3
 
-    def thickness_at(self, z: float) -> float:
-        """Wall thickness at a height [m]."""
-        if np.ndim(self.thickness) == 0:
-            return float(self.thickness)
-        table = np.array(self.thickness)
-        return float(np.interp(z, table[:, 0], table[:, 1]))
-
 
 @dataclass(frozen=True)
 class Grasp:

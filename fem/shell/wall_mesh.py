@@ -165,11 +165,6 @@ class BodyMesh(ShellMesh):
         """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
         return self.ring(self.surface.flat[0])
 
-    def outer_grid(self) -> FloatArray:
-        """Exact outer face at the crossings of the lines, ``(m + 1, n + 1, 3)`` [m]."""
-        theta, s = np.meshgrid(self.theta, self.s, indexing="ij")
-        return self.surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)
-
     def locate(self, theta: ArrayLike, s: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
         """Nodes ``(n, 4)``, shape functions ``N (n, 4)`` and their derivatives by theta and s ``(n, 2, 4)`` at points.
 

@@ -22,7 +22,8 @@ from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad import foam as element_kernel
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import approach
 from softjaw.study.environment import launch_environment, mpirun
 from tests.benchmark import factors, kernels

@@ -6,7 +6,8 @@ import pytest
 from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 G = 0.020e6

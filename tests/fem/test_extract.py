@@ -7,7 +7,8 @@ from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 from tests.fem import reference

@@ -9,7 +9,8 @@ from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Revolution, Sphere
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 SIZE, G, MM = (0.050, 0.022, 0.015), 0.040e6, 1e-3

@@ -16,7 +16,8 @@ import pytest
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 E, R = 1e6, 0.02

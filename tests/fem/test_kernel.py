@@ -5,7 +5,8 @@ import pytest
 
 from softjaw.fem.materials import material
 from softjaw.fem.pad import foam as kernel
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 
 G = 0.020e6
 SIZE = (0.06, 0.03, 0.015)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.materials import material
-from softjaw.fem.pad.mesh import Pad, PadShape, along_side
+from softjaw.fem.pad.mesh import Pad, along_side
+from softjaw.fem.pad.shape import PadShape
 
 FOAM = material("blatz_ko", 0.020e6)
 SIZE = (0.06, 0.03, 0.015)

@@ -7,7 +7,8 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 G = 0.040e6

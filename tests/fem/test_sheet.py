@@ -8,7 +8,8 @@ from softjaw.fem.contact.problem import ContactProblem, Control, SpringBed
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.backing_plate import Sheet, back_stiffness, relative_compliance
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 SIZE = (0.050, 0.022, 0.015)

@@ -12,7 +12,8 @@ from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.fem.pad.mesh import Pad, PadShape
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 
 STUCK = ConvergenceError("stuck at 3 N")

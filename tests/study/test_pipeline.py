@@ -347,7 +347,7 @@ PRESSED_FLAT = """
 import numpy as np
 from softjaw.fem.materials import material
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.mesh import PadShape
+from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.contact.press import Press
 
 def plane(x):

@@ -1,0 +1,72 @@
+"""Dimensions and mesh lines of a pad, before anything is discretised: a plan needs no more, and loads no scikit-fem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
+
+
+@dataclass(frozen=True)
+class PadShape:
+    """Dimensions and mesh of a pad.
+
+    Parameters
+    ----------
+    size : tuple of 3 floats
+        Length (x), width (y), thickness (z) [m].
+    elements : tuple of 3 ints
+        Of the whole pad along x, y, z.
+    grading : tuple of 3 floats
+        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the front [-].
+    element : str
+        ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
+    """
+
+    size: tuple[float, float, float]
+    elements: tuple[int, int, int]
+    grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    element: str = "hex8"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meshed."""
+        if min(self.size) <= 0 or not np.all(np.isfinite(self.size)):
+            raise ValueError(f"pad size must be positive, found {self.size} m")
+        if min(self.elements) < 1:
+            raise ValueError(f"a pad needs at least one element in every direction, found {self.elements}")
+        if self.element not in PER_SIDE:
+            raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(PER_SIDE)}")
+
+    @property
+    def per_side(self) -> int:
+        """Nodes along a side of an element, and quadrature points along a side of its face."""
+        return PER_SIDE[self.element]
+
+    @property
+    def patch_faces(self) -> tuple[int, int]:
+        """Faces of a contact patch along length and width: one for each quadrature point of the front."""
+        return self.per_side * self.elements[0], self.per_side * self.elements[1]
+
+    def halved(self) -> PadShape:
+        """The same pad with half as many elements in every direction, rounded up."""
+        return PadShape(self.size, tuple(-(-n // 2) for n in self.elements), self.grading, self.element)
+
+    def lines(self, axis: int, half: bool) -> FloatArray:
+        """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
+        n, length, ratio = self.elements[axis], self.size[axis], self.grading[axis]
+        if axis == 2:
+            return -length * _graded(n, ratio)[::-1]
+        if n % 2:
+            return np.linspace(-length / 2, length / 2, n + 1)
+        positive = length / 2 * _graded(n // 2, ratio)
+        return positive if half else np.concatenate([-positive[:0:-1], positive])
+
+
+def _graded(n: int, ratio: float) -> FloatArray:
+    """Lines ``0..1`` whose intervals grow geometrically so that the last is ``ratio`` times the first."""
+    steps = ratio ** np.linspace(0.0, 1.0, n) if n > 1 else np.ones(1)
+    return np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
