@@ -67,6 +67,7 @@ class Data:
         self.messages: np.ndarray = self.ds["message"].values
         self.chosen = chosen
         self._fields: dict[str, np.ndarray] = {}
+        self._read: dict[tuple[str, str], np.ndarray | None] = {}
         self.forces: np.ndarray = self.axes[-1].values
         self.by_poses = not self.axes[-3].units
 
@@ -114,9 +115,14 @@ class Data:
         return self._known(name, model)
 
     def _known(self, name: str, model: str = "curved") -> np.ndarray | None:
-        found = self.ds.get(name)
-        if found is None or name not in self.ds.data_vars:
+        if (name, model) not in self._read:
+            self._read[name, model] = self._floats(name, model)
+        return self._read[name, model]
+
+    def _floats(self, name: str, model: str) -> np.ndarray | None:
+        if name not in self.ds.data_vars:
             return None
+        found = self.ds[name]
         if found.dims[-1:] == ("model",) and "finger" not in found.dims:
             found = found.sel(model=model)
         values = found.values.astype(float)
