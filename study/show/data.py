@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from softjaw.study.quantities import SINGULAR
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT
-from softjaw.study.result.read import dataset
+from softjaw.study.result.read import FIELDS, dataset
 from softjaw.study.show.tables.ranking import BORNE, LOST, TIE, borne_level, judged, ranking
 from softjaw.study.units import shown as in_shown
 from softjaw.study.units import shown_unit
@@ -54,18 +56,20 @@ def number(value: float, digits: int = 3) -> str:
 class Data:
     """A result file as reports, views and figures see it; ``None`` stands for what the file does not have.
 
-    The states are read first: a case that is done then has its values, even while a run goes on writing. ``chosen`` is
-    the index of a case that the reader asked for beside the best one.
+    Everything comes from ``ds``, the dataset that `study.result.read.open` gives, but for contact patches and the
+    deformed walls, which stay in the file. ``chosen`` is the index of a case that the reader asked for beside the best.
     """
 
     def __init__(self, result: Any, chosen: tuple[int, ...] | None = None) -> None:
-        self.result, self.axes, self.shape = result, result.axes, result.layout.shape
-        self.status = result.status
+        self.result, self.ds = result, dataset(result)
+        self.axes, self.status = result.axes, self.ds["status"].values
+        self.shape = self.status.shape
+        self.messages: np.ndarray = self.ds["message"].values
         self.chosen = chosen
+        self._fields: dict[str, np.ndarray] = {}
+        self._read: dict[tuple[str, str], np.ndarray | None] = {}
         self.forces: np.ndarray = self.axes[-1].values
         self.by_poses = not self.axes[-3].units
-        self._paths = {d.path.removeprefix(f"{ROOT}/"): d for d in result.layout.datasets}
-        self._read: dict[str, np.ndarray] = {}
 
     @cached_property
     def dataset(self) -> Any:
@@ -75,12 +79,12 @@ class Data:
     @property
     def title(self) -> str:
         """Name of the object or of the scene file."""
-        return self.result.title or self.result.path.stem
+        return self.ds.attrs["title"] or Path(self.ds.attrs["file"]).stem
 
     @property
     def planar(self) -> str:
         """The planar model that the scene prefers."""
-        return self.result.layout.planar
+        return str(self.ds.attrs["planar"])
 
     @property
     def grasps(self) -> int:
@@ -96,25 +100,40 @@ class Data:
         """Number of cases in this state."""
         return int(np.sum(self.status == state))
 
-    @cached_property
-    def rows(self) -> np.ndarray:
-        """Row in the file of every case, over all axes."""
-        return np.arange(self.status.size).reshape(self.shape)
-
     def values(self, path: str) -> np.ndarray | None:
-        """A dataset below ``/study`` over all cases, NaN where the case is not done; None if there is no value."""
-        if path not in self._paths:
-            return None
-        if path not in self._read:
-            found = self.result.read(path).astype(float)
-            found[self.status != DONE] = np.nan
-            self._read[path] = found
-        found = self._read[path]
-        return found if np.isfinite(found).any() else None
+        """A variable by its group and name in the file, over all cases; None if there is no value.
+
+        Cases that are not done have NaN.
+        """
+        if path in FIELDS:  # too large for the dataset
+            return self._field(path)
+        group, _, name = path.partition("/")
+        return self._known(name if group == "derived" else f"{SINGULAR.get(group, group)}_{name}")
+
+    def _field(self, path: str) -> np.ndarray | None:
+        if path not in self._fields and any(d.path == f"{ROOT}/{path}" for d in self.result.layout.datasets):
+            self._fields[path] = np.where((self.status == DONE)[..., None, None], self.result.read(path), np.nan)
+        return self._fields.get(path)
 
     def map(self, name: str, model: str = "curved") -> np.ndarray | None:
         """A map over all cases, of one friction model where it has several."""
-        return self.values(f"{name}/{model}" if f"{name}/{model}" in self._paths else f"{name}/{name}")
+        return self._known(name, model)
+
+    def _known(self, name: str, model: str = "curved") -> np.ndarray | None:
+        if (name, model) not in self._read:
+            self._read[name, model] = self._floats(name, model)
+        return self._read[name, model]
+
+    def _floats(self, name: str, model: str) -> np.ndarray | None:
+        if name not in self.ds.data_vars:
+            return None
+        found = self.ds[name]
+        if found.dims[-1:] == ("model",) and "finger" not in found.dims:
+            found = found.sel(model=model)
+        values = found.values.astype(float)
+        if values.shape[: len(self.shape)] == self.shape:
+            values[self.status != DONE] = np.nan  # codes have integers there
+        return values if np.isfinite(values).any() else None
 
     def at(self, name: str, index: Sequence[int], model: str = "curved") -> float:
         """A map's value at one case, NaN if there is none."""
@@ -123,10 +142,8 @@ class Data:
 
     def units(self, name: str) -> tuple[str, str, float]:
         """A map's long name without its unit, the unit people read, and the factor from SI."""
-        path = f"{name}/{name}" if f"{name}/{name}" in self._paths else f"{name}/curved"
-        found = self._paths[path].attributes if path in self._paths else {}
-        units = found.get("units", "")
-        label = found.get("long_name", name).removesuffix(f" [{units}]").removesuffix(", curved")
+        found = self.ds[name].attrs if name in self.ds else {}
+        label, units = found.get("long_name", name), found.get("units", "")
         return label, *shown(units)
 
     def label(self, name: str) -> str:
@@ -152,13 +169,11 @@ class Data:
     @property
     def walled(self) -> bool:
         """Whether the object has a thin wall."""
-        return "wall" in self.result.layout.has
+        return "wall" in self.ds.attrs["has"]
 
     def bound(self, name: str) -> np.ndarray | None:
         """A bound of the window of forces [N], over all axes but the force; None if the file has no such bound."""
-        if name not in {d.name for d in self.result.layout.derived}:
-            return None
-        return self.result.derived(name)
+        return self.ds[name].values if name in self.ds.attrs["derived"] else None
 
     @cached_property
     def k(self) -> int:
@@ -238,7 +253,7 @@ class Data:
 
     def candidate(self, index: Sequence[int]) -> str:
         """The name that the scene gives a candidate."""
-        return str(self.result.labels[index[-3], index[-2]])
+        return str(self.ds["label"].values[index[-3], index[-2]])
 
     def flagged(self, index: Sequence[int]) -> list[str]:
         """Checks that a case does not pass, in words."""
@@ -258,7 +273,7 @@ class Data:
 
     def grouped(self, state: int) -> list[tuple[int, str, list[tuple[int, ...]]]]:
         """Messages of the cases in a state: how many, an example, where; alike but for their numbers is one kind."""
-        messages, rows = self.result.messages, np.argwhere(self.status == state)
+        messages, rows = self.messages, np.argwhere(self.status == state)
         groups: dict[str, tuple[str, list[tuple[int, ...]]]] = {}
         for row in rows:
             index = tuple(int(i) for i in row)

@@ -68,7 +68,6 @@ class HardCase:
     remark: str = ""
     up_to_n: float = 0.0
     quick: bool = False
-    open: str = ""
     same_as: Same | None = None
     known: Known | None = None
     sections: dict[str, Any] = field(default_factory=dict)

@@ -13,13 +13,10 @@ from tests.hard_cases.verdict import FINITE, Verdict, judge
 GOOD = {"force_balance": 0.0, "tension": 0.0, "penetration": 0.0, "min_det_f": 0.9, "acoustic": 0.9}
 
 
-def marks(case):
-    """Slow cases are long; those that are known to be wrong have to stay so until somebody looks."""
-    slow = [] if case.quick else [pytest.mark.long]
-    return [*slow, pytest.mark.xfail(reason=case.open, strict=True)] if case.open else slow
+NAMES = [pytest.param(case.name, marks=() if case.quick else pytest.mark.long) for case in CASES.values()]
 
 
-@pytest.mark.parametrize("name", [pytest.param(case.name, marks=marks(case)) for case in CASES.values()])
+@pytest.mark.parametrize("name", NAMES)
 def test_a_hard_case_comes_to_what_is_right_for_it(name, record_property):
     case, found = CASES[name], outcome(name)
     verdict = judge(case, found, outcome(case.same_as.case) if case.same_as else None)

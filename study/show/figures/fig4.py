@@ -28,9 +28,9 @@ AGAINST = {
 
 def contact(data: Data) -> tuple[Any, str]:
     """(a) A pad on the elliptic cylinder with the pressure on its elements; (b) their friction against a turn."""
-    ratio = data.result.derived("b_over_a")
+    ratio = data.bound("b_over_a")
     index = (int(np.abs(ratio - RATIO).argmin()), 0, 0, len(data.forces) - 1)
-    view, pad = View(data, index[:1]), pads(data, read_scene(data.result.scene).gripper, index)[0]
+    view, pad = View(data, index[:1]), pads(data, read_scene(data.ds.attrs["scene"]).gripper, index)[0]
     top = 1e-3 * float(pad.pressure.max())
     out, along, beside = -pad.approach, pad.rotation[:, 0], pad.rotation[:, 1]
     drawn, axes = pictures.figure(WIDTH, 3.2, 1, 2)
@@ -74,7 +74,7 @@ def _fewer(pad: Pad) -> Pad:
 
 def curvature(data: Data) -> tuple[Any, str]:
     """(c) Share of the planar models' claims that the curved contact cannot carry, over a/b."""
-    x, order = 1 / data.result.derived("b_over_a"), np.argsort(1 / data.result.derived("b_over_a"))
+    x, order = 1 / data.bound("b_over_a"), np.argsort(1 / data.bound("b_over_a"))
     drawn, axes = pictures.figure(WIDTH, 3.4, 1, 2, gap=0.1)
     for axis, (model, title) in zip(axes[0], AGAINST.items(), strict=True):
         axis.axhline(0, color=pictures.SOFT, lw=0.7)

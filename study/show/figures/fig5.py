@@ -28,7 +28,7 @@ TURN = 144  # directions in a plane
 def candidates(data: Data) -> tuple[Any, str]:
     """(a) The candidates of a map on its object, and the pressure on a pad at one of them."""
     index = (0, 0, len(data.forces) - 1)
-    view, both = View(data, ()), pads(data, read_scene(data.result.scene).gripper, index)
+    view, both = View(data, ()), pads(data, read_scene(data.ds.attrs["scene"]).gripper, index)
     pad, top = both[0], 1e-3 * max(float(p.pressure.max()) for p in both)
     marks, up = candidate_marks(), np.array([0.0, 0.0, 1.0])
 
@@ -109,7 +109,7 @@ def wrench_spaces(data: Data, sharp: Data) -> tuple[Any, str]:
 
 
 def _sharpest(data: Data) -> tuple[tuple[int, ...], float]:
-    ratio = data.result.derived("b_over_a")
+    ratio = data.bound("b_over_a")
     return (int(ratio.argmin()), 0, 0, len(data.forces) - 1), 1 / float(ratio.min())
 
 

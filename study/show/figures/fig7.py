@@ -47,7 +47,7 @@ def quantities(data: Data) -> dict[str, tuple[str, dict[str, np.ndarray]]]:
 
     Forces are over the pressure sum S, as in the paper; torques over F times the pad's length.
     """
-    length = read_scene(data.result.scene).gripper.pad_length
+    length = read_scene(data.ds.attrs["scene"]).gripper.pad_length
     S, F = data.map("S")[0, 0], data.forces
 
     def of(name: str, factor: Any) -> dict[str, np.ndarray]:

@@ -60,6 +60,6 @@ def best_and_widest(data: Data) -> str:
 
 def widest(data: Data) -> np.ndarray:
     """Stations ``(s,)`` where the object itself is widest, to 0.5 %."""
-    shape, stations = read_scene(data.result.scene).object, data.axes[-3].values
+    shape, stations = read_scene(data.ds.attrs["scene"]).object, data.axes[-3].values
     half = np.max([np.interp(stations, *shape_outline(shape, angle)) for angle in data.axes[-2].values], axis=0)
     return half >= (1 - WIDE) * half.max()

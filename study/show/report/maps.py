@@ -42,7 +42,7 @@ def ticks(data: Data, position: int) -> tuple[Any, dict[str, Any]]:
     values = axis.values * shown(axis.units)[1]
     texts = data.texts(axis)
     if position == len(data.shape) - 3 and data.by_poses:
-        texts = [str(name) or str(i) for i, name in enumerate(data.result.labels[:, 0])]
+        texts = [str(name) or str(i) for i, name in enumerate(data.ds["label"].values[:, 0])]
     elif len(values) == 1 or (position >= len(data.shape) - 2 and len(values) <= MOST_LABELS):
         texts = [number(v, 5) for v in values]
     settings = {"title_text": data.axis_label(axis)}

@@ -86,7 +86,7 @@ def _row(data: Data, index: tuple[int, ...]) -> list[str]:
 def remark(data: Data, index: tuple[int, ...]) -> str:
     """The reason of a failed case; the checks that a solved one misses, and its flags."""
     if data.status[index] == FAILED:
-        return str(data.result.messages[index]) or "no reason was given"
+        return str(data.messages[index]) or "no reason was given"
     if data.status[index] != DONE:
         return ""
     return ", ".join([*data.flagged(index), *(flag.word for flag in flags_of(data, index))])
@@ -233,25 +233,26 @@ def time_split(data: Data) -> list[Block]:
 
 def definitions(data: Data) -> list[Block]:
     """The file's own definitions: its introduction, and one row for each quantity."""
-    intro = data.result.definitions.partition("\n\n")[0]
-    rows = [[q.key, q.unit, f"{q.label}. {q.definition}"] for q in data.result.layout.quantities]
-    rows += [[f"derived/{d.name}", d.units, f"{d.long_name}. {d.definition}"] for d in data.result.layout.derived]
-    head = ["dataset", "unit (SI)", "meaning"]
+    intro = data.ds.attrs["definitions"].partition("\n\n")[0]
+    rows = [[str(name), v.attrs.get("units", ""), f"{v.attrs['long_name']}. {v.attrs['definition']}"]
+            for name, v in data.ds.data_vars.items() if v.attrs.get("definition")]  # fmt: skip
+    head = ["variable", "unit (SI)", "meaning"]
     listed_rows = details("All datasets", [table("What the numbers mean", head, rows, (0, 1), (2,))])
     return [text(" ".join(intro.split())), listed_rows]
 
 
 def scene(data: Data) -> list[Block]:
     """The effective scene and where it came from."""
-    about = data.result.scene_attributes
-    keys = [key for key in ("file", "overrides", "petsc_options") if about.get(key)]
-    items = [f"{key.replace('_', ' ')}: {about[key]}" for key in keys]
-    return [bullets([*items, f"digest: {data.result.digest}"]), verbatim(data.result.scene)]
+    about = data.ds.attrs
+    named = {"file": about["scene_file"], "overrides": ", ".join(about["overrides"]), "digest": about["digest"],
+             "petsc options": about["petsc_options"]}  # fmt: skip
+    items = [f"{name}: {words}" for name, words in named.items() if words]
+    return [bullets(items), verbatim(about["scene"])]
 
 
 def provenance(data: Data) -> list[Block]:
     """Sessions, programs and machines."""
-    sessions = data.result.sessions
+    sessions = data.ds.attrs["provenance"]
     if not sessions:
         return [text("No session is recorded.", "note")]
     rows = [

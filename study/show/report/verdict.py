@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from softjaw.study.accuracy.uncertainty.verdict import sure
@@ -39,7 +41,7 @@ def subtitle(data: Data) -> str:
             words.append(f"{n} candidate{plural}")
         elif not (position == last + 1 and data.by_poses):
             words.append(f"{n} {name} ({reach}{space}{unit})")
-    return f"{data.result.path.name}: {' × '.join(words)}"
+    return f"{Path(data.ds.attrs['file']).name}: {' × '.join(words)}"
 
 
 def verdict(data: Data, mu: float | None) -> list[str]:
@@ -207,7 +209,7 @@ def chosen(data: Data) -> str:
         return ""
     which = f"Chosen candidate {np.ravel_multi_index(index[:-1], data.shape[:-1])}: {data.place(index, force=True)}"
     if data.status[index] == FAILED:
-        return f"{which}, failed: {data.result.messages[index] or 'no reason was given'}"
+        return f"{which}, failed: {data.messages[index] or 'no reason was given'}"
     if data.status[index] != DONE:
         return f"{which}, is not solved yet."
     order = data.order(index[-1])
@@ -232,7 +234,7 @@ def warnings(data: Data) -> list[str]:
         found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
     if flagged := data.flagged(best):
         found.append(f"The best case does not pass its checks: {', '.join(flagged)}.")
-    if note := str(data.result.messages[best]):
+    if note := str(data.messages[best]):
         found.append(f"Note on the best case: {note}.")
     stations = data.axes[-3].values
     if len(stations) > 2 and not data.by_poses and best[-3] in (int(stations.argmin()), int(stations.argmax())):

@@ -46,7 +46,7 @@ def _stored(view: View, index: tuple[int, ...]) -> bool:
 def _write_object(view: View, index: tuple[int, ...], path: Path) -> None:
     x, corners, cell = view.surface
     if not len(corners):
-        raise StudyError(OTHER_FILE, f"{view.data.result.path}: {view.note or 'there is no object to write'}")
+        raise StudyError(OTHER_FILE, f"{view.data.ds.attrs['file']}: {view.note or 'there is no object to write'}")
     on_cells: dict[str, np.ndarray] = {"candidate": cell}
     for k, force in enumerate(view.data.forces):
         state = view.state(k)

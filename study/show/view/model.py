@@ -26,7 +26,7 @@ class View:
 
     def __init__(self, data: Data, point: tuple[int, ...]) -> None:
         self.data, self.point = data, point
-        scene = read_scene(data.result.scene)
+        scene = read_scene(data.ds.attrs["scene"])
         self.scene = None if scene is None else scene_at(scene, point)
         self.gripper = getattr(self.scene, "gripper", None)
         self.note = ""
@@ -117,7 +117,7 @@ class View:
         number_ = int(np.ravel_multi_index(index[:-1], data.shape[:-1]))
         lines = [f"candidate {number_}: {data.place(index, force=True)}"]
         if data.status[index] == FAILED:
-            return [*lines, f"failed: {data.result.messages[index] or 'no reason was given'}"]
+            return [*lines, f"failed: {data.messages[index] or 'no reason was given'}"]
         if data.status[index] != DONE:
             return [*lines, "not computed yet"]
         names = dict.fromkeys((quantity, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "dent"))
