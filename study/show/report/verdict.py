@@ -105,7 +105,7 @@ def _apart(data: Data, best: tuple[int, ...]) -> list[str]:
     places = [tuple(np.delete(index, -1)) for index in np.ndindex(data.shape[:-1])]
     flat = [int(np.ravel_multi_index(index, data.shape[:-1])) for index in order]
     units = "m" * (data.score == "e_n")
-    said = judgement(sure(data.result, data.score, best[-1]), flat, places, units).replace("+-", "±")
+    said = judgement(sure(data.ds, data.score, best[-1]), flat, places, units).replace("+-", "±")
     return [f"{said[0].upper()}{said[1:]}."] if said else []
 
 
