@@ -416,7 +416,7 @@ def test_nodes_of_a_face_are_a_grid(seed, columns, rows):
     shuffled = np.empty_like(nodes)
     shuffled[order] = nodes
     assert _lines(moved(shuffled[:, 0], seed), 1e-9 * size).max() == columns - 1
-    number, shape = _as_grid(moved(shuffled, seed), np.ones(len(nodes), bool), 1e-9 * size)
+    number, shape = _as_grid(moved(shuffled, seed), np.arange(len(nodes)), 1e-9 * size)
     assert shape == (columns, rows)
     assert number.tolist() == order.tolist()
 

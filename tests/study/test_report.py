@@ -203,7 +203,7 @@ def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinar
     path, _, page = ordinary
     with open_result(path) as result:
         data = Data(result)
-        first = best(result).rows[0]
+        first = best(data.ds).rows[0]
         assert data.best == (2, 1, 1)
         assert (first[1], first[2]) == (data.axes[0].values[2], data.axes[1].values[1])
         sentences, pairs = verdict.verdict(data, 0.8), dict(verdict.key_values(data))
