@@ -20,6 +20,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.polytope import polytope_volume
+from softjaw.study import pictures
 from softjaw.study.case import effects, model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
@@ -28,7 +29,6 @@ from softjaw.study.case.solving import Solver, solver
 from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
 from softjaw.study.scene.sections import LimitSurface
-from softjaw.study.show import pictures
 
 TARGET = 0.02  # relative error of e_n that a skip may have
 FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there

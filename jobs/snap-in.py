@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from softjaw.study import pictures
 from softjaw.study.quantities import EFFECTS
 from softjaw.study.result.store import open_result
-from softjaw.study.show import pictures
 
 PANELS = (("travel", "travel of the pads [mm]"), ("dent", "dent [mm]"), ("e_n", "e_n [mm]"))
 LOOKS = ({"color": "#12436d"}, {"color": "#c05a00", "ls": "--"}, {"color": "#566069", "ls": ":"})

@@ -202,6 +202,7 @@ def program() -> Program:
         add_options(made[name])
     _add_scene_options(made)
     _add_result_options(made)
+    made["completion"].set_defaults(program=parser)
     made["completion"].add_argument("shell", choices=SHELLS, help="the shell that is to learn softjaw's words")
     return parser
 

@@ -189,16 +189,18 @@ def figure(options: Namespace) -> int:
     """Redraw figures of the paper."""
     from softjaw.study.show.figures.command import figure
 
-    return figure(options)
+    def solved(scene: Path, file: Path) -> int:
+        words = {"scene": str(scene), "overrides": [], "petsc": [], "output": str(file), "retry_failed": False}
+        return run(Namespace(**words))
+
+    return figure(options, solved)
 
 
 def completion(options: Namespace) -> int:
     """Print a script that lets a shell complete the words of this program, files among them."""
     import shtab
 
-    from softjaw.study.cli import program
-
-    parser: ArgumentParser = program()
+    parser: ArgumentParser = options.program
     commands = next(a for a in parser._actions if isinstance(a, _SubParsersAction)).choices.values()
     for action in (action for made in commands for action in made._actions):
         if action.metavar in FILES:

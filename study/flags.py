@@ -65,6 +65,8 @@ class Flag(IntFlag):
 
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG
+BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
+LOST = Flag.SLIPS | Flag.OVERLAP | BORNE  # of a grasp that does not hold, or does harm, as it was computed
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

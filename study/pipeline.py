@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.study.accuracy.uncertainty.probing import Probing
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.effects import effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
+from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, Solver, solver, state_flags
 from softjaw.study.case.wall import wall_flags

@@ -65,14 +65,17 @@ def with_target_met(scene: Any, path: Path) -> tuple[Any, Any]:
 def work(scene: Any, choice: Any = None) -> Any:
     """How the cases of a scene are solved; ``choice`` is what its target of accuracy chose."""
     from softjaw.study import pipeline
-    from softjaw.study.accuracy.cost import stored
-    from softjaw.study.result import derived
     from softjaw.study.run.session import Work
     from softjaw.study.show.tables.status import summary
 
-    def finalise(writer: Any) -> None:
-        stored.fill(writer, choice)
+    def finalise(writer: Any) -> None:  # loads what one rank needs at the end
+        from softjaw.study.accuracy.cost.target import fill
+        from softjaw.study.result import derived
+        from softjaw.study.show.report.plain_report import plain_report
+
+        fill(writer, choice)
         derived.finalise(writer, scene)
+        writer.write_report(plain_report(writer.result(), scene.friction.mu))
 
     return Work(
         solve_unit=pipeline.solve_unit,
@@ -86,7 +89,7 @@ def work(scene: Any, choice: Any = None) -> Any:
 
 def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
-    from softjaw.study.accuracy.cost.stored import overrides
+    from softjaw.study.accuracy.cost.target import overrides
     from softjaw.study.case.build import warnings
     from softjaw.study.case.model import check_poses
     from softjaw.study.run.plan import make_plan

@@ -1,4 +1,5 @@
-"""Who may import whom, read from the sources: study -> fem -> friction, and one door to each foreign library.
+"""Who may import whom, read from the sources: study -> fem -> friction, inside study only downward, and one door to
+each foreign library.
 
 Everything is imported as ``softjaw.*``: under a second name a module would be loaded, and compiled, twice.
 """
@@ -44,6 +45,14 @@ DOORS = {
     "pyvista": PICTURES | {"study/patch/reading.py"},
     "vtkmodules": PICTURES | {"study/patch/reading.py"},
 }
+# Folders of study, and modules directly in it, the lowest first: each imports only what stands before it, so that there
+# is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; preparation
+# joins what a run needs, from the scene to the report in its file; commands joins everything, cli above it.
+ORDER = (
+    "messages", "units", "flags", "quantities", "environment", "writing", "pictures",
+    "scene", "case", "pipeline", "result", "run", "accuracy", "lookup", "export", "patch", "show",
+    "preparation", "doctor", "commands", "cli",
+)  # fmt: skip
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]
 
@@ -79,6 +88,27 @@ def forbidden_imports(path: str, source: str) -> set[str]:
     return {name for name in foreign if name not in allowed or path not in DOORS.get(name, {path})}
 
 
+def modules_of_study(source: str) -> set[str]:
+    """What a source imports of study, as far as it can be a module: ``show.data`` and ``show.data.Data``."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("importlib.import_module", "__import__"):
+            names.add(getattr(node.args[0], "value", "softjaw.study"))  # a computed name may be any of them
+    inside = {name for name in names if f"{name}.".startswith("softjaw.study.")}
+    return {name.removeprefix("softjaw.study").removeprefix(".") for name in inside}
+
+
+def arrows_up(path: str, source: str) -> set[str]:
+    """What a file of study at this path imports from its own level of `ORDER` upward, its own folder left out."""
+    own = path.split("/")[1].removesuffix(".py")
+    allowed = ORDER[: ORDER.index(own) + 1]
+    return {name for name in modules_of_study(source) if name.split(".")[0] not in allowed}
+
+
 def outside_world(source: str) -> set[str]:
     """What a source takes from or gives to the user's session: printing, arguments, environment, working directory."""
     used = {ast.unparse(node) for node in ast.walk(ast.parse(source)) if isinstance(node, (ast.Name, ast.Attribute))}
@@ -92,6 +122,37 @@ def test_every_file_imports_only_what_its_folder_may():
     assert {path: names for path, names in found.items() if names} == {}
     bare = {path: {name for name in imported((ROOT / path).read_text()) if name.startswith("(bare)")} for path in USERS}
     assert {path: names for path, names in bare.items() if names} == {}
+
+
+def test_study_imports_downward_only():
+    """Also inside functions and behind TYPE_CHECKING."""
+    paths = [path for path in SOURCES if path.startswith("study/") and path != "study/__init__.py"]
+    assert {path.split("/")[1].removesuffix(".py") for path in paths} <= set(ORDER)
+    found = {path: arrows_up(path, (ROOT / path).read_text(encoding="utf-8")) for path in paths}
+    assert {path: names for path, names in found.items() if names} == {}
+    assert not (ROOT / "study/__init__.py").read_text(encoding="utf-8")  # or every module would import what it does
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "names"),
+    [
+        ("study/case/build.py", "from softjaw.study.result.layout import DONE", {"result.layout.DONE"}),
+        ("study/case/build.py", "def f():\n    from softjaw.study.show import data", {"show.data"}),
+        ("study/case/build.py", "if TYPE_CHECKING:\n    import softjaw.study.run.plan as p", {"run.plan"}),
+        ("study/case/build.py", "from softjaw.study import pipeline, units", {"pipeline"}),
+        ("study/flags.py", "from softjaw.study.quantities import MODELS", {"quantities.MODELS"}),
+        ("study/commands.py", "from softjaw.study.cli import main", {"cli.main"}),
+        ("study/case/build.py", "import importlib\nimportlib.import_module('softjaw.study.cli')", {"cli"}),
+        ("study/case/build.py", "__import__(name)", {""}),
+        ("study/case/build.py", "from softjaw import study", {""}),
+        ("study/case/build.py", "import softjaw.study", {""}),
+        ("study/case/build.py", "from softjaw.study.unheard import of", {"unheard.of"}),
+        ("study/case/build.py", "from softjaw.study.case.model import Finger\nfrom softjaw.fem import run", set()),
+        ("study/cli.py", "from softjaw.study import commands\nfrom softjaw.study.show.data import Data", set()),
+    ],
+)
+def test_an_import_upward_is_noticed(path, source, names):
+    assert arrows_up(path, source) == names
 
 
 def test_only_study_talks_to_the_session_it_runs_in():

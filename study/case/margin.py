@@ -1,8 +1,9 @@
-"""Comparisons with a limit that rounding does not decide."""
+"""Comparisons that rounding does not decide: with a limit, and of values with each other."""
 
 from __future__ import annotations
 
 MARGIN = 1e-6  # of a limit: what is nearer to it is undecided
+TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal as far as can be told
 
 
 def surely_below(value: float, limit: float) -> bool:

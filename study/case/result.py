@@ -25,3 +25,7 @@ class CaseFailure:
     """A case without a result; ``message`` is one sentence with the cause and the remedy."""
 
     message: str
+
+
+class TimeLimitError(BaseException):
+    """The case in flight has had its time; not an ``Exception``, so that no solver takes it for a failed step."""

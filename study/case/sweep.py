@@ -10,24 +10,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.candidates import Candidate, candidates, groups
-from softjaw.study.result.layout import Derived
 from softjaw.study.scene import Option, Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
-if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
-
 FloatArray = NDArray[np.float64]
-SWEPT = {
-    "object.semi_axis_a_mm",
-    "object.semi_axis_b_mm",
-}  # give the axes that curvature studies are drawn over
 
 
 @dataclass(frozen=True)
@@ -60,7 +51,7 @@ class Unit:
     cost : float
         Work, in element solves; only ratios mean something.
     probe : bool
-        Whether it is solved again with inputs changed, as `study.accuracy.uncertainty` needs it.
+        Whether it is solved again with inputs changed, as `study.case.probing` does.
     """
 
     index: int
@@ -136,31 +127,3 @@ def ladder_cost(scene: Scene) -> float:
     nodes = {"hex8": 1, "hex27": 8}[scene.gripper.element]
     coarse = 1 + (scene.accuracy.meshes - 1) / 8
     return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * coarse
-
-
-def derived(scene: Scene) -> list[Derived]:
-    """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
-    if scene.object.shape != "elliptic_cylinder" or not SWEPT & set(scene.sweep):
-        return []
-    over = tuple(axis.name for axis in axes(scene)[:-3])
-    return [
-        Derived("b_over_a", "", "b / a", "Semi-axis across the contact over that along its normal.", over),
-        Derived(
-            "apex_curvature",
-            "1/m",
-            "apex curvature a / b^2",
-            "Curvature of the section where pads at angle 0 touch.",
-            over,
-        ),
-    ]
-
-
-def finalise(writer: ResultWriter, scene: Scene) -> None:
-    """Fill the derived datasets, by one rank, after all cases."""
-    if not derived(scene):
-        return
-    points = [scene.with_values(dict(zip(scene.sweep, v, strict=True))).object for v in product(*scene.sweep.values())]
-    shape = writer.layout.shape[:-3]
-    a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
-    writer.write_derived("b_over_a", b / a)
-    writer.write_derived("apex_curvature", a / b**2)

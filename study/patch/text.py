@@ -118,7 +118,7 @@ def write_picture(patches: Sequence[JudgedPatch], kind: str, path: Path) -> None
     StudyError
         With code 5 if the file cannot be written.
     """
-    from softjaw.study.show import pictures  # loads matplotlib, which the text does not need
+    from softjaw.study import pictures  # loads matplotlib, which the text does not need
 
     with pictures.style():
         drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))

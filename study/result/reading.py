@@ -13,7 +13,7 @@ from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import checksums
 from softjaw.study.result.guarded import text_of
 from softjaw.study.result.layout import FAILED, LABEL, MISSING, PROGRAM, READABLE, ROOT, SESSIONS, layout_from_options
-from softjaw.study.run.lock import holder
+from softjaw.study.result.lock import holder
 
 BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
 

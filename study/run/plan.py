@@ -48,9 +48,9 @@ class Plan:
 
 def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
     """The plan of a scene; builds its objects, so a mesh is read here."""
-    from softjaw.study.accuracy.uncertainty.variations import changes, probe_candidates, with_probes
     from softjaw.study.case import sweep
     from softjaw.study.case.build import check_object, pad_shape
+    from softjaw.study.case.variations import changes, probe_candidates, with_probes
     from softjaw.study.result.derived import derived
     from softjaw.study.result.grid_surface import surface_of
 

@@ -21,9 +21,9 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
+from softjaw.study.result.lock import Lock, Standing
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
 from softjaw.study.run.ladder import Climber, give_up, settle
-from softjaw.study.run.lock import Lock, Standing
 from softjaw.study.run.memory import limited_memory
 from softjaw.study.run.plan import Plan, by_cost
 from softjaw.study.run.progress import Progress

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from softjaw.study.case.result import TimeLimitError
+
 # Seconds to finish the case in flight. mpirun kills its ranks about two seconds after it was interrupted; USR1 is what
 # batch systems are asked to send a minute before the time limit.
 GRACE = {signal.SIGUSR1: 30.0, signal.SIGTERM: 0.5, signal.SIGINT: 0.5}
@@ -19,10 +21,6 @@ AGAIN = 1.0  # s; what a handler raises inside a finaliser is printed and lost, 
 
 class AbandonedError(BaseException):
     """The case in flight is given up; not an ``Exception``, so that no solver takes it for a failed step."""
-
-
-class TimeLimitError(BaseException):
-    """The case in flight has had its time; not an ``Exception`` either."""
 
 
 class Stopper:

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.margin import TIE
+from softjaw.study.flags import BORNE, LOST
 from softjaw.study.quantities import SINGULAR
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT
 from softjaw.study.result.read import FIELDS, dataset
-from softjaw.study.show.tables.ranking import BORNE, LOST, TIE, borne_level, judged, ranking
+from softjaw.study.show.tables.ranking import borne_level, judged, ranking
 from softjaw.study.units import shown as in_shown
 from softjaw.study.units import shown_unit
 

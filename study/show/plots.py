@@ -14,7 +14,7 @@ import plotly.graph_objects as go
 from plotly.colors import get_colorscale
 from plotly.subplots import make_subplots
 
-from softjaw.study.show.pictures import span as span  # one range for plotly and matplotlib
+from softjaw.study.pictures import span as span  # one range for plotly and matplotlib
 
 INK, SOFT, GRID, EMPTY = "#1d2429", "#6b747b", "#e3e6e8", "#eceef0"
 MODELS = {  # name, colour, line, marker

@@ -112,7 +112,7 @@ def finger_on(obj, gripper):
 def test_springs_on_a_plane_carry_alike():
     """Uniform pressure, travel F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
     from softjaw.fem.objects.shapes import Plane
-    from softjaw.study.accuracy.cost.probes import winkler_pad
+    from softjaw.study.case.probes import winkler_pad
 
     gripper = scene().gripper
     pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
@@ -124,7 +124,7 @@ def test_springs_on_a_plane_carry_alike():
 def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     """p = k (d - y^2 / 2R): F = 2/3 k L a^3 / R for narrow contacts, order 2 in the spacing of the springs."""
     from softjaw.fem.objects.shapes import EllipticCylinder
-    from softjaw.study.accuracy.cost.probes import stiffness, winkler_pad
+    from softjaw.study.case.probes import stiffness, winkler_pad
 
     gripper, R, force = scene().gripper, 0.2, 1.0
     finger = finger_on(EllipticCylinder(R, R, 1.0), gripper)
@@ -373,8 +373,8 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
 
     from softjaw.study.accuracy.cost.choose import choose, combinations, reference
     from softjaw.study.accuracy.cost.measure import measure
-    from softjaw.study.accuracy.cost.probes import probes
     from softjaw.study.accuracy.cost.study import Measuring, costs, new_study, setting_of
+    from softjaw.study.case.probes import probes
 
     own, target = scene(text, overrides), 0.01
     what = costs(own, with_judging=False)

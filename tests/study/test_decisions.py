@@ -54,7 +54,8 @@ def test_equal_grasps_keep_their_order(values, seed):
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
-    from softjaw.study.show.tables.ranking import TIE, falling
+    from softjaw.study.case.margin import TIE
+    from softjaw.study.show.tables.ranking import falling
 
     order = falling(np.array(values))
     assert sorted(order.tolist()) == list(range(len(values)))
@@ -76,7 +77,7 @@ def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
 @tries
 @given(scores, seeds)
 def test_rounding_is_no_difference_of_two_maps_without_errors(values, seed):
-    from softjaw.study.accuracy.uncertainty.verdict import Sure
+    from softjaw.study.show.tables.certainty import Sure
     from softjaw.study.show.tables.compare import Difference
 
     one, other = np.array(values), moved(values, seed)
@@ -88,7 +89,7 @@ def test_rounding_is_no_difference_of_two_maps_without_errors(values, seed):
 
 
 def test_a_difference_above_the_errors_is_still_one():
-    from softjaw.study.accuracy.uncertainty.verdict import Sure
+    from softjaw.study.show.tables.certainty import Sure
     from softjaw.study.show.tables.compare import Difference
 
     values = np.array([1.0, 1.0]), np.array([1.1, 1.01])
@@ -99,7 +100,7 @@ def test_a_difference_above_the_errors_is_still_one():
 @tries
 @given(seeds)
 def test_a_band_of_a_probe_is_that_of_its_images(seed):
-    from softjaw.study.accuracy.uncertainty.interval import at_least_own
+    from softjaw.study.result.interval import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
     band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
@@ -113,7 +114,7 @@ def test_a_band_of_a_probe_is_that_of_its_images(seed):
 @given(st.lists(st.sampled_from([0.5, 1.0, 1.5]), min_size=1, max_size=5), seeds)
 def test_a_window_ends_at_the_same_force(values, seed):
     """Values that just reach the limit, also where they fall again or the forces end."""
-    from softjaw.study.case.window import first_crossing
+    from softjaw.study.result.window import first_crossing
 
     forces = 1.0 + np.arange(len(values))
     one = first_crossing(forces, values, 1.0)
@@ -232,7 +233,7 @@ def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
 @pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
 def test_equal_places_give_the_first_ones_as_probes(shift):
     """Pads all along a cylinder touch it alike, but for rounding."""
-    from softjaw.study.accuracy.cost.probes import demanding, spread
+    from softjaw.study.case.probes import demanding, spread
     from softjaw.study.case.sweep import units
     from softjaw.study.scene import parse_scene
 

@@ -17,14 +17,15 @@ import scipy.sparse as sp
 
 from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study import messages
+from softjaw.study.case.result import TimeLimitError
 from softjaw.study.environment import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.result.lock import Standing
 from softjaw.study.result.store import open_result
 from softjaw.study.run import memory
-from softjaw.study.run.lock import Standing
 from softjaw.study.run.memory import available, limited_memory
-from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper, TimeLimitError
+from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import h5py
 
 from softjaw.study.result.layout import REPORT
-from softjaw.study.result.plain_report import plain_report
 from softjaw.study.result.store import open_result
+from softjaw.study.show.report.plain_report import plain_report
 from tests.study.sealing import sealed
 from tests.study.view_files import make
 

@@ -18,11 +18,11 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
 from softjaw.study.result.grid import Surface
 from softjaw.study.result.layout import Derived, Header, Layout, layout_from_options
+from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import blank, record, text_bytes
 from softjaw.study.result.skeleton import axes_of, groups, view_slice
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
-from softjaw.study.run.lock import Lock, holder
 from tests.study.fake_run import fake_result
 
 HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))

@@ -8,13 +8,13 @@ import pytest
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
-from softjaw.study.case.stored_surface import circle, shadow_outline, stored_surface
 from softjaw.study.quantities import MONOMIALS
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data
 from softjaw.study.show.report.contact import limit_surfaces
 from softjaw.study.show.report.curves import fit_error
+from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
 from tests.study.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02

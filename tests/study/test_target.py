@@ -118,7 +118,7 @@ def test_the_hardest_contact_is_a_probe():
 
     At the other stations it misses less than 1 %.
     """
-    from softjaw.study.accuracy.cost.probes import demanding
+    from softjaw.study.case.probes import demanding
     from softjaw.study.case.sweep import units
     from softjaw.study.scene import load_scene
 
@@ -279,9 +279,9 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
     """Five cases that no probe has, at random, on the mesh that was chosen and on a much finer one."""
     from softjaw.study.accuracy.cost.knobs import Level
     from softjaw.study.accuracy.cost.measure import measure_once
-    from softjaw.study.accuracy.cost.probes import Probe
     from softjaw.study.accuracy.cost.study import new_study
     from softjaw.study.accuracy.cost.target import quick_choice, quick_probes
+    from softjaw.study.case.probes import Probe
     from softjaw.study.case.sweep import units
 
     own = scene(text, [f"accuracy.e_n={target}"])

@@ -11,17 +11,17 @@ import xarray as xr
 import softjaw
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.volume import volume_linf
-from softjaw.study.accuracy.uncertainty import interval, probing
-from softjaw.study.accuracy.uncertainty.interval import derived
-from softjaw.study.accuracy.uncertainty.probing import _volume
-from softjaw.study.accuracy.uncertainty.variations import by_formula, moved_poses, variations
-from softjaw.study.accuracy.uncertainty.verdict import Sure, sure, verdict
-from softjaw.study.case import sweep
+from softjaw.study.case import probing, sweep
 from softjaw.study.case.candidates import axis_poses
+from softjaw.study.case.probing import _volume
+from softjaw.study.case.variations import by_formula, moved_poses, variations
 from softjaw.study.lookup import GraspMap
+from softjaw.study.result import interval
+from softjaw.study.result.interval import derived
 from softjaw.study.result.layout import Derived, Layout
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.problems import SceneError
+from softjaw.study.show.tables.certainty import Sure, sure, verdict
 from softjaw.study.show.tables.compare import compare
 from softjaw.study.show.tables.export import cases
 from softjaw.study.show.tables.show import as_text, best
@@ -52,7 +52,7 @@ def scene(*overrides):
 
 
 def facing(distance):
-    """Two contacts that face each other, as `study.accuracy.uncertainty.probing` reads them from a file."""
+    """Two contacts that face each other, as `study.case.probing` reads them from a file."""
     turned = np.diag([1.0, -1.0, -1.0])
     return {
         "frame_origin": np.zeros((2, 3)), "frame_axes": np.array([np.eye(3)] * 2),
@@ -67,9 +67,9 @@ def test_the_quality_goes_with_the_fifth_power_of_mu_where_contacts_face_each_ot
         volume_linf(*(x for a in axes * t for x in (Ellipsoid(a).volume, Ellipsoid(a).shadow_area)), d)
         for t in (1.0, 1 + share, 1 - share)
     ]
-    assert interval.facing_change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
+    assert probing.facing_change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
     stored = [_volume(facing(d), t * axes, 1.0, 1.0) for t in (1.0, 1 + share, 1 - share)]
-    assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(interval.facing_change_by_mu(share), rel=1e-6)
+    assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(probing.facing_change_by_mu(share), rel=1e-6)
     assert stored[0] == pytest.approx(volumes[0], rel=1e-6)
 
 
@@ -158,7 +158,7 @@ def test_files_of_scenes_without_bands_keep_their_digest():
 
 
 def test_named_probes_are_those_that_are_solved():
-    from softjaw.study.accuracy.uncertainty.variations import probe_candidates, with_probes
+    from softjaw.study.case.variations import probe_candidates, with_probes
 
     given = scene(*ALL, 'uncertainty.probes=["20 mm, 90 deg", 0]')
     units = sweep.units(given, lambda point: point.axis_symmetry)
@@ -301,9 +301,9 @@ def test_the_change_by_the_modulus_is_that_of_further_solves():
 
 @pytest.mark.long
 def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
-    from softjaw.study.accuracy.uncertainty.variations import probe_candidates
+    from softjaw.study.case.variations import probe_candidates
+    from softjaw.study.flags import LOST
     from softjaw.study.scene import load_scene
-    from softjaw.study.show.tables.ranking import LOST
 
     coarse = "gripper.elements=[12, 6, 4]", "candidates.stations=18", "candidates.angles_deg=[0]"
     given = load_scene("jobs/bottle-rigid.toml", [*coarse, "uncertainty.mesh=true"])

@@ -11,10 +11,11 @@ import pytest
 import xarray as xr
 
 from softjaw.study import pipeline
-from softjaw.study.case import model, wall, window
+from softjaw.study.case import model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
+from softjaw.study.result import window
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import dataset

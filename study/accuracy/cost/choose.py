@@ -26,7 +26,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.text import value_text
 
 if TYPE_CHECKING:
-    from softjaw.study.accuracy.cost.probes import Probe
+    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 NO_LOSS = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")

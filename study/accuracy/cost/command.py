@@ -19,9 +19,9 @@ def run(options: Namespace, scene: Any) -> None:
     path = Path(options.output or f"results/{Path(options.scene).stem}-cost.hdf")
     if path.suffix != ".hdf":
         raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in .hdf; write -o {path}.hdf")
-    from softjaw.study.accuracy.cost.probes import probes
     from softjaw.study.accuracy.cost.study import Measuring, costs, load, new_study
     from softjaw.study.case.build import check_object
+    from softjaw.study.case.probes import probes
 
     check_object(scene)
     found, what = probes(scene, options.candidates), costs(scene)

@@ -17,11 +17,11 @@ from softjaw.scoring.graspit import linearised_contacts
 from softjaw.scoring.polytope import hull_volume
 from softjaw.study.accuracy.cost.knobs import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured, cpu_seconds, from_maps, least_seconds
-from softjaw.study.accuracy.cost.probes import Probe, winkler_pad
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, volume_in_pose
+from softjaw.study.case.probes import Probe, winkler_pad
 from softjaw.study.case.solving import solver
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene

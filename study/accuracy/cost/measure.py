@@ -15,7 +15,7 @@ from softjaw.study.accuracy.cost.knobs import EACH_ALONE, Level, with_level
 from softjaw.study.case.result import CaseFailure
 
 if TYPE_CHECKING:
-    from softjaw.study.accuracy.cost.probes import Probe
+    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment
 
+from softjaw.study import pictures
 from softjaw.study.accuracy.cost.choose import BELOW, NO_LOSS, Combination, best_of, combinations, percent, seconds_text
 from softjaw.study.accuracy.cost.choose import values_text as settings
 from softjaw.study.accuracy.cost.errors import KnobErrors, LevelErrors
 from softjaw.study.accuracy.cost.study import CostStudy
 from softjaw.study.run.progress import duration
-from softjaw.study.show import pictures
 
 GOALS = (0.05, 0.02, 0.01, 0.005, 0.002)
 NEEDED = 0.01  # change of e_n from which an effect is needed

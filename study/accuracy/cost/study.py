@@ -38,7 +38,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.writing import beside
 
 if TYPE_CHECKING:
-    from softjaw.study.accuracy.cost.probes import Probe
+    from softjaw.study.case.probes import Probe
 
 FIRST_GUESS = 2e-8  # seconds of one force over `weight`, before anything is measured
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 2

@@ -23,12 +23,13 @@ from softjaw.study.accuracy.cost.measure import Measured, measure_once, warm_up
 from softjaw.study.accuracy.cost.study import CostStudy, costs, load, new_study, plain, save, setting_of
 from softjaw.study.case import sweep
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.result.derived import MEANING
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.problems import SceneError
-from softjaw.study.scene.text import changes
+from softjaw.study.scene.text import changes, toml_text
 
 if TYPE_CHECKING:
-    from softjaw.study.accuracy.cost.probes import Probe
+    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 FORMAL = 2.0  # highest order that is believed
@@ -81,7 +82,7 @@ def _fresh(scene: Scene, output: Path, say: Callable[[str], None]) -> Choice:
 
 
 def _from_file(scene: Scene, say: Callable[[str], None]) -> Choice:
-    from softjaw.study.accuracy.cost.probes import held_out, probes  # loads PETSc
+    from softjaw.study.case.probes import held_out, probes  # loads PETSc
 
     path = Path(str(scene.accuracy.cost_file))
     study = load(path)
@@ -164,7 +165,7 @@ def _open(knob: Knob | None, given: Mapping[str, Any]) -> list[Level]:
 
 def quick_probes(scene: Scene) -> tuple[list[Probe], list[Probe], int]:
     """Probes at the lowest and the highest force, the cases that the choice is tried on, and all cases of the run."""
-    from softjaw.study.accuracy.cost.probes import demanding, held_out, probes_at  # loads PETSc
+    from softjaw.study.case.probes import demanding, held_out, probes_at  # loads PETSc
 
     units, forces = sweep.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
     found = probes_at(scene, demanding(units), tuple(dict.fromkeys((forces[0], forces[-1]))))
@@ -291,3 +292,20 @@ def _told(study: CostStudy, own: Scene, judged: Judged, on_probes: int, target: 
     measured, rest = (float(np.nanmax(e)) if np.isfinite(e).any() else math.nan for e in parts)
     return Choice(dict(level.values), target, float(np.nanmax(error)), measured, seconds, text, rest,
                   met=judged.chosen is not None and judged.known)  # fmt: skip
+
+
+def fill(writer: Any, choice: Choice | None) -> None:
+    """Write what the choice promises into the file, by one rank, after all cases."""
+    if choice is not None:
+        values = (choice.predicted, choice.measured, choice.held_out, choice.seconds)
+        for name, value in zip(MEANING, values, strict=True):
+            writer.write_derived(name, value)
+
+
+def overrides(choice: Choice | None) -> list[str]:
+    """The chosen values as overrides that say where they come from."""
+    if choice is None:
+        return []
+    texts = [toml_text({"x": {"x": value}}).splitlines()[1].partition(" = ")[2] for value in choice.values.values()]
+    made = [f"{key}={text}  # chosen" for key, text in zip(choice.values, texts, strict=True)]
+    return [*made, f"# {choice}"]

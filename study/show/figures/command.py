@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,15 +30,18 @@ def add_options(parser: ArgumentParser) -> None:
                         help="where the scenes' results are or will be (default: results)")  # fmt: skip
 
 
-def figure(options: Namespace) -> int:
-    """Solve what is missing, then draw; on every rank the same exit code."""
+def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
+    """Solve what is missing, then draw; on every rank the same exit code.
+
+    ``run(scene, file)`` solves a scene into its file and returns the exit code.
+    """
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported, as a run wants it
     wanted = chosen(options.names)
     paths = targets(wanted, options.output)
     results, codes = {}, {DONE}
     for scene in dict.fromkeys(scene for one in wanted for scene in one.scenes):
         results[scene] = Path(options.results) / f"{scene}.hdf"
-        codes.add(_solved(scene, results[scene]))
+        codes.add(_solved(scene, results[scene], run))
         if failed := codes - {DONE, SOME_FAILED}:
             return failed.pop()
     if first_rank():
@@ -74,15 +78,13 @@ def targets(wanted: list[Figure], output: str | None) -> list[Path]:
     return [given]
 
 
-def _solved(scene: str, path: Path) -> int:
+def _solved(scene: str, path: Path, run: Callable[[Path, Path], int]) -> int:
     """Run a scene into its file, which takes a second where nothing is missing; the exit code."""
-    from softjaw.study.cli import main
-
     source = JOBS / f"{scene}.toml"
     if not source.is_file():
         text = f"{source}: there is no such scene; install softjaw from its source folder, which has jobs/"
         raise StudyError(USAGE, text)
-    if (code := main(["run", str(source), "-o", str(path)])) == OTHER_FILE:
+    if (code := run(source, path)) == OTHER_FILE:
         raise StudyError(OTHER_FILE, f"{path}: move it away, or choose another folder with --results")
     return code
 
@@ -97,9 +99,9 @@ def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
     """
     import numpy as np
 
+    from softjaw.study import pictures
     from softjaw.study.result.layout import DONE as SOLVED
     from softjaw.study.result.store import open_result
-    from softjaw.study.show import pictures
     from softjaw.study.show.data import Data
 
     with ExitStack() as stack, pictures.style():

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.show import pictures
+from softjaw.study import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene

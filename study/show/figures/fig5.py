@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.stored_surface import StoredSurface, circle, stored_surface
-from softjaw.study.show import pictures
+from softjaw.study import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.figures import JOBS, WIDTH
 from softjaw.study.show.outline import read_scene, shape_outline
+from softjaw.study.show.stored_surface import StoredSurface, circle, stored_surface
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad, pads

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.study.case.stored_surface import StoredSurface, stored_surface
-from softjaw.study.show import pictures
+from softjaw.study import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.figures import WIDTH
+from softjaw.study.show.stored_surface import StoredSurface, stored_surface
 from softjaw.study.show.tables.ranking import nearest
 from softjaw.study.show.view import solids
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
-from softjaw.study.show import pictures
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene

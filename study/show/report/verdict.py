@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from softjaw.study.accuracy.uncertainty.verdict import sure
-from softjaw.study.accuracy.uncertainty.verdict import verdict as judgement
 from softjaw.study.flags import Flag, flags_in
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.show.data import Data, number, shown
+from softjaw.study.show.tables.certainty import sure
+from softjaw.study.show.tables.certainty import verdict as judgement
 from softjaw.study.show.tables.ranking import BORNE, largest, passed_over
 
 LEAST = 1e-4  # relative error below which only a bound is given

@@ -9,8 +9,6 @@ import textwrap
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
-from softjaw.study.units import shown_text
-
 GAP = "  "
 PAPER = 80  # letters in a line of a text that is kept
 
@@ -98,19 +96,6 @@ def cell(value: Any) -> Any:
     except ValueError:
         return f"'{value}"
     return value
-
-
-def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
-    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
-    words = []
-    label = "" if axes[-3].units else f'"{labels[tuple(index[-3:-1])]}"'
-    for axis, i in zip(axes, index, strict=True):
-        if label and axis.name in ("station", "angle"):
-            words += [label] * (axis.name == "station")
-        else:
-            value = axis.options[i] if axis.options else shown_text(axis.values[i], axis.units, 5)
-            words.append(f"{axis.name} {value}")
-    return ", ".join(words)
 
 
 def digits(value: float) -> str:

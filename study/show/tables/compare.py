@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from softjaw.study.case.margin import TIE
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.scene.text import changes
-from softjaw.study.show.tables.ranking import TIE
 
 FloatArray = NDArray[np.float64]
 ALIKE = 1e-9  # relative difference of coordinates that is only rounding

@@ -67,7 +67,7 @@ def _bands(scene: Any) -> str:
     own = scene.uncertainty
     if not own.parts:
         return ""
-    from softjaw.study.accuracy.uncertainty.variations import changes
+    from softjaw.study.case.variations import changes
 
     more = len(changes(scene))
     count = own.probes if isinstance(own.probes, int) else len(own.probes)

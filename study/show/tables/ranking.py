@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.flags import Flag, flags_in
+from softjaw.study.case.margin import TIE
+from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.result.layout import DONE
 
 IntArray = NDArray[np.int64]
-BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
-LOST = Flag.SLIPS | Flag.OVERLAP | BORNE  # of a grasp that does not hold, or does harm, as it was computed
-TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal as far as can be told
 NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 

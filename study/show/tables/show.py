@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.accuracy.uncertainty.verdict import sure, verdict
-from softjaw.study.flags import OF_FILE
+from softjaw.study.flags import BORNE, LOST, OF_FILE
 from softjaw.study.quantities import TABLE, WINDOW
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
+from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import csv_text, with_unit
-from softjaw.study.show.tables.ranking import BORNE, LOST, borne_level, judged, nearest, passed_over, ranking
+from softjaw.study.show.tables.ranking import borne_level, judged, nearest, passed_over, ranking
 from softjaw.study.show.tables.show_text import Columns, alike
 from softjaw.study.show.tables.show_text import as_text as as_text
 

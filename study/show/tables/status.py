@@ -11,9 +11,10 @@ import numpy as np
 
 from softjaw.study.quantities import PARTS, STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.run.lock import holder
+from softjaw.study.result.lock import holder
+from softjaw.study.result.read import place_text
 from softjaw.study.run.progress import duration
-from softjaw.study.show.tables.columns import PAPER, csv_text, place_text, terminal_width, with_unit, wrapped
+from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
 

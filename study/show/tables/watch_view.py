@@ -13,8 +13,8 @@ import numpy as np
 from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result
-from softjaw.study.run.lock import holder
 from softjaw.study.run.progress import Progress, duration
 from softjaw.study.show.tables.columns import terminal_width, wrapped
 from softjaw.study.show.tables.status import place, reasons

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from softjaw.study.case.stored_surface import stored_surface
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.page import Block, Section, label, page, plot, text
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
 from softjaw.study.show.report.tables import remark
+from softjaw.study.show.stored_surface import stored_surface
 from softjaw.study.show.view.model import CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 from softjaw.study.show.view.pads import LIFT, Pad, pads
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from softjaw.study.show.pictures import COLOURS, INK, SOFT
+from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.show.view.model import FORCE, NEUTRAL, PAD
 from softjaw.study.show.view.pads import LIFT, Pad
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from softjaw.study.case.stored_surface import stored_surface
+from softjaw.study.pictures import COLOURS, INK, span
 from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.show.pictures import COLOURS, INK, span
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
+from softjaw.study.show.stored_surface import stored_surface
 from softjaw.study.show.tables.ranking import nearest
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import CROSSED, NEUTRAL, OPEN, View

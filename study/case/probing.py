@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
-from softjaw.study.accuracy.uncertainty import interval
-from softjaw.study.accuracy.uncertainty.variations import Variation, moved_poses, variations
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of
+from softjaw.study.case.result import TimeLimitError
 from softjaw.study.case.solving import solver
+from softjaw.study.case.variations import Variation, moved_poses, variations
 from softjaw.study.messages import StudyError
-from softjaw.study.run.stopping import TimeLimitError
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 NAMES = ("e_n", "quality")
+POWER = 5  # of mu in the quality of contacts that face each other: three axes of one finger's surface, two of the other
 
 
 class Probing:
@@ -80,7 +80,7 @@ def _ladder(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
 def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
     """Relative change of the quality of every case for a mu larger by its half-width; ``quality`` is over all cases."""
     share = scene.uncertainty.mu / scene.friction.mu
-    change = np.full(quality.shape, interval.facing_change_by_mu(share))
+    change = np.full(quality.shape, facing_change_by_mu(share))
     tilted = np.argwhere((result.map("misalignment") > FACING) & (quality > 0))
     if not len(tilted):
         return change
@@ -96,6 +96,17 @@ def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
             known[key] = (more - less) / (2 * quality[place])
         change[place] = known[key]
     return change
+
+
+def facing_change_by_mu(share: float) -> float:
+    """Relative change of the quality of contacts that face each other for a mu larger by ``share``.
+
+    Half the difference between both sides.
+
+    >>> round(facing_change_by_mu(0.01), 6)
+    0.05001
+    """
+    return ((1 + share) ** POWER - (1 - share) ** POWER) / 2
 
 
 def _volume(frames: dict[str, FloatArray], semi_axes: FloatArray, arms: float, torques: float) -> float:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.accuracy.uncertainty.variations import by_formula, variations
+from softjaw.study.case.margin import TIE
 from softjaw.study.case.sweep import axes
+from softjaw.study.case.variations import by_formula, variations
+from softjaw.study.flags import LOST
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
-from softjaw.study.show.tables.ranking import LOST
 
 if TYPE_CHECKING:
     from softjaw.study.result.store import ResultWriter
@@ -39,9 +40,7 @@ RULES = {
     "probes": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
               " larger).",
 }  # fmt: skip
-TIE = 1e-6  # relative difference of values that is none: images of one grasp
 TIMES = 2.0  # root mean squares of the probes that a band is wide: about 95 of 100 cases lie within
-POWER = 5  # of mu in the quality of contacts that face each other: three axes of one finger's surface, two of the other
 
 
 def band(name: str) -> str:
@@ -118,7 +117,7 @@ def _share(
         return change_by_modulus(force, values, own.shear_modulus_percent / 100)
     if name == "e_n":
         return np.zeros(values.shape)
-    from softjaw.study.accuracy.uncertainty.probing import change_by_mu
+    from softjaw.study.case.probing import change_by_mu
 
     return change_by_mu(writer.result(), scene, values)
 
@@ -282,14 +281,3 @@ def change_along(station: FloatArray, values: FloatArray, shift: float) -> Float
     [0.3, 0.3, 0.3]
     """
     return np.abs(shift * np.gradient(_log(values), station, axis=0))
-
-
-def facing_change_by_mu(share: float) -> float:
-    """Relative change of the quality of contacts that face each other for a mu larger by ``share``.
-
-    Half the difference between both sides.
-
-    >>> round(facing_change_by_mu(0.01), 6)
-    0.05001
-    """
-    return ((1 + share) ** POWER - (1 - share) ** POWER) / 2

@@ -143,7 +143,7 @@ def probe_candidates(scene: Scene, units: Sequence[Any]) -> tuple[int, ...]:
     own = scene.uncertainty
     if not own.parts or not changes(scene):
         return ()
-    from softjaw.study.accuracy.cost.probes import spread  # loads PETSc, as above
+    from softjaw.study.case.probes import spread  # loads PETSc, as above
 
     forces = len(scene.load.normal_force)
     first = {unit.index: unit.rows[0][0] // forces for unit in units}
