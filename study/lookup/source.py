@@ -11,7 +11,8 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.quantities import BY_KEY
-from softjaw.study.result.read import axes_of, maps_in, place_text, values_of
+from softjaw.study.result.read import axes_of, maps_in, values_of
+from softjaw.study.result.reading import place_text
 from softjaw.study.units import UNITS, split_unit
 
 

@@ -6,7 +6,6 @@ PETSc, and works on a file that a run is still writing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, TABLE, Quantity
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.reading import Result, StoredAxis
 from softjaw.study.result.store import open_result
-from softjaw.study.units import shown_text
 
 XYZ = ("x", "y", "z")
 FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to be read with the rest
@@ -214,16 +212,3 @@ def _attributes(result: Result) -> dict[str, Any]:
         "patches": layout.patches, "pad_faces": layout.front, "poses": not result.axes[-3].units,
         "derived": tuple(d.name for d in layout.derived),
     }  # fmt: skip
-
-
-def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
-    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
-    words = []
-    label = "" if axes[-3].units else f'"{labels[tuple(index[-3:-1])]}"'
-    for axis, i in zip(axes, index, strict=True):
-        if label and axis.name in ("station", "angle"):
-            words += [label] * (axis.name == "station")
-        else:
-            value = axis.options[i] if axis.options else shown_text(axis.values[i], axis.units, 5)
-            words.append(f"{axis.name} {value}")
-    return ", ".join(words)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from softjaw.study.result import checksums
 from softjaw.study.result.guarded import text_of
 from softjaw.study.result.layout import FAILED, LABEL, MISSING, PROGRAM, READABLE, ROOT, SESSIONS, layout_from_options
 from softjaw.study.result.lock import holder
+from softjaw.study.units import shown_text
 
 BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
 
@@ -266,3 +268,16 @@ class Result:
 def _texts(found: np.ndarray) -> np.ndarray:
     """Texts of an array of fixed-length strings."""
     return np.array([text_of(text) for text in found.ravel().tolist()], dtype=str).reshape(found.shape)
+
+
+def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
+    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
+    words = []
+    label = "" if axes[-3].units else f'"{labels[tuple(index[-3:-1])]}"'
+    for axis, i in zip(axes, index, strict=True):
+        if label and axis.name in ("station", "angle"):
+            words += [label] * (axis.name == "station")
+        else:
+            value = axis.options[i] if axis.options else shown_text(axis.values[i], axis.units, 5)
+            words.append(f"{axis.name} {value}")
+    return ", ".join(words)

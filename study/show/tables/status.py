@@ -12,7 +12,7 @@ import numpy as np
 from softjaw.study.quantities import PARTS, STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
-from softjaw.study.result.read import place_text
+from softjaw.study.result.reading import place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
