@@ -160,9 +160,7 @@ def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[Floa
     return origin, N, iterations, flag
 
 
-def _on_the_whole(
-    face: ContactFace, cop: FloatArray, N: FloatArray
-) -> tuple[FloatArray, FloatArray, int, FrameFlag]:
+def _on_the_whole(face: ContactFace, cop: FloatArray, N: FloatArray) -> tuple[FloatArray, FloatArray, int, FrameFlag]:
     """Origin, normal, passes and flag on one surface; steps are halved where they lead to and fro."""
     flag, seen = FrameFlag.CLEAN, []
     for iterations in range(1, MAX_ITERATIONS + 1):

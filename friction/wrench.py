@@ -32,7 +32,7 @@ from softjaw.friction.kernel import friction_sums
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
-Model = Literal["curved", "flat", "projected", "unrolled"]
+Model = Literal["ccm", "pcm", "pcm_projected", "unrolled"]
 MODELS: tuple[str, ...] = get_args(Model)
 
 
@@ -73,7 +73,7 @@ class FrictionLimits:
 
 
 def friction_wrench(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "curved", unrolled: ArrayLike | None = None
+    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
 ) -> FloatArray:
     """Total friction wrench on the patch for each slip motion, Eqs. (6)-(8), in the load convention.
 
@@ -109,7 +109,7 @@ def friction_wrench(
 
 
 def friction_support(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "curved", unrolled: ArrayLike | None = None
+    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
 ) -> FloatArray:
     """Power ``H(t) = w(t) . t = mu sum p a |P v|`` that friction takes from each motion, ``(m,)`` [W].
 
@@ -121,7 +121,7 @@ def friction_support(
 
 
 def friction_limits(
-    patch: ContactPatch, mu: float, model: Model = "curved", unrolled: ArrayLike | None = None
+    patch: ContactPatch, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
 ) -> FrictionLimits:
     """Largest forces along x and y and largest torque about z, from three motions; see `friction_wrench`."""
     f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model, unrolled).tolist()
@@ -142,9 +142,9 @@ def model_faces(
         raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
     keep = patch.load > 0
     arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
-    if model == "curved":
+    if model == "ccm":
         return arm, normal, load
-    if model == "projected":
+    if model == "pcm_projected":
         load = load * np.abs(normal[2])
     if model == "unrolled":
         arc = np.asarray(unrolled, float)

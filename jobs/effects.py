@@ -63,12 +63,12 @@ COARSE = ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wal
           "gripper.elements=[10, 6, 4]")  # fmt: skip
 SHELLS = "object: linear or nonlinear shell"
 PANELS = {  # of an effect: threshold, and what the axis says
-    "object: rigid or shell": (wall.STIFF, "dent / travel"),
-    SHELLS: (wall.SMALL_DENT, "dent / wall thickness"),
+    "object: rigid or shell": (wall.STIFF, "indentation / closing displacement"),
+    SHELLS: (wall.SMALL_INDENTATION, "indentation / wall thickness"),
     "sheet": (effects.STIFF_SHEET, "compliance over that of the pad"),
     "friction": (TARGET, "1 - F_N / S"),
     "friction-pressure coupling": (effects.SMALL_TRACTION, "traction left out / pressure"),
-    "limit surface": (0.0, "radial misfit"),  # quality, not e_n; the quartic is never skipped
+    "limit surface": (0.0, "radial fit error"),  # quality, not e_n; the quartic is never skipped
 }
 EXACT = "model size"
 SURFACES = {"three_motions": "s", "full": "^", "quartic": "o"}  # and how they are drawn
@@ -106,7 +106,7 @@ def climb(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]
     return found
 
 
-def e_n(contacts: list[Contact], friction: str = "curved") -> float:
+def e_n(contacts: list[Contact], friction: str = "ccm") -> float:
     """e_n of the weaker finger [m]."""
     return min(c.limits[friction].e_n for c in contacts)
 
@@ -119,17 +119,17 @@ def off(low: float, high: float) -> float:
 def volume(contact: Contact, found: SurfaceFit) -> float:
     """Quality of two such contacts face to face with a fitted surface over that with the exact one."""
     w = friction_wrench(contact.local, fibonacci_twists(HULL, contact.rho), 1.0)[:, [0, 1, 5]]
-    V, A = polytope_volume(np.vstack([w, -w]) / contact.limits["curved"].S / [1, 1, contact.rho])
+    V, A = polytope_volume(np.vstack([w, -w]) / contact.limits["ccm"].S / [1, 1, contact.rho])
     return found.surface.volume * found.surface.shadow_area / (V * A)
 
 
 def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
     """Effects that are chosen when the contact is solved."""
-    S, F_N = (sum(getattr(c.limits["curved"], value) for c in contacts) for value in ("S", "F_N"))
-    yield "friction", name, 1.0 - F_N / S, off(e_n(contacts, "flat"), e_n(contacts))
+    S, F_N = (sum(getattr(c.limits["ccm"], value) for c in contacts) for value in ("S", "F_N"))
+    yield "friction", name, 1.0 - F_N / S, off(e_n(contacts, "pcm"), e_n(contacts))
     c = contacts[0]
     for level in SURFACES:
-        found = fit_surface(c, "curved", LimitSurface(model=level))
+        found = fit_surface(c, "ccm", LimitSurface(model=level))
         yield "limit surface", f"{name}, {level}", found.own.Erad, off(volume(c, found), 1.0)
 
 

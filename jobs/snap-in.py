@@ -1,4 +1,4 @@
-"""Force over travel, dent and e_n of thin walls from results of jobs/snap-in.toml, as a picture.
+"""Force over closing displacement, indentation and e_n of thin walls from results of jobs/snap-in.toml, as a picture.
 
     python jobs/snap-in.py results/snap-in.hdf results/snap-in-linear.hdf -o snap-in.png
 
@@ -16,7 +16,7 @@ from softjaw.study import pictures
 from softjaw.study.quantities import EFFECTS
 from softjaw.study.result.store import open_result
 
-PANELS = (("travel", "travel of the pads [mm]"), ("dent", "dent [mm]"), ("e_n", "e_n [mm]"))
+PANELS = (("closing", "closing of the pads [mm]"), ("indentation", "indentation [mm]"), ("e_n", "e_n [mm]"))
 LOOKS = ({"color": "#12436d"}, {"color": "#c05a00", "ls": "--"}, {"color": "#566069", "ls": ":"})
 
 
@@ -24,7 +24,7 @@ def line(file: Path) -> tuple[str, np.ndarray, list[np.ndarray]]:
     """How the wall of the first candidate was simulated, its forces [N], and the panels' values over them [mm]."""
     with open_result(file) as result:
         forces = np.asarray(result.axes[-1].values)
-        values = [1e3 * np.asarray(result.map(name, "curved" if name == "e_n" else "")) for name, _ in PANELS]
+        values = [1e3 * np.asarray(result.map(name, "ccm" if name == "e_n" else "")) for name, _ in PANELS]
         level = int(result.read("effects/object_level").ravel()[0])
     return EFFECTS["object"][level], forces, [v.reshape(-1, len(forces))[0] for v in values]
 
@@ -45,7 +45,7 @@ def draw(files: list[Path]) -> bytes:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Force over travel, dent and e_n, as a picture.")
+    parser = argparse.ArgumentParser(description="Force over closing displacement, indentation and e_n, as a picture.")
     parser.add_argument("files", nargs="+", type=Path, help="up to three result files")
     parser.add_argument("-o", dest="out", type=Path, required=True, help="PNG to write")
     given = parser.parse_args()

@@ -200,7 +200,7 @@ class Quartic(LevelSet):
         for part in range(0, len(T), 10_000):
             along = T[part : part + 10_000] @ Y.T
             height = np.abs(along)
-            if self._is_dented:
+            if self._is_indented:
                 tops = height >= height[:, neighbours(d, len(Y))].max(axis=2)
                 row, column = np.nonzero(tops | (height > 0.9 * height.max(axis=1, keepdims=True)))
             else:
@@ -224,7 +224,7 @@ class Quartic(LevelSet):
         return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
 
     @cached_property
-    def _is_dented(self) -> bool:
+    def _is_indented(self) -> bool:
         """Whether a sampled direction has a negative curvature; several starts do no harm to a convex body."""
         return bool(lowest_eigenvalues(self._round.hessian(directions(self.dimension, 200))).min() < 0)
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.ellipsoid import full_ellipsoid, nearest_solution
+from softjaw.lsfit.fit_error import FitErrors, fit_error
 from softjaw.lsfit.flag import FitError
 from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.gram import GramCertificate, ball_gram, gram_certificate, gram_map
 from softjaw.lsfit.interior import least_quadratic
-from softjaw.lsfit.misfit import Misfit, misfit
 from softjaw.lsfit.quartic_surface import Quartic
 from softjaw.lsfit.round import ball_coefficients
 from softjaw.lsfit.span import Scaling, SpanSamples, placed, refuse_runaway, span_samples
@@ -38,7 +38,7 @@ class SpanFit(NamedTuple):
     """
 
     surface: LimitSurface
-    errors: Misfit
+    errors: FitErrors
     rank: int
     certificate: GramCertificate | None = None
 
@@ -164,5 +164,5 @@ def _fit(surface: LimitSurface, samples: SpanSamples, check: bool = True) -> Spa
     if check:
         refuse_runaway(surface, samples.Y)
     with np.errstate(invalid="ignore"):
-        errors = misfit(surface, samples.Y, samples.T)
+        errors = fit_error(surface, samples.Y, samples.T)
     return SpanFit(placed(surface, samples), errors, samples.rank)

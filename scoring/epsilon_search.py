@@ -66,7 +66,7 @@ def epsilon(
     Notes
     -----
     The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
-    bound, which leaves a gap as large as its misfit; the upper bound uses its own support.
+    bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
 
     Examples
     --------

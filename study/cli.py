@@ -251,7 +251,7 @@ def _add_result_options(made: dict[str, Any]) -> None:
     for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
         made[name].add_argument("--top", type=_whole(0), default=10, metavar="K", help=f"{listed}, 0: all (default 10)")
     for name in ("compare", "export"):
-        made[name].add_argument("--model", choices=("curved", "flat", "projected"), default="curved",
+        made[name].add_argument("--model", choices=("ccm", "pcm", "pcm_projected"), default="ccm",
                                 help="friction model (default curved)")  # fmt: skip
     made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
     add_choice(made["report"])

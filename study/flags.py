@@ -38,12 +38,12 @@ class Flag(IntFlag):
     )  # fmt: skip
     OVERHANG = 1 << 6, "overhang", f"some loaded faces of a patch are turned {DEGREES_90}"
     WINDING = 1 << 7, "winding", "some faces are wound against their normals, which were taken"
-    ASKEW = 1 << 8, "askew", "contacts more than 5 deg from antipodal"
+    NOT_ANTIPODAL = 1 << 8, "not antipodal", "contacts more than 5 deg from antipodal"
     NODAL = 1 << 9, "nodal", "solved with nodal gaps, because weighted ones had no solution"
     SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
-    OVERLAP = 1 << 11, "overlap", "the pads run into each other beside the object, which is not simulated"
+    COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
-        "the front overlaps the object by more than a tenth of the travel, fewer than six elements carry load or only"
+        "the front overlaps the object by more than a tenth of the closing, fewer than six elements carry load or only"
         " one along its length or its width, or trilinear elements are too stiff for foam with a Poisson's ratio above"
         " 0.45"
     )  # fmt: skip
@@ -53,7 +53,7 @@ class Flag(IntFlag):
     SLIDES_OUT = 1 << 14, "slides out", (
         "the pads push the object along its axis with more than friction can hold, so it slides out"
     )  # fmt: skip
-    YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the dent stays"
+    YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the indentation stays"
     NO_FIT = 1 << 16, "no fit", "a limit surface could not be fitted, the ellipsoid from three motions stands in"
     UNSTABLE = 1 << 17, "unstable", "the foam lost ellipticity, strains may localise"
     JUMPED = 1 << 18, "jumped", (
@@ -66,7 +66,7 @@ class Flag(IntFlag):
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG
 BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
-LOST = Flag.SLIPS | Flag.OVERLAP | BORNE  # of a grasp that does not hold, or does harm, as it was computed
+LOST = Flag.SLIPS | Flag.COLLISION | BORNE  # of a grasp that does not hold, or does harm, as it was computed
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

@@ -14,15 +14,15 @@ import numpy as np
 
 INK, SOFT, EMPTY = "#1d2429", "#6b747b", "#e7e9eb"
 MODEL_STYLE = {
-    "curved": {"color": "#12436d", "linestyle": "-", "marker": "o"},
-    "flat": {"color": "#c05a00", "linestyle": "--", "marker": "s"},
-    "projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
+    "ccm": {"color": "#12436d", "linestyle": "-", "marker": "o"},
+    "pcm": {"color": "#c05a00", "linestyle": "--", "marker": "s"},
+    "pcm_projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
 }
 COLOURS = {
     "quality": "viridis",
     "e_n": "cividis",
     "pressure": "magma_r",
-    "dent": "plasma_r",
+    "indentation": "plasma_r",
     "wall_stress": "inferno_r",
 }
 RASTER = 150  # polygons above which a map is stored as pixels: a page must stay small

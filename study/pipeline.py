@@ -103,14 +103,14 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
 
 def _state_values(contacts: Sequence[PressedContact]) -> dict[str, Any]:
     """What the solved states say beside their patches."""
-    travel, checks = [c.state.travel for c in contacts], [vars(c.state.checks) for c in contacts]
-    values = {"maps/travel": np.mean(travel), "fingers/travel": travel}
+    closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
+    values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
     return values | {f"checks/{name}": [own[name] for own in checks] for name in checks[0]}
 
 
 def _work(contacts: Sequence[PressedContact], outcome: Solved, friction: float) -> dict[str, Any]:
     """Work of one case, of which friction, fits and scores took so many seconds."""
-    names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("cuts", "cuts"))
+    names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("step_halvings", "halvings"))
     work = {f"work/{key}": [getattr(c.state, name) for c in contacts] for key, name in names}
     spent = [s.seconds for s in outcome.spent]
     for part in ("assembly", "factorisation", "rest"):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from softjaw.study.flags import flag_definitions
 
-MODELS = ("curved", "flat", "projected")
+MODELS = ("ccm", "pcm", "pcm_projected")
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
 STATES = ("missing", "done", "failed")  # of a case, by these codes:
@@ -32,17 +32,17 @@ EFFECTS = {
     "sheet": ("rigid", "elastic plate"),
     "model_size": ("quarter", "half", "full"),
     "fingers": ("one", "two"),
-    "friction": ("flat", "curved"),
+    "friction": ("pcm", "ccm"),
     "wrench": ("3-D", "6-D"),
     "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
     "friction_pressure_coupling": ("none", "tangential traction"),
 }
 INDICATORS = {
-    "object": "dent that a linear wall would get at the largest force, over the wall's thickness",
+    "object": "indentation that a linear wall would get at the largest force, over the wall's thickness",
     "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",
-    "limit_surface": "radial misfit of the fitted limit surface, curved model, of the finger where it is larger",
+    "limit_surface": "radial fit error of the fitted limit surface, curved model, of the finger where it is larger",
     "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
     " finger where it is larger",
 }
@@ -132,11 +132,11 @@ TABLE = (
     Quantity("quality_graspit", M, "", "grasp quality, linearised as in GraspIt!",
              "As quality, with the hull of the 20 points that GraspIt! takes on each ellipsoid instead of the "
              "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs="graspit"),
-    Quantity("misfit", (), "", "misfit of the fitted limit surface",
+    Quantity("fit_error", (), "", "fit error of the fitted limit surface",
              "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
              "377 motions that it was not fitted to; curved model, of the finger where it is larger.", rank=10),
-    Quantity("misfit_ellipsoid", (), "", "misfit of the ellipsoid from three motions",
-             "As misfit, of the ellipsoid that quality is computed from."),
+    Quantity("fit_error_ellipsoid", (), "", "fit error of the ellipsoid from three motions",
+             "As fit error, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
              "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.", rank=2),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
@@ -163,7 +163,7 @@ TABLE = (
     Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
-    Quantity("travel", (), "m", "travel of the pad",
+    Quantity("closing", (), "m", "closing displacement of the pad",
              "How far the pad's back moved towards the object after first touch; mean of both fingers."),
     Quantity("contact_area", (), "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
     Quantity("p_max", (), "Pa", "largest pressure", "Largest contact pressure on either finger."),
@@ -181,9 +181,9 @@ TABLE = (
                  f" cannot carry ({note}); of the finger where it is largest.")
         for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
         for suffix, model, note in (
-            ("", "flat", "both scaled by S, the paper's normalisation"),
-            ("_projected", "projected", "both scaled by the physical normal force F_N; not positive, for a planar model"
-             " with that force claims too little"),
+            ("", "pcm", "both scaled by S, the paper's normalisation"),
+            ("_pcm_projected", "pcm_projected", "both scaled by the physical normal force F_N; not positive, for a"
+             " planar model with that force claims too little"),
         )
     ),
     Quantity("e_n_error", (), "", "relative error of e_n",
@@ -201,14 +201,14 @@ TABLE = (
         Quantity(f"{name}_overestimate{suffix}_error", (), "", f"error of {name}_overestimate{suffix}",
                  "Absolute difference between the mesh and one with half as many elements per direction.",
                  needs="two meshes")
-        for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_projected")
+        for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_pcm_projected")
     ),
     Quantity("safety_factor", M, "", "weight held over weight",
              "How many times its own weight the object could have before the grasp, with the normal force of this "
              "case on both fingers, lost it, with the hull of the sampled wrenches as limit surface (on the safe "
              "side). Below 1 it cannot hold the object. The centre of mass is that of [task], or the middle of the "
              "box round the object.", symbol="safety", needs="mass", rank=5),
-    Quantity("dent", (), "m", "depth of the dent",
+    Quantity("indentation", (), "m", "indentation of the wall",
              "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=3),
     Quantity("wall_stress", (), "Pa", "largest stress in the wall",
              "Largest von Mises stress on its two faces.", symbol="stress", needs="wall", rank=6),
@@ -225,7 +225,7 @@ TABLE = (
     Quantity("tau_pure", F, "N m", "largest torque without a net force", AS_MAP, "fingers"),
     Quantity("S", F, "N", "pressure times area", AS_MAP, "fingers"),
     Quantity("F_N", F, "N", "normal force", AS_MAP, "fingers"),
-    Quantity("travel", F, "m", "travel of the pad", AS_MAP, "fingers"),
+    Quantity("closing", F, "m", "closing displacement of the pad", AS_MAP, "fingers"),
     Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
              "In the pad's frame: where the line through the centre of pressure along z meets the pad's deformed "
              "face, loaded there or not.", "fingers"),
@@ -238,27 +238,27 @@ TABLE = (
              "x_object = rotation x_pad + origin.", "fingers"),
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
              "Centre of the undeformed front face at first touch, in the object's frame; under load the pad's back "
-             "has moved on by the travel, along its z axis.", "fingers"),
+             "has moved on by the closing displacement, along its z axis.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
-    Quantity("tension", F, "", "largest tension",
+    Quantity("adhesion", F, "", "largest adhesion",
              "Largest negative nodal pressure over the largest pressure.", "checks"),
     Quantity("penetration", F, "", "largest penetration", "Deepest mean overlap at a node over an element.", "checks"),
     Quantity("complementarity", F, "", "complementarity",
              "Largest product of pressure and gap at a node, over the largest pressure and the element size.",
              "checks"),
-    Quantity("overlap", F, "m", "deepest point inside the object",
-             "Of the quadrature points of the front: weighted gaps hold on average, so this tells how well the mesh "
+    Quantity("penetration_depth", F, "m", "deepest point inside the object",
+             "Of the quadrature points of the front: weighted gaps hold on average, so this shows how well the mesh "
              "follows the object.", "checks"),
     Quantity("min_det_f", F, "", "smallest det F", "Smallest ratio of deformed to undeformed volume.", "checks"),
     Quantity("max_strain", F, "", "largest strain", "Largest difference of a principal stretch from 1.", "checks"),
-    Quantity("acoustic", F, "", "smallest acoustic eigenvalue",
+    Quantity("ellipticity", F, "", "smallest acoustic eigenvalue",
              "Over the shear modulus, in 24 directions at one point per element; not positive: the foam lost "
              "ellipticity and strains may localise.", "checks"),
     # work
     Quantity("newton_iterations", F, "", "Newton iterations", "Since the force below.", "work"),
     Quantity("load_steps", F, "", "load steps", "Newton solves since the force below.", "work"),
-    Quantity("cuts", F, "", "step cuts", "Solves that failed and were tried again in shorter steps.", "work"),
+    Quantity("step_halvings", F, "", "step halvings", "Solves that failed and were repeated in half steps.", "work"),
     *(
         Quantity(f"seconds_{part}", (), "s", f"seconds in {part}", f"Time of the case spent in {part}.", "work")
         for part in (*PARTS, "total")
@@ -285,13 +285,13 @@ TABLE = (
              "Sum of: 1 the wrenches lie in a plane or on a line, so the surface is flat; 2 fewer independent "
              "wrenches than coefficients; 4 its reach was limited, for the wrenches alone would give an endless body;"
              " 8 rho does not suit the contact.", "limit_surface"),
-    Quantity("misfit", (*FM, "component"), "-, -, rad", "misfit of the fitted surface",
+    Quantity("fit_error", (*FM, "component"), "-, -, rad", "fit error of the fitted surface",
              "Means over 377 motions that it was not fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of "
              "the radius), angle between gradient and motion.", "limit_surface"),
-    Quantity("misfit_own", (*FM, "component"), "-, -, rad", "misfit of the fitted surface on its own samples",
+    Quantity("fit_error_own", (*FM, "component"), "-, -, rad", "fit error of the fitted surface on its own samples",
              "Means over the motions that it was fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of the "
              "radius), angle between gradient and motion.", "limit_surface"),
-    Quantity("misfit_ellipsoid", (*FM, "component"), "-, -, rad", "misfit of the ellipsoid from three motions",
+    Quantity("fit_error_ellipsoid", (*FM, "component"), "-, -, rad", "fit error of the ellipsoid from three motions",
              "Means over the 377 motions: |P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle "
              "between gradient and motion.", "limit_surface"),
     Quantity("matrix_6d", (*F, "wrench", "wrench_2"), "", "matrix of the fitted 6-D ellipsoid",
@@ -299,8 +299,8 @@ TABLE = (
              " the directions that the contact resists.", "limit_surface", needs="six components"),
     Quantity("rank_6d", F, "", "directions that the contact resists",
              "Of the six; 3 for a planar contact.", "limit_surface", needs="six components"),
-    Quantity("misfit_6d", (*F, "component"), "-, -, rad", "misfit of the 6-D ellipsoid",
-             "As misfit, over the motions it was fitted to.", "limit_surface", needs="six components"),
+    Quantity("fit_error_6d", (*F, "component"), "-, -, rad", "fit error of the 6-D ellipsoid",
+             "As fit error, over the motions it was fitted to.", "limit_surface", needs="six components"),
     # deformed wall
     Quantity("place", ("wall_place", "component"), "m", "deformed wall",
              f"Outer face in the object's frame at {AROUND} angles about the axis, in equal steps from finger 1's,"

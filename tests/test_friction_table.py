@@ -19,7 +19,7 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import body_volume, shadow_area
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.six import six_samples, span_ellipsoid, span_quartic
@@ -46,7 +46,7 @@ from tests.generators import (
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]
 CASES = {case["id"]: case for case in TABLE}
-MODEL = {"ccm": "curved", "pcm_flat": "flat", "pcm_projected": "projected", "pcm_unrolled": "unrolled"}
+MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected", "pcm_unrolled": "unrolled"}
 X_HINT = [0.0, 0.0, 1.0]  # of the contacts of a grasp, to be projected on their tangent planes
 
 
@@ -129,7 +129,7 @@ def samples(inputs):
 
 
 def errors_of(name, surface, W, T):
-    return {f"{name}.{error}": value for error, value in misfit(surface, W, T)._asdict().items()}
+    return {f"{name}.{error}": value for error, value in fit_error(surface, W, T)._asdict().items()}
 
 
 def mean_square(surface, W):

@@ -238,7 +238,7 @@ def millimetres_or_metres():
 
 def saddle():
     patch, twist = heightfield(1, 1, 1, -1, 20, 20), fibonacci_twists(200, 2.0)
-    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("projected", "curved", "flat"))
+    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("pcm_projected", "ccm", "pcm"))
     assert (projected < curved).all()
     assert (curved < flat).all()
     frame = contact_frame(patch, X)
@@ -254,7 +254,7 @@ def overhanging_normals():
     assert frame.overhang_share == pytest.approx(1 / 3, rel=1e-12)
     assert frame.overhang_count == 15 * 40
     local = in_frame(patch, frame)
-    limits, projected = friction_limits(local, 1.0), friction_limits(local, 1.0, "projected")
+    limits, projected = friction_limits(local, 1.0), friction_limits(local, 1.0, "pcm_projected")
     assert limits.F_N == pytest.approx(np.pi * math.sin(np.radians(120)) ** 2, rel=1e-3)
     assert projected.f_x == pytest.approx(local.load @ np.abs(local.normal[:, 2]), rel=1e-12)
     assert projected.f_x > limits.F_N * 1.5

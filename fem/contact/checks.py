@@ -12,31 +12,31 @@ from softjaw.fem.pad.foam import FloatArray, Foam
 
 BALANCE = 1e-8  # of the normal force
 PENETRATION = 1e-9  # of an element's size
-TENSION = COMPLEMENTARITY = 1e-8  # of the largest pressure, of that times an element's size
+ADHESION = COMPLEMENTARITY = 1e-8  # of the largest pressure, of that times an element's size
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
 TOO_MUCH = 0.7  # strain beyond which not the contact is what fails
-MOST_FALL = 0.05  # of the travel from one force to the next: weighted and nodal gaps differ by less
+MOST_FALL = 0.05  # of the closing displacement from one force to the next: weighted and nodal gaps differ by less
 
 
 @dataclass(frozen=True)
 class Checks:
     """Measures of a converged state; the first four must be small, ``min_det_f`` positive.
 
-    ``force_balance`` is relative to the force, ``tension`` to the largest pressure, ``penetration`` and
+    ``force_balance`` is relative to the force, ``adhesion`` to the largest pressure, ``penetration`` and
     ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
-    ``overlap`` is the deepest point of the front inside the object [m]: weighted gaps hold on average, so it tells how
-    well the mesh follows the object; ``acoustic`` is the smallest eigenvalue of the acoustic tensor over the shear
-    modulus: not positive means that the foam has lost ellipticity and that strains may localise.
+    ``penetration_depth`` is the deepest point of the front inside the object [m]: weighted gaps hold on average, so it
+    shows how well the mesh follows the object; ``ellipticity`` is the smallest eigenvalue of the acoustic tensor
+    over the shear modulus: not positive means that the foam has lost ellipticity and that strains may localise.
     """
 
     force_balance: float
-    tension: float
+    adhesion: float
     penetration: float
     complementarity: float
-    overlap: float
+    penetration_depth: float
     min_det_f: float
     max_strain: float
-    acoustic: float
+    ellipticity: float
 
 
 def check(
@@ -64,22 +64,22 @@ def check(
     """
     pad = foam.pad
     pressure, gap, points = state
-    det, strain, acoustic = foam.strains(x, DIRECTIONS)
+    det, strain, ellipticity = foam.strains(x, DIRECTIONS)
     size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
     largest = max(float(pressure.max(initial=0.0)), 1e-300)
     checks = Checks(
         force_balance=abs(points.force[2] / pad.share - force) / force,
-        tension=max(0.0, -float(pressure.min())) / largest,
+        adhesion=max(0.0, -float(pressure.min())) / largest,
         penetration=max(0.0, -float(gap.min())) / size,
         complementarity=float(np.abs(pressure * gap).max(initial=0.0)) / (largest * size),
-        overlap=max(0.0, -float(points.gap.min())),
+        penetration_depth=max(0.0, -float(points.gap.min())),
         min_det_f=det,
         max_strain=strain,
-        acoustic=acoustic,
+        ellipticity=ellipticity,
     )
     for kept, broken in (
         (checks.force_balance <= BALANCE, f"force balance is off by {checks.force_balance:.1e} of the force"),
-        (checks.tension <= TENSION, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
+        (checks.adhesion <= ADHESION, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
         (checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
         (checks.complementarity <= COMPLEMENTARITY, "pressure and gap are both positive at a node"),
         (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
@@ -111,37 +111,37 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
     x : (size,) array
         Last state in equilibrium, at the normal force ``force`` [N].
     """
-    det, strain, acoustic = foam.strains(x, DIRECTIONS)
-    if isinstance(error, NotReachedError) or (acoustic > BARELY_ELLIPTIC and strain < TOO_MUCH):
+    det, strain, ellipticity = foam.strains(x, DIRECTIONS)
+    if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < TOO_MUCH):
         return error
-    if acoustic > BARELY_ELLIPTIC:
+    if ellipticity > BARELY_ELLIPTIC:
         return ConvergenceError(
             f"the pad is squeezed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
             f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
         )
     return ConvergenceError(
         f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "
-        f"{acoustic:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "
+        f"{ellipticity:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "
         f"equilibrium was found beyond ({error})"
     )
 
 
 def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
-    """Refuse a state that a pad on a rigid object cannot have come to: more force means more travel.
+    """Refuse a state that a pad on a rigid object cannot have come to: more force means more closing displacement.
 
     Parameters
     ----------
     low, high : (float, float)
-        Force [N] and travel [m] of a state and of the next one.
+        Force [N] and closing displacement [m] of a state and of the next one.
 
     Raises
     ------
     CheckError
-        If the force grew and the travel fell.
+        If the force grew and the closing displacement fell.
     """
     if high[0] > low[0] and high[1] < (1.0 - MOST_FALL) * low[1]:
         raise CheckError(
-            f"the travel falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "
+            f"the closing displacement falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "
             f"{high[0]:.4g} N: one of the two states is not what a growing force leads to; the contact is too small "
             "for the mesh, refine the pad"
         )

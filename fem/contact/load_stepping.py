@@ -1,15 +1,15 @@
-"""From one converged contact state to the next: by normal force, by halves of the step, or along the sheet's travel.
+"""From one converged contact state to the next: by normal force, by halves of the step, or along the sheet's closing.
 
 `Stepping` goes there in one step where Newton's method can; `Following` keeps to the path of equilibria of a pad on a
 rigid object, so that no force leads off it.
 
 Where a force has several equilibria, Newton's method finds the one that its start leads to. So the start has to be
-near: a step of the force is as long as the tangent of the path foretells at most `LONGEST` of travel, and its state has
-to lie within `STRAY` of what the tangent foretells, else the step is halved. Both are parts of the pad's thickness and
-do not depend on the forces that were asked for. Steps in which the largest strain grows by more than `FOLD` are halved,
-too; where it grows while the force hardly does (`FOLDING`, `FOLDS`), the foam folds somewhere. Foam that is strained
-further than `STRAINED` may buckle: there a stable state has to lead to a stable one, whose tangent on the free
-displacements, the nodes in contact held to the object, is positive definite.
+near: a step of the force is as long as the tangent of the path foretells at most `LONGEST` of closing, and its state
+has to lie within `STRAY` of what the tangent foretells, else the step is halved. Both are parts of the pad's
+thickness and do not depend on the forces that were asked for. Steps in which the largest strain grows by more than
+`FOLD` are halved, too; where it grows while the force hardly does (`FOLDING`, `FOLDS`), the foam folds somewhere.
+Foam that is strained further than `STRAINED` may buckle: there a stable state has to lead to a stable one, whose
+tangent on the free displacements, the nodes in contact held to the object, is positive definite.
 
 Where even a step of `SHORTEST_FORETOLD` leads from a stable state to an unstable one, the path forks: its states go on
 and are taken, but a pad that is disturbed may leave them. Where such a step leaves the path, the pad jumps: the path
@@ -39,14 +39,14 @@ MOST_FAILURES = 20  # of the steps of one walk
 FIRST_TRIES = 12
 FALL = 1e-6  # of the force: less is the rounding of a plateau, see `falls`
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
-LONGEST = 0.2  # foretold travel of one step
+LONGEST = 0.2  # foretold closing displacement of one step
 STRAY = 0.1  # distance of a node or the sheet from where it was foretold; good steps of practice keep to 0.06
-SHORTEST_FORETOLD = 0.025  # foretold travel of a step that is not halved again
-LEAST = 0.01  # foretold travel of a step that is given up where Newton's method does not converge
+SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not halved again
+LEAST = 0.01  # foretold closing displacement of a step that is given up where Newton's method does not converge
 FEWEST = 1.0 / 1024.0  # part of a step that is not halved again where nothing is foretold
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
-FIRST = 0.25  # travel at which the first contact is looked for, at most
+FIRST = 0.25  # closing displacement at which the first contact is looked for, at most
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
@@ -78,7 +78,7 @@ class Work:
 
     iterations: int = 0
     steps: int = 0
-    cuts: int = 0
+    halvings: int = 0
 
 
 class Pressing(Protocol):
@@ -89,8 +89,8 @@ class Pressing(Protocol):
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the sheet [N]."""
 
-    def travel(self, x: FloatArray) -> float:
-        """Travel of the sheet [m]."""
+    def closing(self, x: FloatArray) -> float:
+        """Closing displacement of the sheet [m]."""
 
 
 @dataclass
@@ -103,13 +103,13 @@ class Stepping:
     solver : NonlinearSolver
     settings : Settings
     thickness : float
-        Of the pad; steps along the travel are parts of it [m].
+        Of the pad; steps along the closing displacement are parts of it [m].
     share : float
         Part of the pad that is meshed.
     guess : callable
-        Travel to a vector of unknowns to start from.
+        Closing displacement to a vector of unknowns to start from.
     force_scale : callable
-        Travel to the force that a residual there is judged by [N].
+        Closing displacement to the force that a residual there is judged by [N].
     floor : float
         Norm of the residual that rounding leaves [N].
     most : int, optional
@@ -133,19 +133,19 @@ class Stepping:
     def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
         self.problem.control = control
-        scale = control.force if control.force is not None else self.force_scale(control.travel)
+        scale = control.force if control.force is not None else self.force_scale(control.closing)
         self.solver.thrifty = self.floor <= BALANCE * scale * self.share  # or states would fail their checks
         work.steps += 1
         try:
             x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor), most)
         except ConvergenceError:
-            work.cuts += 1
+            work.halvings += 1
             raise
         work.iterations += iterations
         return x
 
     def climb(self, x: FloatArray, reached: float, force: float, work: Work, *, walk: bool = True) -> FloatArray:
-        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or (``walk``) along the travel."""
+        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or (``walk``) along the closing."""
         fraction, done = 1.0, 0.0
         while done < 1.0:
             goal = min(1.0, done + fraction)
@@ -166,7 +166,7 @@ class Stepping:
     def walk(
         self, x: FloatArray, force: float, work: Work, longest: float = np.inf, forces: list[float] | None = None
     ) -> FloatArray:
-        """Travel on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
+        """Closing displacement on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
 
         The forces on the way are appended to ``forces``.
         """
@@ -175,7 +175,7 @@ class Stepping:
         shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
         for _ in range(WALK_STEPS):
             try:
-                ahead = self.solve(low[0], Control(travel=problem.travel(low[0]) + step), work, self.most)
+                ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
                 high = (ahead, problem.sheet_force(ahead))
                 if high[1] >= force:
                     return self._land(low, high, force, work)
@@ -193,33 +193,33 @@ class Stepping:
         """State at ``force`` between two on the way; Newton's method may jump to one further on, which is refused."""
         share = (force - low[1]) / (high[1] - low[1])
         x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work, self.most)
-        ends = self.problem.travel(low[0]), self.problem.travel(high[0])
+        ends = self.problem.closing(low[0]), self.problem.closing(high[0])
         margin = 1e-3 * (ends[1] - ends[0])
-        if not ends[0] - margin <= self.problem.travel(x) <= ends[1] + margin:
+        if not ends[0] - margin <= self.problem.closing(x) <= ends[1] + margin:
             raise ConvergenceError(f"the state at {force:.4g} N lies beyond the one that was looked for")
         self.watch(x, force)
         return x
 
-    def first(self, travel: float, force: float, work: Work) -> State:
-        """First state in contact and its force, by travel control near ``travel``: force control has no start."""
+    def first(self, closing: float, force: float, work: Work) -> State:
+        """First state in contact and its force, by displacement control near ``closing``; force has no start."""
         failure, best = "no force yet", None
         for _ in range(FIRST_TRIES):
             try:
-                x = self.solve(self.guess(travel), Control(travel=travel), work)
+                x = self.solve(self.guess(closing), Control(closing=closing), work)
             except ConvergenceError as error:
                 if best:
                     return best
-                travel, failure = 0.6 * travel, str(error)
+                closing, failure = 0.6 * closing, str(error)
                 continue
             reached = self.problem.sheet_force(x)
             if reached > FIRMLY * force:
                 return x, reached
             best = (x, reached) if reached > BARELY * force else best
-            travel *= 1.5
+            closing *= 1.5
         if best:
             return best
         raise ConvergenceError(
-            f"found no first contact for {force:.4g} N near a travel of {travel * 1e3:.4g} mm; the pad may rest on "
+            f"found no first contact for {force:.4g} N near a closing of {closing * 1e3:.4g} mm; the pad may rest on "
             f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
         )
 
@@ -244,9 +244,9 @@ class Following(Stepping):
 
     _last: _Place | None = None
 
-    def first(self, travel: float, force: float, work: Work) -> State:
+    def first(self, closing: float, force: float, work: Work) -> State:
         """As `Stepping.first`, not further in than where a first contact is certain to be on the path."""
-        return super().first(min(travel, FIRST * self.thickness), force, work)
+        return super().first(min(closing, FIRST * self.thickness), force, work)
 
     def climb(self, x: FloatArray, reached: float, force: float, work: Work, *, walk: bool = True) -> FloatArray:
         """As `Stepping.climb`, along the path."""
@@ -271,7 +271,7 @@ class Following(Stepping):
             leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
             if leaves or forks or ahead.strain - here.strain > FOLD:
                 if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
-                    cut, work.cuts = 0.5 * cut, work.cuts + 1
+                    cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
                 if leaves:
                     self._jump(target, walk)
@@ -314,13 +314,13 @@ class Following(Stepping):
         return LONGEST / foretold if foretold > LONGEST else 1.0
 
     def _foretold(self, here: _Place, step: float) -> float:
-        """Travel over the thickness that the tangent foretells for a step [N]; NaN where it is not known."""
-        return np.nan if here.tangent is None else abs(self.problem.travel(here.tangent) * step) / self.thickness
+        """Closing displacement over thickness that the tangent foretells for a step [N]; NaN if unknown."""
+        return np.nan if here.tangent is None else abs(self.problem.closing(here.tangent) * step) / self.thickness
 
     def _leaves(self, here: _Place, ahead: _Place) -> bool:
         """Whether the state ``ahead`` is not the one that the path leads to from ``here``."""
         if here.tangent is not None:
-            off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.travel_dof + 1]
+            off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.thickness:
                 return True
         grown = ahead.strain - here.strain
@@ -333,7 +333,7 @@ class Following(Stepping):
         self.jumped = True
 
     def _walked(self, here: _Place, force: float, work: Work) -> FloatArray:
-        """State at ``force`` by way of the travel; the force may fall on the way, which it does beyond a limit."""
+        """State at ``force`` by way of the closing; the force may fall on the way, which it does beyond a limit."""
         forces = [here.force]
         x = self.walk(here.x, force, work, STRAY * self.thickness, forces)
         self.jumped |= falls(forces)

@@ -3,7 +3,7 @@
 A force that Newton does not reach in one step is approached by halves. Where that fails, or the pad jumps, and a
 fallback pad with nodal gaps is given, the ladder goes on with that one, from first contact (weighted gaps couple
 neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever); where that
-fails too, or there is none, the sheet is walked by its travel until the force is bracketed. Every state that is passed
+fails too, or there is none, the sheet is walked by its closing until the force is bracketed. Every state that is passed
 on has converged and has been checked.
 """
 
@@ -35,8 +35,8 @@ class Pressed:
 
     Parameters
     ----------
-    force, travel : float
-        Normal force [N] and travel of the sheet from first touch [m].
+    force, closing displacement : float
+        Normal force [N] and closing displacement of the sheet from first touch [m].
     unknowns : (n,) array
         State of the solver.
     pad : Pad
@@ -52,7 +52,7 @@ class Pressed:
     """
 
     force: float
-    travel: float
+    closing: float
     unknowns: FloatArray
     pad: Pad
     pressure: FloatArray
@@ -61,7 +61,7 @@ class Pressed:
     checks: Checks
     iterations: int
     steps: int
-    cuts: int
+    halvings: int
     seconds: Seconds
     path_dependent: bool = False
 
@@ -75,8 +75,8 @@ def pressed(
     checks = check(foam, x, state, left_over, force, settings.residual)
     front = (pad.nodes + pad.displacement(x))[pad.front_nodes]
     return Pressed(
-        force, float(x[pad.travel_dof]), x, pad, pressure, front, points, checks, work.iterations, work.steps,
-        work.cuts, seconds, path_dependent,
+        force, float(x[pad.closing_dof]), x, pad, pressure, front, points, checks, work.iterations, work.steps,
+        work.halvings, seconds, path_dependent,
     )  # fmt: skip
 
 
@@ -153,10 +153,10 @@ class Press:
                     raise
                 x = self._other_way(force, work)
             if below is not None:
-                refuse_fall((reached, self.problem.travel(below)), (force, self.problem.travel(x)))
+                refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
             seconds = since(before, self.solver.seconds, start)
-            left_over = np.abs(self.problem.residual(x)[: self.pad.travel_dof + 1]).max() / self.pad.share
+            left_over = np.abs(self.problem.residual(x)[: self.pad.closing_dof + 1]).max() / self.pad.share
             state = self.problem.contact_state(x)
             yield pressed(
                 self.problem.foam, x.copy(), state, left_over, force, self.settings, work, seconds,
@@ -185,10 +185,10 @@ class Press:
         self._set_up()
         self.solver.seconds = seconds
 
-    def at_travel(self, travel: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
-        """State at a prescribed travel [m] and the normal force it takes [N], from ``x`` or from scratch."""
-        start = self._bed.guess(travel) if x is None else x
-        x = self._stepping.solve(start, Control(travel=travel), Work())
+    def at_closing(self, closing: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
+        """State at a prescribed closing [m] and the normal force it takes [N], from ``x`` or from scratch."""
+        start = self._bed.guess(closing) if x is None else x
+        x = self._stepping.solve(start, Control(closing=closing), Work())
         return x, self.problem.sheet_force(x)
 
     def destroy(self) -> None:
@@ -199,7 +199,7 @@ class Press:
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
         way = self.way(reached, force)
         if x is None:
-            x, reached = self._stepping.first(self._bed.travel(way[0]), way[0], work)
+            x, reached = self._stepping.first(self._bed.closing(way[0]), way[0], work)
         self._remember(x, reached)
         try:
             for goal in (f for f in way if f > reached or f == force):

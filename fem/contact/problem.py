@@ -1,10 +1,10 @@
 """Frictionless contact of a pad with a rigid object as a mixed complementarity problem.
 
-Unknowns ``x = [q | delta | l]``: free displacements, travel of the sheet, and one pressure ``p_i = kappa l_i`` per
+Unknowns ``x = [q | delta | l]``: free displacements, closing of the sheet, and one pressure ``p_i = kappa l_i`` per
 node of the front, with ``kappa = E / thickness`` so that all unknowns are lengths.  The residual is::
 
     R_q     = r_int(u) - int N_a p n dA                       u = u(q, delta), p = sum N_i p_i, n = grad g
-    R_delta = sum of r_int over the bonded back - F           (force)  or  s (delta - travel)   (travel)
+    R_delta = sum of r_int over the bonded back - F           (force)  or  s (delta - closing)   (closing)
     R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
               kappa G_i   with   l_i >= 0                     (complementarity)
 
@@ -45,10 +45,10 @@ def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
 
 @dataclass
 class Control:
-    """What drives the sheet: the normal force on the whole pad [N], or the travel [m] where ``force`` is None."""
+    """What drives the sheet: the normal force on the whole pad [N], or the closing [m] where ``force`` is None."""
 
     force: float | None = None
-    travel: float = 0.0
+    closing: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,15 +87,15 @@ class ContactProblem:
     """
 
     def __init__(self, pad: Pad, gap: Gap) -> None:
-        self.pad, self.gap, self.control, self.complementarity = pad, gap, Control(travel=0.0), False
+        self.pad, self.gap, self.control, self.complementarity = pad, gap, Control(closing=0.0), False
         self.foam = Foam(pad)
         self.size = pad.size
         self.kappa = pad.modulus_per_thickness
         self.area = pad.node_area
-        self.travel_stiffness = self.kappa * self.area.sum()
+        self.closing_stiffness = self.kappa * self.area.sum()
         self._by_force: bool | None = None  # whether the last tangent was that under force control
-        self.travel_step = 0.1 * pad.shape.size[2]  # longest change of travel in one iteration
-        self._pressures = slice(pad.travel_dof + 1, pad.size)
+        self.closing_step = 0.1 * pad.shape.size[2]  # longest change of closing displacement in one iteration
+        self._pressures = slice(pad.closing_dof + 1, pad.size)
         self._allocate()
         self._describe_entries()
 
@@ -111,8 +111,8 @@ class ContactProblem:
         """Row and column of every entry that ``tangent`` returns, in its order."""
         pad = self.pad
         face = pad.dofs[pad.face_nodes].transpose(0, 2, 1)
-        pressure = pad.travel_dof + 1 + pad.pressure_index[pad.face_nodes]
-        own = np.arange(pad.travel_dof, pad.size, dtype=np.int32)
+        pressure = pad.closing_dof + 1 + pad.pressure_index[pad.face_nodes]
+        own = np.arange(pad.closing_dof, pad.size, dtype=np.int32)
         rows, columns = [self.foam.rows], [self.foam.columns]
         for first, second in (
             (face[:, :, :, None, None], face[:, None, None, :, :]),
@@ -168,9 +168,9 @@ class ContactProblem:
         weighted_gap = self._contact(x, tangent=False)
         R += gather(self._face_dofs, self._force, self.size)
         if self.control.force is None:
-            R[pad.travel_dof] = self.travel_stiffness * (x[pad.travel_dof] - self.control.travel)
+            R[pad.closing_dof] = self.closing_stiffness * (x[pad.closing_dof] - self.control.closing)
         else:
-            R[pad.travel_dof] -= self.control.force * pad.share
+            R[pad.closing_dof] -= self.control.force * pad.share
         if self.complementarity:
             R[self._pressures] = self.kappa * weighted_gap
         else:
@@ -194,26 +194,26 @@ class ContactProblem:
             own[1:] = np.where(active, 0.0, self.kappa * self.area)
         self._by_force = self.control.force is not None
         if not self._by_force:
-            elements[self.foam.travel_entries] = 0.0
-            own[0] = self.travel_stiffness
+            elements[self.foam.closing_entries] = 0.0
+            own[0] = self.closing_stiffness
         return self._values
 
     def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
         """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
 
         ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
-        force does not grow with the travel, or a tangent under travel control cannot tell.
+        force does not grow with the closing displacement, or a tangent under displacement control cannot tell.
         """
         if self._by_force is None:  # nothing has been factorised yet
             return None
         load = np.zeros(self.size)
-        load[self.pad.travel_dof] = 1.0
+        load[self.pad.closing_dof] = 1.0
         found = answer(load)
-        if not found[self.pad.travel_dof] > 0.0:
+        if not found[self.pad.closing_dof] > 0.0:
             return None
         if self._by_force:
             return self.pad.share * found
-        along = found / found[self.pad.travel_dof]
+        along = found / found[self.pad.closing_dof]
         h = 1e-6 * self.pad.shape.size[2]
         rise = (self.sheet_force(x + h * along) - self.sheet_force(x - h * along)) / (2.0 * h)
         return along / rise if rise > 0.0 else None
@@ -245,8 +245,8 @@ class ContactProblem:
         return self._by_force == (self.control.force is not None) and np.array_equal(self._pressing, self._held)
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
-        """Factor that keeps the change of travel and the squeezing of every element within reason."""
-        return self.foam.shorten(x, step, self.travel_step)
+        """Factor that keeps the change of closing displacement and the squeezing of every element within reason."""
+        return self.foam.shorten(x, step, self.closing_step)
 
     def accept(self, x: FloatArray) -> None:
         """Told every state that the next one starts from; without friction the way to a state does not matter."""
@@ -256,13 +256,13 @@ class ContactProblem:
         return self.foam.sheet_force(x)
 
     @property
-    def travel_dof(self) -> int:
-        """Number of the unknown that is the sheet's travel; before it come the displacements."""
-        return self.pad.travel_dof
+    def closing_dof(self) -> int:
+        """Number of the unknown that is the sheet's closing displacement; before it come the displacements."""
+        return self.pad.closing_dof
 
-    def travel(self, x: FloatArray) -> float:
-        """Travel of the sheet [m]."""
-        return float(x[self.pad.travel_dof])
+    def closing(self, x: FloatArray) -> float:
+        """Closing displacement of the sheet [m]."""
+        return float(x[self.pad.closing_dof])
 
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
@@ -284,18 +284,18 @@ class SpringBed:
         gap, normal, _ = self.gap(self.pad.nodes[self.pad.front_nodes])
         return np.maximum(gap, 0.0) / np.maximum(-normal[:, 2], 0.2)
 
-    def force(self, travel: float) -> float:
+    def force(self, closing: float) -> float:
         """Normal force on the whole pad [N]."""
-        pressure = self.pad.modulus_per_thickness * np.maximum(0.0, travel - self.height)
+        pressure = self.pad.modulus_per_thickness * np.maximum(0.0, closing - self.height)
         return float(self.pad.node_area @ pressure) / self.pad.share
 
-    def force_scale(self, travel: float) -> float:
-        """Force that a residual at this travel is judged by, never zero [N]."""
-        one_node = self.pad.modulus_per_thickness * self.pad.node_area.max() * abs(travel)
-        return max(self.force(travel), 1e-3 * one_node)
+    def force_scale(self, closing: float) -> float:
+        """Force that a residual at this closing displacement is judged by, never zero [N]."""
+        one_node = self.pad.modulus_per_thickness * self.pad.node_area.max() * abs(closing)
+        return max(self.force(closing), 1e-3 * one_node)
 
-    def travel(self, force: float) -> float:
-        """Travel at which the bed carries the force [m]."""
+    def closing(self, force: float) -> float:
+        """Closing displacement at which the bed carries the force [m]."""
         low, high = 0.0, 1e-3 * self.pad.shape.size[2]
         while self.force(high) < force and high < 10 * self.pad.shape.size[2]:
             high *= 2.0
@@ -304,18 +304,18 @@ class SpringBed:
             low, high = (middle, high) if self.force(middle) < force else (low, middle)
         return high
 
-    def guess(self, travel: float) -> FloatArray:
+    def guess(self, closing: float) -> FloatArray:
         """Vector of unknowns: columns shortened affinely, so that no element starts inverted, and their pressures."""
         pad = self.pad
-        squeeze = np.clip(travel - self.height, 0.0, 0.6 * pad.shape.size[2])
+        squeeze = np.clip(closing - self.height, 0.0, 0.6 * pad.shape.size[2])
         u = np.zeros(pad.dofs.shape)
-        u[:, 2] = travel
+        u[:, 2] = closing
         if pad.material.poisson_ratio <= STIFF_VOLUME:
             u[:, 2] -= squeeze[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
         x = np.zeros(pad.size)
         x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
-        x[pad.travel_dof] = travel
-        x[pad.travel_dof + 1 :] = squeeze
+        x[pad.closing_dof] = closing
+        x[pad.closing_dof + 1 :] = squeeze
         return x
 
     @cached_property

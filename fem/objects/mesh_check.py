@@ -148,16 +148,22 @@ def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
     if points.ndim != 2 or points.shape[1:] != (3,) or not len(points) or not len(triangles):
         raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
     if len(triangles) > MOST_TRIANGLES:
-        raise MeshError(f"the mesh has {len(triangles)} triangles, more than {MOST_TRIANGLES}; decimate it, to about a "
-                        "tenth of the pad's element size nothing is lost")
+        raise MeshError(
+            f"the mesh has {len(triangles)} triangles, more than {MOST_TRIANGLES}; decimate it, to about a "
+            "tenth of the pad's element size nothing is lost"
+        )
     astray = (triangles < 0) | (triangles >= len(points))
     if astray.any():
-        raise MeshError(f"a triangle refers to point {triangles[astray][0]}, but there are only {len(points)} (counted "
-                        "from 0); the file is damaged, export it again")
+        raise MeshError(
+            f"a triangle refers to point {triangles[astray][0]}, but there are only {len(points)} (counted "
+            "from 0); the file is damaged, export it again"
+        )
     bad = ~np.isfinite(points).all(axis=1)
     if bad.any():
-        raise MeshError(f"{bad.sum()} of {len(points)} points have a coordinate that is not a finite number, "
-                        f"the first is point {np.flatnonzero(bad)[0]} (counted from 0); repair the file")
+        raise MeshError(
+            f"{bad.sum()} of {len(points)} points have a coordinate that is not a finite number, "
+            f"the first is point {np.flatnonzero(bad)[0]} (counted from 0); repair the file"
+        )
 
 
 def _check_size(extent: float, unit: str) -> None:
@@ -167,8 +173,10 @@ def _check_size(extent: float, unit: str) -> None:
         return
     fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
     advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
-    raise MeshError(f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
-                    f"{SMALLEST:g} m to {LARGEST:g} m; {advice}")
+    raise MeshError(
+        f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
+        f"{SMALLEST:g} m to {LARGEST:g} m; {advice}"
+    )
 
 
 def _snapped(points: FloatArray) -> FloatArray:
@@ -199,11 +207,15 @@ def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     forward = edges[:, 0] < edges[:, 1]
     unique, inverse, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
     if (count == 1).any():
-        raise MeshError(f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
-                        "triangle only; fill the holes in a mesh editor, or give the object as a profile")
+        raise MeshError(
+            f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
+            "triangle only; fill the holes in a mesh editor, or give the object as a profile"
+        )
     if (count > 2).any():
-        raise MeshError(f"the mesh is not manifold: at {np.sum(count > 2)} edges more than two triangles meet; remove "
-                        "the inner walls or doubled triangles there")
+        raise MeshError(
+            f"the mesh is not manifold: at {np.sum(count > 2)} edges more than two triangles meet; remove "
+            "the inner walls or doubled triangles there"
+        )
     order = np.argsort(inverse.ravel(), kind="stable").reshape(-1, 2)
     return order[:, 0] // 3, order[:, 1] // 3, forward[order[:, 0]] == forward[order[:, 1]]
 
@@ -264,17 +276,22 @@ def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
     pieces = [triangles[label[triangles[:, 0]] == k] for k in range(count)]
     size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
     speck = size < DEBRIS * size.max()
-    inner = np.array([
-        any(_lies_inside(points, pieces[k], pieces[m]) for m in np.flatnonzero(~speck) if m != k)
-        for k in range(count)
-    ])
+    inner = np.array(
+        [
+            any(_lies_inside(points, pieces[k], pieces[m]) for m in np.flatnonzero(~speck) if m != k)
+            for k in range(count)
+        ]
+    )
     keep = ~speck & ~inner
     if not keep.any():
         raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
     triangles = np.concatenate([piece for piece, wanted in zip(pieces, keep, strict=True) if wanted])
     used, inverse = np.unique(triangles, return_inverse=True)
-    notes = [f"dropped {number} {kind}" for number, kind in
-             ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object")) if number]
+    notes = [
+        f"dropped {number} {kind}"
+        for number, kind in ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object"))
+        if number
+    ]
     return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
 
 

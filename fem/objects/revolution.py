@@ -114,8 +114,10 @@ def _checked_points(profile: FloatArray) -> FloatArray:
     bad[[0, -1]] = points[[0, -1], 1] < 0
     if bad.any():
         k = _first(bad)
-        raise ValueError(f"profile point {k} has radius {points[k - 1, 1]:g} m; only the two ends may lie on the axis, "
-                         "all other radii must be positive")
+        raise ValueError(
+            f"profile point {k} has radius {points[k - 1, 1]:g} m; only the two ends may lie on the axis, "
+            "all other radii must be positive"
+        )
     short = np.linalg.norm(np.diff(points, axis=0), axis=1) < CLOSEST_POINTS
     if short.any():
         k = _first(short)
@@ -157,8 +159,10 @@ def _check_line(line: FloatArray) -> None:
     near = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=-1)
     i, _ = np.nonzero(np.triu(split & split.T & near, k=2))
     if len(i):
-        raise ValueError(f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
-                         "the points in order along the outside, and more of them where it bends sharply")
+        raise ValueError(
+            f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
+            "the points in order along the outside, and more of them where it bends sharply"
+        )
 
 
 def _overshoot(points: FloatArray, given: Curve) -> float:

@@ -209,8 +209,10 @@ class Box(Analytic):
             raise ValueError(f"size must hold three lengths in metres, found {self.size}")
         _positive(size=float(size.min()))
         if not 0 <= self.edge_radius <= size.min() / 2:
-            raise ValueError(f"edge_radius must lie between 0 and half the smallest side, {size.min() / 2:g} m, found "
-                             f"{self.edge_radius}")
+            raise ValueError(
+                f"edge_radius must lie between 0 and half the smallest side, {size.min() / 2:g} m, found "
+                f"{self.edge_radius}"
+            )
         object.__setattr__(self, "size", size)
 
     def gap(self, x: FloatArray) -> Gap:

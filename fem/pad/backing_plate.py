@@ -1,8 +1,8 @@
 """The sheet behind a pad as an elastic plate: its stiffness for the nodes of the pad's back, condensed once.
 
-The plate has the outline of the pad. The finger holds it on a patch in its middle, which moves by the travel alone; the
-rest bends. Its four-node shell elements have their corners on the nodes of the pad's back, which is glued to its face.
-Displacements of the plate are taken as small.
+The plate has the outline of the pad. The finger holds it on a patch in its middle, which moves by the closing alone;
+the rest bends. Its four-node shell elements have their corners on the nodes of the pad's back, which is glued to its
+face. Displacements of the plate are taken as small.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class BackStiffness:
     free : (rows, columns, 3) array of bool
         Displacements of the back's nodes, along x then y, that the finger and the planes of symmetry leave free.
     K : (k + 1, k + 1) array
-        Forces on them, and last on the finger along the approach, by them and the travel [N/m].
+        Forces on them, and last on the finger along the approach, by them and the closing displacement [N/m].
     """
 
     free: NDArray[np.bool_]

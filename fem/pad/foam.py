@@ -164,7 +164,7 @@ def _bound_to(laws):
         """
         F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
         C, Q = np.empty((3, 3)), np.empty((3, 3))
-        strain, acoustic = 0.0, np.inf if len(laws) > 0 else np.nan
+        strain, ellipticity = 0.0, np.inf if len(laws) > 0 else np.nan
         for e in range(dN.shape[0]):
             for q in range(dN.shape[1]):
                 J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
@@ -183,8 +183,8 @@ def _bound_to(laws):
                             for j in range(3):
                                 value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
                             Q[i, k] = value
-                    acoustic = min(acoustic, extreme_eigenvalues(Q)[0])
-        return strain, acoustic / shear_modulus
+                    ellipticity = min(ellipticity, extreme_eigenvalues(Q)[0])
+        return strain, ellipticity / shear_modulus
 
     return elements, strain_measures
 
@@ -252,8 +252,8 @@ class Foam:
     ----------
     rows, columns : (entries,) arrays
         Where the entries of `stiffness` belong; negative means fixed.
-    travel_entries : (k,) array
-        Those of them in the row of the sheet's travel.
+    closing_entries : (k,) array
+        Those of them in the row of the sheet's closing displacement.
     """
 
     def __init__(self, pad: Pad) -> None:
@@ -265,14 +265,14 @@ class Foam:
         self._elements, behind = len(rows), pad.back_dofs if pad.back else pad.back_dofs[:0]
         self.rows = np.concatenate([rows, np.repeat(behind, len(behind))])
         self.columns = np.concatenate([columns, np.tile(behind, len(behind))])
-        self.travel_entries = np.flatnonzero(self.rows == pad.travel_dof)
+        self.closing_entries = np.flatnonzero(self.rows == pad.closing_dof)
         self._dofs = dofs.ravel()
         self._shape = (n, 3, nodes, 3, nodes)
         self._r = np.empty((n, 3, nodes))
         self._none = np.empty((0, 0, 0, 0, 0))
 
     def force(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """Internal force on every unknown ``(size,)`` [N], the sheet's in its travel, and the smallest ``det F``."""
+        """Internal force on every unknown ``(size,)`` [N], the sheet's in its closing, and the smallest ``det F``."""
         smallest = self._evaluate(x, self._none)
         R = gather(self._dofs, self._r, self.pad.size)
         if self.pad.back:
@@ -287,11 +287,11 @@ class Foam:
 
     def sheet_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
-        return float(self.force(x)[0][self.pad.travel_dof]) / self.pad.share
+        return float(self.force(x)[0][self.pad.closing_dof]) / self.pad.share
 
     def shorten(self, x: FloatArray, step: FloatArray, longest: float) -> float:
-        """Factor that keeps the change of travel below ``longest`` [m] and the squeezing of elements within reason."""
-        factor = min(1.0, longest / max(abs(step[self.pad.travel_dof]), 1e-300))
+        """Factor that keeps the change of closing below ``longest`` [m] and the squeezing of elements within reason."""
+        factor = min(1.0, longest / max(abs(step[self.pad.closing_dof]), 1e-300))
         for _ in range(12):
             if smallest_det(self._displacements(x - factor * step), self.pad.dN) > SMALLEST_DET:
                 break
@@ -301,8 +301,8 @@ class Foam:
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""
         u, dN, law = self._displacements(x), self.pad.dN, self.pad.material
-        strain, acoustic = strain_measures(law.number, law.parameters, law.shear_modulus, u, dN, directions)
-        return smallest_det(u, dN), strain, acoustic
+        strain, ellipticity = strain_measures(law.number, law.parameters, law.shear_modulus, u, dN, directions)
+        return smallest_det(u, dN), strain, ellipticity
 
     def _evaluate(self, x: FloatArray, K: FloatArray) -> float:
         law, pad = self.pad.material, self.pad

@@ -1,9 +1,9 @@
 """The pad: a foam block bonded to a rigid sheet, meshed with hexahedra through scikit-fem.
 
 The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
-``[free displacements | travel of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
-travel, so that the force on the sheet is the residual of that unknown. On an elastic sheet only the nodes that the
-finger holds do; the others are free, and the sheet connects them to the travel.
+``[free displacements | closing of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
+closing, so that the force on the sheet is the residual of that unknown. On an elastic sheet only the nodes that the
+finger holds do; the others are free, and the sheet connects them to the closing displacement.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Pad:
     back : BackStiffness or None
         Of an elastic sheet.
     back_dofs : (k + 1,) array
-        Its unknowns: the free displacements of the back, then the travel.
+        Its unknowns: the free displacements of the back, then the closing displacement.
     dofs : (k, 3) array
         Unknown of each displacement; -1 is fixed.
     face_nodes : (m, face nodes) array
@@ -85,7 +85,7 @@ class Pad:
         self._describe_front(lines, contact)
 
     def _number_unknowns(self, basis: Basis) -> None:
-        """Number free displacements, then the travel, then one pressure per node of the front."""
+        """Number free displacements, then the closing displacement, then one pressure per node of the front."""
         tol, count = 1e-9 * max(self.shape.size), len(self.nodes)
 
         def on_plane(axis: int, place: float) -> NDArray[np.int64]:
@@ -100,14 +100,14 @@ class Pad:
         for axis in range(2):
             if self.symmetry[axis]:
                 free[on_plane(axis, 0.0), axis] = False
-        self.travel_dof = int(free.sum())
+        self.closing_dof = int(free.sum())
         self.dofs = np.full((count, 3), -1, dtype=np.int32)
-        self.dofs[free] = np.arange(self.travel_dof, dtype=np.int32)
-        self.dofs[back_nodes[~free[back_nodes, 2]], 2] = self.travel_dof
-        self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.travel_dof))
+        self.dofs[free] = np.arange(self.closing_dof, dtype=np.int32)
+        self.dofs[back_nodes[~free[back_nodes, 2]], 2] = self.closing_dof
+        self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.closing_dof))
         self.pressure_index = np.full(count, -1, dtype=np.int32)
         self.pressure_index[self.front_nodes] = np.arange(len(self.front_nodes), dtype=np.int32)
-        self.size = self.travel_dof + 1 + len(self.front_nodes)
+        self.size = self.closing_dof + 1 + len(self.front_nodes)
 
     def _on_sheet(self, back_nodes: IntArray) -> BackStiffness | None:
         """Stiffness of the elastic sheet behind the nodes of the back."""
@@ -144,7 +144,7 @@ class Pad:
 
     @property
     def rounding(self) -> float:
-        """Norm of the forces that rounding leaves where a stiff sheet meets the travel [N]."""
+        """Norm of the forces that rounding leaves where a stiff sheet meets the closing displacement [N]."""
         if self.back is None:
             return 0.0
         return float(np.finfo(float).eps * self.shape.size[2] * np.linalg.norm(np.diag(self.back.K)[:-1]))

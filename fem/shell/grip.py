@@ -1,7 +1,7 @@
 """Press two fingers on a thin-walled object along a ladder of normal forces, each started from the one before.
 
 As in ``fem.contact.press``, with a wall that gives way. Where a wall snaps in, force control jumps or fails; then the
-fingers are walked on by their travel, in short steps, and the first state with the wanted force is taken: what a
+fingers are walked on by their closing, in short steps, and the first state with the wanted force is taken: what a
 gripper that closes with a growing force meets first.
 """
 
@@ -26,12 +26,12 @@ from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
 SIDES = 0.3  # of the largest distance from the plane between the fingers on a ring: nodes nearer to it are left out
-LONGEST_STEP = 5e-4  # of the travel while a wall is walked in [m]
-JUMP = 1e-3  # change of travel between two forces that may have passed over a limit [m]
+LONGEST_STEP = 5e-4  # of the closing displacement while a wall is walked in [m]
+JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
 MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
-DENTED = 0.95  # and after nodal gaps have found none either
+INDENTED = 0.95  # and after nodal gaps have found none either
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
@@ -40,8 +40,8 @@ class Opening:
     """How far the two halves of a wall still are apart along the approach, as a part of their undeformed distance.
 
     The grasp frame's x axis is the approach, so a node is compared with the one that it looks at along x: its own image
-    where x = 0 is a plane of symmetry, else the nearest across from it. A dent turns back at its deepest place, where
-    it is level; so the node that lies nearest there is good enough.
+    where x = 0 is a plane of symmetry, else the nearest across from it. An indentation turns back at its deepest place,
+    where it is level; so the node that lies nearest there is good enough.
 
     Parameters
     ----------
@@ -162,16 +162,16 @@ class Grip:
         self.solver = NonlinearSolver(self.problem, self.options)
         self._stepping = Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
-            self._guess, lambda travel: min(bed.force_scale(travel) for bed in self._beds),
+            self._guess, lambda closing: min(bed.force_scale(closing) for bed in self._beds),
             ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
             None if "contact_snes_max_it" in self.options else MOST_ITERATIONS, self._watch,
         )  # fmt: skip
 
-    def _guess(self, travel: float) -> FloatArray:
+    def _guess(self, closing: float) -> FloatArray:
         """The wall undeformed, the pads as beds of springs."""
         x = np.zeros(self.problem.size)
         for f, bed in zip(self.problem.fingers, self._beds, strict=True):
-            x[f.own] = bed.guess(travel)
+            x[f.own] = bed.guess(closing)
         return x
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Gripped]:
@@ -188,14 +188,14 @@ class Grip:
             try:
                 x, slope, fell = self._level(x, reached, force, compliance, work)
             except ConvergenceError as error:
-                self._refuse_folded(error, DENTED if self.fallback is None else FOLDED)
+                self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
                 if self.fallback is None:
                     raise
                 self._fall_back()
                 try:
                     x, slope, fell = self._level(x, reached, force, compliance, work)
                 except ConvergenceError as again:
-                    self._refuse_folded(again, DENTED)
+                    self._refuse_folded(again, INDENTED)
                     raise
             reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
             yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
@@ -227,14 +227,14 @@ class Grip:
     ) -> tuple[FloatArray, float, bool]:
         """State at ``force``, the mean compliance [m/N] on the way, and whether a limit was passed."""
         if x is None:
-            travel = float(np.mean([bed.travel(force) for bed in self._beds]))
-            x, reached = self._stepping.first(travel, force, work)
-            compliance = self.problem.travel(x) / reached  # foam gets stiffer, so this is more than what comes
+            closing = float(np.mean([bed.closing(force) for bed in self._beds]))
+            x, reached = self._stepping.first(closing, force, work)
+            compliance = self.problem.closing(x) / reached  # foam gets stiffer, so this is more than what comes
         ahead, fell = self._climb(x, reached, force, compliance, work)
         if not force > reached:
             return ahead, np.inf, fell
-        slope = (self.problem.travel(ahead) - self.problem.travel(x)) / (force - reached)
-        return ahead, slope, fell or GIVES_WAY * slope > self.problem.travel(x) / reached
+        slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
+        return ahead, slope, fell or GIVES_WAY * slope > self.problem.closing(x) / reached
 
     def _climb(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
@@ -243,7 +243,7 @@ class Grip:
         expected = max(JUMP, 2.0 * compliance * (force - reached))
         try:
             ahead = self._stepping.climb(x, reached, force, work, walk=False)
-            if self.problem.travel(ahead) - self.problem.travel(x) <= expected:
+            if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
                 return ahead, False
         except ConvergenceError:
             pass
@@ -255,22 +255,22 @@ class Grip:
         self.opening.watch(self.problem.wall_state(x), force)
 
     def _gives_way(self, x: FloatArray, force: float) -> bool:
-        """Whether the force grows much more slowly with the travel here than it has done so far.
+        """Whether the force grows much more slowly with the closing displacement here than it has done so far.
 
         Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
         when they snap in, and no force falls there.
         """
         fingers = self.problem.fingers
         load = np.zeros(self.problem.size)
-        load[[f.travel for f in fingers]] = [f.pad.share for f in fingers]
-        return bool(self.problem.travel(self.solver.answer(load)) * force > self.problem.travel(x) / GIVES_WAY)
+        load[[f.closing for f in fingers]] = [f.pad.share for f in fingers]
+        return bool(self.problem.closing(self.solver.answer(load)) * force > self.problem.closing(x) / GIVES_WAY)
 
     def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
         """State of all parts, checked."""
         problem, residual = self.problem, np.abs(self.problem.residual(x))
         fingers = []
         for k, f in enumerate(problem.fingers):
-            left_over = residual[f.offset : f.travel + 1].max() / f.pad.share
+            left_over = residual[f.offset : f.closing + 1].max() / f.pad.share
             part = seconds if k == 0 else Seconds()
             fingers.append(pressed(
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,

@@ -8,9 +8,9 @@ residual is::
     R_q     = r_int(q) + int N_a p n dA                          on both numbers that move the outer face
     R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]            G_i = int N_i g dA
     R_delta = force on the sheet - F                             (force)
-              k (sum of the travels - their goal), and the difference of the sheets' forces   (travel)
+              k (sum of the closings - their goal), and the difference of the sheets' forces   (closing displacement)
 
-All rows are forces [N]. Both pads press with the same force, each with a travel of its own.
+All rows are forces [N]. Both pads press with the same force, each with a closing displacement of its own.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from softjaw.fem.shell.wall_kernel import contact_forces, contact_tangent
 from softjaw.fem.shell.wall_model import WallModel
 
 IntArray = NDArray[np.int32]
-LONGEST_TRAVEL = 1e-3  # of one iteration [m]
+LONGEST_CLOSING = 1e-3  # of one iteration [m]
 CARRIED = 0.3  # part of a node's area that must face the wall for the node to carry load
 
 
@@ -53,17 +53,17 @@ class Finger:
         self.pad, self.pose, self.wall, self.offset = pad, pose, wall, offset
         self.foam = Foam(pad)
         self.own = slice(offset, offset + pad.size)
-        self.travel = offset + pad.travel_dof
+        self.closing = offset + pad.closing_dof
         self.kappa = pad.modulus_per_thickness
         self.R = np.ascontiguousarray(pose.rotation)
         self.local_dofs = np.ascontiguousarray(pad.dofs[pad.face_nodes].transpose(0, 2, 1))  # (faces, 3, k)
         self.dofs = _shift(self.local_dofs, offset)
-        self.pressures = _shift(pad.travel_dof + 1 + pad.pressure_index[pad.face_nodes], offset)
+        self.pressures = _shift(pad.closing_dof + 1 + pad.pressure_index[pad.face_nodes], offset)
         self.nodes = pad.pressure_index[pad.face_nodes]
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Nominal pressures of the front's nodes at the whole state ``x`` [Pa]."""
-        return self.kappa * x[self.own][self.pad.travel_dof + 1 :]
+        return self.kappa * x[self.own][self.pad.closing_dof + 1 :]
 
     def points(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Quadrature points of the front in the pad's frame ``(faces, points, 3)`` and the object's ``(n, 3)`` [m]."""
@@ -105,7 +105,7 @@ class GripProblem:
             self.fingers.append(Finger(pad, pose, wall, self.size))
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.pad.node_area.sum() for f in self.fingers)
-        self.control = Control(travel=0.0)
+        self.control = Control(closing=0.0)
         self.places = [f.wall.places(f.points(np.zeros(self.size))[1]) for f in self.fingers]
         self._build_pattern()
 
@@ -130,8 +130,8 @@ class GripProblem:
         self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
         if len(self.fingers) == 2:
             f = self.fingers[0]
-            columns = self._foam_entries(f)[1][f.foam.travel_entries]
-            self._balance_slots = self.pattern.slots(np.full_like(columns, self.fingers[1].travel), columns)
+            columns = self._foam_entries(f)[1][f.foam.closing_entries]
+            self._balance_slots = self.pattern.slots(np.full_like(columns, self.fingers[1].closing), columns)
 
     def _foam_entries(self, f: Finger) -> tuple[IntArray, IntArray]:
         return _shift(f.foam.rows, f.offset), _shift(f.foam.columns, f.offset)
@@ -140,11 +140,11 @@ class GripProblem:
         rows, columns = self._foam_entries(f)
         pair = [a.ravel() for a in np.broadcast_arrays(f.dofs[:, :, :, None], f.pressures[:, None, None, :])]
         rows, columns = np.concatenate([rows, pair[0], pair[1]]), np.concatenate([columns, pair[1], pair[0]])
-        if f is self.fingers[-1] and f is not self.fingers[0]:  # its travel row may hold the balance of both sheets
+        if f is self.fingers[-1] and f is not self.fingers[0]:  # its closing row may hold the balance of both sheets
             other = self.fingers[0]
-            back = _shift(other.foam.columns[other.foam.travel_entries], other.offset)
-            rows = np.concatenate([rows, np.full_like(back, f.travel), [other.travel]])
-            columns = np.concatenate([columns, back, [f.travel]])
+            back = _shift(other.foam.columns[other.foam.closing_entries], other.offset)
+            rows = np.concatenate([rows, np.full_like(back, f.closing), [other.closing]])
+            columns = np.concatenate([columns, back, [f.closing]])
         return rows.astype(np.int32), columns.astype(np.int32)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -183,8 +183,8 @@ class GripProblem:
             if not smallest > 0.0:
                 return np.full(self.size, np.nan)
             own += gather(f.local_dofs, c.force, f.pad.size)
-            pressed = f.pad.node_area * x[f.own][f.pad.travel_dof + 1 :]
-            own[f.pad.travel_dof + 1 :] = f.kappa * (pressed - np.maximum(0.0, pressed - c.weighted))
+            pressed = f.pad.node_area * x[f.own][f.pad.closing_dof + 1 :]
+            own[f.pad.closing_dof + 1 :] = f.kappa * (pressed - np.maximum(0.0, pressed - c.weighted))
             R[f.own] = own
         self._drive(x, R)
         return R
@@ -194,12 +194,12 @@ class GripProblem:
         one, last = self.fingers[0], self.fingers[-1]
         if self.control.force is not None:
             for f in self.fingers:
-                R[f.travel] -= self.control.force * f.pad.share
+                R[f.closing] -= self.control.force * f.pad.share
             return
         if last is not one:
-            R[last.travel] = R[last.travel] / last.pad.share - R[one.travel] / one.pad.share
-        travel = np.mean([x[f.travel] for f in self.fingers])
-        R[one.travel] = self.stiffness * (travel - self.control.travel)
+            R[last.closing] = R[last.closing] / last.pad.share - R[one.closing] / one.pad.share
+        closing = np.mean([x[f.closing] for f in self.fingers])
+        R[one.closing] = self.stiffness * (closing - self.control.closing)
 
     def tangent(self, x: FloatArray) -> FloatArray:
         """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
@@ -232,21 +232,21 @@ class GripProblem:
         for f, slots, own, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
             add_up(slots, own, values)
             idle = np.flatnonzero(~c.active)
-            index = f.offset + f.pad.travel_dof + 1 + idle
+            index = f.offset + f.pad.closing_dof + 1 + idle
             values[self.pattern.slots(index, index)] += f.kappa * f.pad.node_area[idle]
         if self.control.force is None:
-            self._fill_travel_rows(values)
+            self._fill_closing_rows(values)
 
-    def _fill_travel_rows(self, values: FloatArray) -> None:
-        """Under travel control the first row holds the mean travel, the second the balance of both sheets."""
+    def _fill_closing_rows(self, values: FloatArray) -> None:
+        """Under displacement control the first row holds the mean closing, the second the balance of both sheets."""
         one, last = self.fingers[0], self.fingers[-1]
-        back = self._foam_slots[0][one.foam.travel_entries]
+        back = self._foam_slots[0][one.foam.closing_entries]
         if last is not one:
-            values[self.pattern.start[last.travel] : self.pattern.start[last.travel + 1]] /= last.pad.share
-            add_up(self._balance_slots, -self._values[0][one.foam.travel_entries] / one.pad.share, values)
+            values[self.pattern.start[last.closing] : self.pattern.start[last.closing + 1]] /= last.pad.share
+            add_up(self._balance_slots, -self._values[0][one.foam.closing_entries] / one.pad.share, values)
         values[back[back >= 0]] = 0.0
-        travels = np.array([f.travel for f in self.fingers])
-        values[self.pattern.slots(np.full_like(travels, one.travel), travels)] = self.stiffness / len(travels)
+        closings = np.array([f.closing for f in self.fingers])
+        values[self.pattern.slots(np.full_like(closings, one.closing), closings)] = self.stiffness / len(closings)
 
     def _add_contact(self, f: Finger, c: _Evaluated) -> bool:
         pad, facing, pattern = f.pad, c.facing, self.pattern
@@ -284,7 +284,7 @@ class GripProblem:
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of the travels and the squeezing of every element within reason."""
-        return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_TRAVEL) for f in self.fingers)
+        return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_CLOSING) for f in self.fingers)
 
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
@@ -314,9 +314,9 @@ class GripProblem:
         """Normal force on the sheets [N], mean of the fingers."""
         return float(np.mean([f.foam.sheet_force(x[f.own]) for f in self.fingers]))
 
-    def travel(self, x: FloatArray) -> float:
-        """Travel of the sheets [m], mean of the fingers."""
-        return float(np.mean([x[f.travel] for f in self.fingers]))
+    def closing(self, x: FloatArray) -> float:
+        """Closing displacement of the sheets [m], mean of the fingers."""
+        return float(np.mean([x[f.closing] for f in self.fingers]))
 
 
 def _shift(index: IntArray, offset: int) -> IntArray:

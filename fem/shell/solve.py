@@ -121,7 +121,7 @@ class Equilibrium:
         State [m].
     reaction : (6 k,) array
         Forces of the supports on the fixed numbers, zero elsewhere [N].
-    iterations, cuts : int
+    iterations, halvings : int
         Newton iterations since the last state that was asked for, failed tries included, and how often a step was cut.
     """
 
@@ -129,7 +129,7 @@ class Equilibrium:
     q: FloatArray
     reaction: FloatArray
     iterations: int
-    cuts: int
+    halvings: int
 
 
 def load_steps(
@@ -169,13 +169,13 @@ def load_steps(
     try:
         for target in factors:
             whole = step = target - at
-            spent = cuts = 0
+            spent = halvings = 0
             while at != target:
                 goal = target if abs(target - at) <= 1.001 * abs(step) else at + step
                 try:
                     x, done = _solve(solver, problem, x, goal, iterations, tolerance)
                 except ConvergenceError as error:
-                    spent, cuts, step = spent + iterations, cuts + 1, step / 2
+                    spent, halvings, step = spent + iterations, halvings + 1, step / 2
                     if abs(step) < SMALLEST_STEP * abs(whole):
                         raise ConvergenceError(
                             f"the shell found no equilibrium beyond load factor {at:.6g} on the way to {target:.6g}: "
@@ -185,7 +185,7 @@ def load_steps(
                     continue
                 at, spent = goal, spent + done
                 step *= GROWTH if done <= EASY else 1.0
-            yield _equilibrium(problem, x, spent, cuts)
+            yield _equilibrium(problem, x, spent, halvings)
     finally:
         solver.destroy()
 
@@ -210,8 +210,8 @@ def _solve(
         raise
 
 
-def _equilibrium(problem: ShellProblem, x: FloatArray, iterations: int, cuts: int) -> Equilibrium:
-    return Equilibrium(problem.factor, problem.state(x), problem.support_forces(x), iterations, cuts)
+def _equilibrium(problem: ShellProblem, x: FloatArray, iterations: int, halvings: int) -> Equilibrium:
+    return Equilibrium(problem.factor, problem.state(x), problem.support_forces(x), iterations, halvings)
 
 
 class ArcProblem(ShellProblem):
@@ -283,7 +283,7 @@ def follow(
     along = x.copy()
     shortest = SHORTEST * arc.length(along)
     length = min(arc.length(along), longest)
-    cuts = spent = 0
+    halvings = spent = 0
     try:
         while steps > 0:
             arc.begin(x, along, length)
@@ -293,7 +293,7 @@ def follow(
                 done = 0
             spent += done or iterations
             if not done or _turn(arc, along, new - x) > LARGEST_TURN:
-                cuts, length = cuts + 1, length / 2
+                halvings, length = halvings + 1, length / 2
                 if length < shortest:
                     raise ConvergenceError(
                         f"the shell's path is lost beyond load factor {x[-1]:.6g}: steps of {length:.3g} m fail; "
@@ -303,8 +303,8 @@ def follow(
             along, x = new - x, new
             length = min(length * float(np.clip(np.sqrt(DESIRED / done), 0.5, 1.5)), longest)
             arc.factor = x[-1]
-            yield Equilibrium(float(x[-1]), arc.state(x), arc.support_forces(x[:-1]), spent, cuts)
-            cuts, spent, steps = 0, 0, steps - 1
+            yield Equilibrium(float(x[-1]), arc.state(x), arc.support_forces(x[:-1]), spent, halvings)
+            halvings, spent, steps = 0, 0, steps - 1
     finally:
         solver.destroy()
 

@@ -25,7 +25,7 @@ class WallMaterial:
     young_modulus, poisson_ratio : float
         [Pa], [-].
     yield_strength : float, optional
-        Stress at which the wall would keep a dent [Pa]; None where it is not known.
+        Stress at which the wall would keep an indentation [Pa]; None where it is not known.
     """
 
     young_modulus: float

@@ -145,7 +145,7 @@ def pose_flags(contacts: Sequence[Contact]) -> Flag:
     """Flags of how two contacts stand, and of their frames."""
     one, two = contacts
     normals, line = angles(one, two)
-    found = Flag.ASKEW * (max(normals, line) > ANTIPODAL - ALIKE)
+    found = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - ALIKE)
     found |= Flag.SLIPS * slips(line, one.mu)
     for c in contacts:
         found |= raised(c.frame.flag)

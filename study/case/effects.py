@@ -117,8 +117,8 @@ def effects_of(
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
     sheet = sheet_level(scene)
-    S, F_N = (sum(getattr(c.limits["curved"], name) for c in contacts) for name in ("S", "F_N"))
-    curved = [own["curved"] for own in fits]
+    S, F_N = (sum(getattr(c.limits["ccm"], name) for c in contacts) for name in ("S", "F_N"))
+    curved = [own["ccm"] for own in fits]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
     size = MODEL_SIZES[solving.planes]
     return {
@@ -126,7 +126,7 @@ def effects_of(
         "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),
-        "friction": ("curved", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),
+        "friction": ("ccm", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),
         "wrench": ("3-D", dropped, APART) if wanted.wrench == "auto" else (wanted.wrench, dropped, FORCED),
         "limit_surface": _surface(scene, curved),
         "friction_pressure_coupling": coupling_level(scene, contacts, bool(solving.level and solving.level.number)),
@@ -146,7 +146,7 @@ def _surface(scene: Scene, fits: Sequence[Any]) -> tuple[str, float, int]:
     """Form of the limit surface: an ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
     model = scene.limit_surface.model
     costs_little = model == "quartic" and scene.effects.limit_surface == "auto"
-    return SURFACES[model], float(np.max([b.misfit.Erad for b in fits])), CHEAP if costs_little else FORCED
+    return SURFACES[model], float(np.max([b.fit_error.Erad for b in fits])), CHEAP if costs_little else FORCED
 
 
 def _fingers(solving: Any, only: int) -> tuple[str, float, int]:

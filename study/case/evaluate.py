@@ -36,7 +36,10 @@ FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
-PLANAR = (("flat", ""), ("projected", "_projected"))  # planar model, suffix of the quantities that compare with it
+PLANAR = (
+    ("pcm", ""),
+    ("pcm_projected", "_pcm_projected"),
+)  # planar model, suffix of the quantities that compare with it
 Fits = Mapping[str, SurfaceFit]  # by friction model
 
 
@@ -136,7 +139,7 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
         for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
     }
-    S, F_N = (np.array([getattr(c.limits["curved"], name) for c in contacts]) for name in ("S", "F_N"))
+    S, F_N = (np.array([getattr(c.limits["ccm"], name) for c in contacts]) for name in ("S", "F_N"))
     tau_pure = [c.tau_pure for c in contacts]
     values = {
         "maps/tau_pure": min(tau_pure),
@@ -175,7 +178,7 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
     shares = {}
     for name, _ in LIMITS:
         for planar, suffix in PLANAR:
-            pairs = [(getattr(c.limits["curved"], name), getattr(c.limits[planar], name)) for c in contacts]
+            pairs = [(getattr(c.limits["ccm"], name), getattr(c.limits[planar], name)) for c in contacts]
             shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)
     return shares
 
@@ -186,7 +189,7 @@ def mesh_errors(
     """Differences of the curved model's results to those of the mesh half as fine; ``values`` are of the fine one."""
     errors = {}
     for name, key in (("e_n", "e_n"), *LIMITS):
-        pairs = [tuple(getattr(c.limits["curved"], name) for c in pair) for pair in zip(fine, coarse, strict=True)]
+        pairs = [tuple(getattr(c.limits["ccm"], name) for c in pair) for pair in zip(fine, coarse, strict=True)]
         errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
     for key, value in _overestimates(coarse).items():
         errors[f"maps/{key}_error"] = abs(values[f"maps/{key}"] - value)

@@ -17,8 +17,8 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.fit_error import FitErrors, fit_error
 from softjaw.lsfit.flag import FitError
-from softjaw.lsfit.misfit import Misfit, misfit
 from softjaw.lsfit.quartic import Quartic, convex_quartic
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.six import six_samples, span_ellipsoid
@@ -40,9 +40,9 @@ STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.
 class SurfaceFit(NamedTuple):
     """Limit surface of a contact in one friction model, with what it was fitted to.
 
-    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``own`` is the misfit on those
-    motions, ``misfit`` and ``ellipsoid_misfit`` are those of the surface and of the ellipsoid from three motions on
-    others.
+    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``own`` is the fit error on
+    those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from three
+    motions on others.
     """
 
     rho: float
@@ -50,9 +50,9 @@ class SurfaceFit(NamedTuple):
     surface: LimitSurface
     certificate: int
     wrench: FloatArray
-    own: Misfit
-    misfit: Misfit
-    ellipsoid_misfit: Misfit
+    own: FitErrors
+    fit_error: FitErrors
+    ellipsoid_fit_error: FitErrors
 
     def body(self, mu: float) -> LimitSurface:
         """The surface in ``(f_x, f_y, tau_z)`` per unit of S [-, -, m]."""
@@ -89,12 +89,12 @@ def fit_surfaces(
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
     # a fit is judged by motions that it has not seen
     own, others = slice(samples), slice(samples, None)
-    reference = _misfit(ellipsoid, W[others], T[others])
+    reference = _fit_error(ellipsoid, W[others], T[others])
     found = {}
     for kind in kinds:
         surface, certificate = fitted(ellipsoid, W[own], T[own], kind, objective)
-        judged = reference if surface is ellipsoid else _misfit(surface, W[others], T[others])
-        on_own = _misfit(surface, W[own], T[own])
+        judged = reference if surface is ellipsoid else _fit_error(surface, W[others], T[others])
+        on_own = _fit_error(surface, W[own], T[own])
         found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], on_own, judged, reference)
     return found
 
@@ -143,12 +143,12 @@ def coefficients(surface: LimitSurface) -> FloatArray:
     return surface.coefficients if isinstance(surface, Quartic) else np.full(15, np.nan)
 
 
-def _misfit(surface: LimitSurface, W: FloatArray, T: FloatArray) -> Misfit:
-    """Misfit with the angle in rad; NaN where a flat body has no value at the samples."""
+def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors:
+    """Fit error with the angle in rad; NaN where a flat body has no value at the samples."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        E1, radius, angle = misfit(surface, W, T)
+        E1, radius, angle = fit_error(surface, W, T)
     found = (E1, radius, np.radians(angle))
-    return Misfit(*found) if np.isfinite(found).all() else Misfit(np.nan, np.nan, np.nan)
+    return FitErrors(*found) if np.isfinite(found).all() else FitErrors(np.nan, np.nan, np.nan)
 
 
 def surface_values(
@@ -161,12 +161,12 @@ def surface_values(
         "coefficients": lambda b: coefficients(b.surface),
         "certificate": lambda b: b.certificate,
         "fit_flag": lambda b: int(getattr(b.surface, "flag", 0)),
-        "misfit": lambda b: b.misfit,
-        "misfit_own": lambda b: b.own,
-        "misfit_ellipsoid": lambda b: b.ellipsoid_misfit,
+        "fit_error": lambda b: b.fit_error,
+        "fit_error_own": lambda b: b.own,
+        "fit_error_ellipsoid": lambda b: b.ellipsoid_fit_error,
     }
     found = {f"limit_surface/{name}": [[of(b) for b in own] for own in every] for name, of in per_model.items()}
-    curved = [own["curved"] for own in fits]
+    curved = [own["ccm"] for own in fits]
     if six:
         found |= six_values(contacts)
     if sampled:
@@ -175,34 +175,34 @@ def surface_values(
         ]
     return found | {
         "limit_surface/rho": [b.rho for b in curved],
-        "maps/misfit": np.max([b.misfit.Erad for b in curved]),
-        "maps/misfit_ellipsoid": np.max([b.ellipsoid_misfit.Erad for b in curved]),
+        "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),
+        "maps/fit_error_ellipsoid": np.max([b.ellipsoid_fit_error.Erad for b in curved]),
     }
 
 
 def six_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
-    found = [six_ellipsoid(c.local, c.rho, c.unit_limits["curved"].S) for c in contacts]
-    names = ("matrix_6d", "rank_6d", "misfit_6d")
+    found = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
+    names = ("matrix_6d", "rank_6d", "fit_error_6d")
     return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*found, strict=True), strict=True)}
 
 
-def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, Misfit]:
-    """Ellipsoid of all six components: matrix ``(6, 6)`` on the directions that the contact resists, rank, misfit.
+def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, FitErrors]:
+    """Ellipsoid of all six components: matrix ``(6, 6)`` on the directions that the contact resists, rank, fit error.
 
     A plane contact resists three directions only; a fit that the wrenches do not hold is NaN.
     """
     motion = sphere_motions(SIX_MOTIONS, 6)
     twist = motion / [1, 1, 1, rho, rho, rho]
     W, T = six_samples(friction_wrench(patch, twist, 1.0), twist, S, rho)
-    nothing = Misfit(np.nan, np.nan, np.nan)
+    nothing = FitErrors(np.nan, np.nan, np.nan)
     try:
         fit = span_ellipsoid(W, T)
     except CollapsedFitError:
         return np.full((6, 6), np.nan), 0, nothing
     surface = fit.surface
     if isinstance(surface, TiltedEllipsoid):
-        return surface.A, fit.rank, Misfit(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+        return surface.A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
     inverse = np.linalg.pinv(surface.B)
     A = inverse.T @ surface.inner.A @ inverse
-    return A, fit.rank, Misfit(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+    return A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))

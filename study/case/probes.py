@@ -163,7 +163,7 @@ class WinklerPad:
     """A pad of independent springs and a planar contact patch: the milliseconds baseline.
 
     Every point of the pad's face is a spring of the foam's stiffness in confined compression, ``E_oed / thickness``,
-    and feels nothing of its neighbours; all normals are those of the undeformed pad. The travel at a force is exact.
+    and feels nothing of its neighbours; all normals are those of the undeformed pad. The closing at a force is exact.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class WinklerPad:
     area : float
         Of each cell [m^2].
     height : (n,) array
-        Travel at which each cell touches [m]; infinite where there is no object before it.
+        Closing displacement at which each cell touches [m]; infinite where there is no object before it.
     stiffness : float
         Pressure over shortening [Pa/m].
     """
@@ -182,8 +182,8 @@ class WinklerPad:
     height: FloatArray
     stiffness: float
 
-    def travel(self, force: float) -> float:
-        """Travel that carries a normal force [m]: the force is piecewise linear in it, with a knee at every height."""
+    def closing(self, force: float) -> float:
+        """Closing displacement that carries a normal force [m]; the force is piecewise linear in it."""
         h = np.sort(self.height[np.isfinite(self.height)])
         count = np.arange(1, len(h) + 1)
         wanted = (force / (self.stiffness * self.area) + np.cumsum(h)) / count
@@ -191,7 +191,7 @@ class WinklerPad:
 
     def patch(self, force: float) -> ContactPatch:
         """Planar patch in the pad's frame at a normal force [N]."""
-        pressure = self.stiffness * np.maximum(self.travel(force) - self.height, 0.0)
+        pressure = self.stiffness * np.maximum(self.closing(force) - self.height, 0.0)
         place = np.column_stack([self.place, np.zeros(len(self.place))])
         side = 0.5 * np.array([np.ptp(np.unique(x)) / max(len(np.unique(x)) - 1, 1) for x in self.place.T])
         ring = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*side, 0.0]

@@ -72,7 +72,7 @@ def _ladder(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
     try:
         for outcome in solving.ladder(scene.load.normal_force):
             contacts = [c for c, *_ in outcome.contacts]
-            yield min(c.limits["curved"].e_n for c in contacts), quality(contacts, settings)
+            yield min(c.limits["ccm"].e_n for c in contacts), quality(contacts, settings)
     finally:
         solving.destroy()
 

@@ -27,7 +27,7 @@ from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin
 from softjaw.study.flags import Flag
 from softjaw.study.scene import Scene
 
-OVERLAP = 0.1  # of the travel, beyond which the mesh is coarse for the contact
+OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
@@ -66,7 +66,7 @@ class PressedContact(Contact):
         loaded = self.loaded.reshape(n, k, m, k)
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
-        overlaps = self.state.checks.overlap > OVERLAP * self.state.travel
+        overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
         return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
 
     @property
@@ -79,8 +79,8 @@ def state_flags(contacts: Sequence[PressedContact]) -> Flag:
     """Flags of the solved states of both fingers."""
     one, two = contacts
     between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
-    found = Flag.OVERLAP * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
-    found |= Flag.UNSTABLE * (min(c.state.checks.acoustic for c in contacts) <= 0)
+    found = Flag.COLLISION * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
+    found |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
     for c in contacts:
         found |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
@@ -123,8 +123,8 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
     _refuse_along_axis(fingers)
     held = _grasp(scene, fingers, False)
     pad = pad_of(scene, held.pad_symmetry, scene.accuracy.contact, False)
-    travel = SpringBed(pad, fingers[0].gap).travel(scene.load.normal_force[-1])
-    level = choose_level(scene, held, travel)
+    closing = SpringBed(pad, fingers[0].gap).closing(scene.load.normal_force[-1])
+    level = choose_level(scene, held, closing)
     if level.number == RIGID:
         return OnRigid(scene, fingers, poses, level)
     return OnWall(scene, fingers, level)

@@ -27,7 +27,7 @@ class Variation:
     name : str
         In words.
     part : str
-        Of the band, as in ``Uncertainty.parts``.
+        Of the uncertainty interval, as in ``Uncertainty.parts``.
     values : dict
         Keys of the scene that change.
     shift : float

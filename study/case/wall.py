@@ -23,8 +23,8 @@ from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
 RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.quantities lists them
-STIFF = 0.02  # dent over travel below which a wall is as good as rigid: e_n then changes by less than 0.1 %
-SMALL_DENT = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
+STIFF = 0.02  # indentation over closing below which a wall is as good as rigid: e_n then changes by less than 0.1 %
+SMALL_INDENTATION = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
@@ -49,8 +49,8 @@ def thin_body(shape: Walled) -> ThinWalled:
 class WallLevel:
     """How the object's compliance is simulated.
 
-    ``indicator`` is the dent that a linear wall would get at the largest force, over the wall's thickness; ``share``
-    that dent over the travel of the pads on the rigid object.
+    ``indicator`` is the indentation that a linear wall would get at the largest force, over the wall's thickness;
+    ``share`` that indentation over the closing displacement of the pads on the rigid object.
     """
 
     number: int
@@ -59,23 +59,23 @@ class WallLevel:
     forced: bool
 
 
-def choose_level(scene: Scene, held: Grasp, travel: float) -> WallLevel:
+def choose_level(scene: Scene, held: Grasp, closing: float) -> WallLevel:
     """WallLevel of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
 
-    ``travel`` is that of the pads on the rigid object at the largest force [m].
+    ``closing`` is that of the pads on the rigid object at the largest force [m].
     """
     names = {"rigid": RIGID, "linear_shell": LINEAR, "nonlinear_shell": NONLINEAR}
     body = thin_body(scene.object)
-    dent, ratio = estimated_dent(body, held, scene, travel)
+    indentation, ratio = estimated_indentation(body, held, scene, closing)
     if scene.effects.object != "auto":
-        return WallLevel(names[scene.effects.object], ratio, dent / travel, forced=True)
-    soft = NONLINEAR if not surely_below(ratio, SMALL_DENT) else LINEAR
-    number = RIGID if surely_below(dent, STIFF * travel) else soft
-    return WallLevel(number, ratio, dent / travel, forced=False)
+        return WallLevel(names[scene.effects.object], ratio, indentation / closing, forced=True)
+    soft = NONLINEAR if not surely_below(ratio, SMALL_INDENTATION) else LINEAR
+    number = RIGID if surely_below(indentation, STIFF * closing) else soft
+    return WallLevel(number, ratio, indentation / closing, forced=False)
 
 
-def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -> tuple[float, float]:
-    """Dent of the linear wall at the largest force, where undeformed pads would overlap it [m], and over the wall.
+def estimated_indentation(body: ThinWalled, held: Grasp, scene: Scene, closing: float) -> tuple[float, float]:
+    """Indentation of the linear wall at the largest force, where undeformed pads would overlap it [m], and ratio.
 
     The second is the largest ratio of an inward displacement to the wall's thickness there. One right-hand side with
     factors that all candidates share.
@@ -89,7 +89,7 @@ def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -
         local = pose.to_pad(mesh.outer)
         under = (np.abs(local[:, 0]) <= 0.5 * length) & (np.abs(local[:, 1]) <= 0.5 * width)
         under &= mesh.D @ pose.rotation[:, 2] < 0
-        depth = np.where(under, np.maximum(travel - local[:, 2], 0.0), 0.0) * area
+        depth = np.where(under, np.maximum(closing - local[:, 2], 0.0), 0.0) * area
         if not depth.sum() > 0:  # the touch lies between the nodes
             depth = np.where(under, area, 0.0)
         if not depth.sum() > 0:
@@ -99,11 +99,13 @@ def estimated_dent(body: ThinWalled, held: Grasp, scene: Scene, travel: float) -
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
     q = linear.solve(load.ravel()).reshape(-1, 6)
-    dents = _dents(linear.shell, q)
-    return float(dents[pressed].max(initial=0.0)), float((dents / mesh.thickness)[pressed].max(initial=0.0))
+    indentations = _indentations(linear.shell, q)
+    return float(indentations[pressed].max(initial=0.0)), float(
+        (indentations / mesh.thickness)[pressed].max(initial=0.0)
+    )
 
 
-def _dents(shell: Shell, q: FloatArray) -> FloatArray:
+def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     """Inward displacement ``(k,)`` of the outer face's nodes, less the motion of the wall as a whole [m]."""
     v = q[:, :3] + q[:, 3:]
     drift = shell.node_area @ v / shell.node_area.sum()
@@ -117,7 +119,7 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
     return {
-        "maps/dent": float(_dents(shell, q).max(initial=0.0)),
+        "maps/indentation": float(_indentations(shell, q).max(initial=0.0)),
         "maps/wall_stress": max(float(f.von_mises.max()) for f in both),
         "maps/wall_strain": max(float(np.abs(f.principal_strain).max()) for f in both),
         "maps/support_force": float(np.linalg.norm(state.wall.reaction)),

@@ -111,13 +111,11 @@ class GraspMap:
         if candidate is not None:
             raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
         along = _one(station, station_mm, "mm", "station")
-        turn = _one(
-            angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None
-        )
+        turn = _one(angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None)
         return self._point(along, turn, force)
 
     def value(
-        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "curved"
+        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
     ) -> FloatArray | float:
         """One quantity at a station [m], angle [rad] and force [N]; NaN where there is none. Built to be fast.
 
@@ -149,12 +147,12 @@ class GraspMap:
         return (1.0 - r) * low + r * high
 
     def error(
-        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "curved"
+        self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
     ) -> FloatArray | float:
         """Estimated error of `value` by the interpolation, in the quantity's unit; NaN where there is no value."""
         return self._point(station, angle, force).error(name, model)
 
-    def table(self, name: str, model: str = "curved") -> FloatArray:
+    def table(self, name: str, model: str = "ccm") -> FloatArray:
         """Values of a quantity at the nodes, flat over station, angle (folded) and force; NaN for unsolved cases.
 
         Per finger where ``name`` is that of a dataset such as ``fingers/f_x_max``: ``(nodes, 2, ...)``.

@@ -50,18 +50,18 @@ class GraspPoint:
         texts = [self._reason(i) for i in range(len(self.states))]
         return texts[0] if not self.shape else np.array(texts, object).reshape(self.shape)
 
-    def value(self, name: str, model: str = "curved") -> Any:
+    def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp, in SI units; NaN where there is none."""
         found = self.map.interpolated(name, model, self.corners)
         return self._shaped(np.where(self.states == INSIDE, found, np.nan))
 
-    def error(self, name: str, model: str = "curved") -> Any:
+    def error(self, name: str, model: str = "ccm") -> Any:
         """Estimated error of `value` by the interpolation, in the quantity's unit; see `study.lookup.GraspMap`."""
         found = self.map.errors(name, model, self.corners)
         valid = (self.states == INSIDE) & np.isfinite(self.map.interpolated(name, model, self.corners))
         return self._shaped(np.where(valid, found, np.nan))
 
-    def fingers(self, name: str, model: str = "curved") -> FloatArray:
+    def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
         found = self.map.interpolated(name if "/" in name else f"fingers/{name}", model, self.corners)
         found[self.states != INSIDE] = np.nan
@@ -89,15 +89,15 @@ class GraspPoint:
         used = (self.corners.weight > 0) & (self.states == INSIDE)[:, None]
         return self._shaped(np.bitwise_or.reduce(np.where(used, flags, 0), axis=1))
 
-    def semi_axes(self, model: str = "curved") -> FloatArray:
+    def semi_axes(self, model: str = "ccm") -> FloatArray:
         """Largest f_x, f_y, tau_z of each finger ``(..., 2, 3)`` [N, N, N m]: the ellipsoid from three motions."""
         return self.fingers("limit_surface/semi_axes", model) * self.fingers("S")[..., None]
 
-    def coefficients(self, model: str = "curved") -> FloatArray:
+    def coefficients(self, model: str = "ccm") -> FloatArray:
         """Coefficients of the fitted quartics ``(..., 2, 15)``, in the units of ``limit_surface/coefficients``."""
         return self.fingers("limit_surface/coefficients", model)
 
-    def limit_surface(self, finger: int, model: str = "curved", fitted: bool = True) -> LimitSurface:
+    def limit_surface(self, finger: int, model: str = "ccm", fitted: bool = True) -> LimitSurface:
         """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m], with ``support``, ``holds`` and the rest.
 
         Between the cases the coefficients are interpolated: a mean of convex forms is convex, so the surface is.
@@ -129,7 +129,7 @@ class GraspPoint:
         if not fitted:
             return Ellipsoid(self.semi_axes(model)[finger - 1])
         S, rho = self.fingers("S")[finger - 1], self.fingers("limit_surface/rho")[finger - 1]
-        mu = self.fingers("f_x_max", "flat")[finger - 1] / S
+        mu = self.fingers("f_x_max", "pcm")[finger - 1] / S
         P, A = self.coefficients(model)[finger - 1], self.fingers("limit_surface/matrix", model)[finger - 1]
         unit = mu * S * np.array([1.0, 1.0, rho])
         if np.isfinite(P).all():

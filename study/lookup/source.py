@@ -32,7 +32,7 @@ class Source:
         self.status, self.messages = self._data.status.values, self._data.message.values
         self.maps = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
 
-    def read(self, name: str, model: str = "curved") -> np.ndarray:
+    def read(self, name: str, model: str = "ccm") -> np.ndarray:
         """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""
         if name in self.maps:
             return values_of(self._data, name, model)

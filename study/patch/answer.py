@@ -102,7 +102,7 @@ class JudgedPatch:
     @property
     def rank(self) -> int:
         """Dimension of the loads that the contact can carry, 3 if nothing is missing."""
-        return self.exact["curved"].rank
+        return self.exact["ccm"].rank
 
     def surface(self, model: str, kind: str) -> Any:
         """A limit surface in ``(f_x, f_y, tau_z)`` per unit of S; ``kind`` is ``exact`` or one of `SURFACES`."""
@@ -264,7 +264,7 @@ def as_record(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> d
         "mu": patches[0].contact.mu,
         "patches": [_patch_record(judged) for judged in patches],
         "grasp": grasp,
-        "remarks": _remarks(patches, grasp),
+        "notes": _notes(patches, grasp),
         "units": UNITS,
         "definitions": DEFINITIONS,
     }
@@ -288,8 +288,8 @@ def _patch_record(judged: JudgedPatch) -> dict[str, Any]:
         "loaded_faces": len(patch.area),
         "area": patch.area.sum(),
         "pressure": patch.pressure.max(),
-        "S": contact.limits["curved"].S,
-        "F_N": contact.limits["curved"].F_N,
+        "S": contact.limits["ccm"].S,
+        "F_N": contact.limits["ccm"].F_N,
         "rho": contact.rho,
         "frame": {name: getattr(frame, name) for name in names} | {"flag": int(frame.flag)},
         "rank": judged.rank,
@@ -306,51 +306,51 @@ def _surfaces_record(judged: JudgedPatch, model: str) -> dict[str, Any]:
         if kind != "exact":
             fit = judged.fits[model][kind]
             # samples in a plane bound no body, so there is nothing to be off from
-            errors = fit.misfit if judged.exact[model].rank == SPACE else (None, None, None)
+            errors = fit.fit_error if judged.exact[model].rank == SPACE else (None, None, None)
             found[kind] |= {"stands_in": fit.certificate == STANDS_IN}
             found[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))
     return found
 
 
-def _remarks(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> list[str]:
+def _notes(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> list[str]:
     """What the reader should know, in sentences."""
-    remarks = []
+    notes = []
     for judged in patches:
         name = f"{judged.read.file}: " if len(patches) > 1 else ""
-        remarks += [note if note.startswith(judged.read.file) else name + note for note in _patch_remarks(judged)]
+        notes += [note if note.startswith(judged.read.file) else name + note for note in _patch_notes(judged)]
     if grasp is None:
-        return remarks
+        return notes
     if grasp["misalignment"] > ANTIPODAL - ALIKE:
-        remarks.append(f"the contacts are {np.degrees(grasp['misalignment']):.2g} deg from antipodal")
+        notes.append(f"the contacts are {np.degrees(grasp['misalignment']):.2g} deg from antipodal")
     if grasp["slips"]:
-        remarks.append("the line that joins the contacts leaves a friction cone: the grasp slips as it stands")
+        notes.append("the line that joins the contacts leaves a friction cone: the grasp slips as it stands")
     if len(patches) == 1:
-        remarks.append("the second contact of the grasp is the same patch facing the first, because no --other was "
+        notes.append("the second contact of the grasp is the same patch facing the first, because no --other was "
                        "given")  # fmt: skip
-    return remarks
+    return notes
 
 
-def _patch_remarks(judged: JudgedPatch) -> list[str]:
-    frame, remarks = judged.contact.frame, list(judged.read.notes)
+def _patch_notes(judged: JudgedPatch) -> list[str]:
+    frame, notes = judged.contact.frame, list(judged.read.notes)
     if not judged.x_given:
-        remarks.append("x follows the longer direction of the patch, because no --long-side was given")
+        notes.append("x follows the longer direction of the patch, because no --long-side was given")
     for flag, sentence in FRAME.items():
         if frame.flag & flag:
             share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
-            remarks.append(sentence + share * (flag == FrameFlag.OVERHANG))
+            notes.append(sentence + share * (flag == FrameFlag.OVERHANG))
     if frame.flag & FrameFlag.WINDING:
         against = _count(judged.read, _minority(wound(judged.read.patch) < 0))
-        remarks.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
+        notes.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
     for model, fits in judged.fits.items():
         failed = [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]
         if failed:
-            remarks.append(f"{model} model: no {' and no '.join(failed)} surface could be fitted, the ellipsoid of "
+            notes.append(f"{model} model: no {' and no '.join(failed)} surface could be fitted, the ellipsoid of "
                            "three motions stands in")  # fmt: skip
     if judged.rank < SPACE:
         space = {1: "one line", 2: "a plane"}.get(judged.rank, "a point")
-        remarks.append(f"the loads that friction can carry fill {space} only (rank {judged.rank}): the limit surface "
+        notes.append(f"the loads that friction can carry fill {space} only (rank {judged.rank}): the limit surface "
                        "has no volume and no fit is judged")  # fmt: skip
-    return remarks
+    return notes
 
 
 def _plain(value: Any) -> Any:

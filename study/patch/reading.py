@@ -361,8 +361,8 @@ def _not_finite(faces: Faces) -> list[Problem]:
 def _out_of_range(faces: Faces) -> list[Problem]:
     """Negative pressures and areas, and numbers of no contact on earth, which would overflow further on."""
     pressure, area, length = faces.pressure, faces.area, np.abs(faces.normal).max(axis=1)
-    tension = (pressure <= 0).all() and (pressure < 0).any()
-    remedy = "change the sign of the column" if tension else "set faces that do not press to 0"
+    adhesion = (pressure <= 0).all() and (pressure < 0).any()
+    remedy = "change the sign of the column" if adhesion else "set faces that do not press to 0"
     problems = faces.problems(pressure < 0, "pressure", lambda i: f"{pressure[i]:g} Pa",
                               "a pressure of 0 or more, positive in compression", remedy)  # fmt: skip
     problems += faces.problems(area < 0, "area", lambda i: f"{area[i]:g} m^2", "an area of 0 or more",

@@ -35,7 +35,7 @@ def as_text(record: dict[str, Any]) -> str:
     blocks = [_patch_block(patch, record["mu"]) for patch in record["patches"]]
     blocks.append(_grasp_block(grasp) if grasp else ["no grasp is scored: add --distance MM for two such contacts that "
                                                      "face each other, or --other FILE"])  # fmt: skip
-    blocks.append([line for text in record["remarks"] for line in _wrapped(f"note: {text}")])
+    blocks.append([line for text in record["notes"] for line in _wrapped(f"note: {text}")])
     words = {word: text for word, text in DEFINITIONS.items() if grasp or word not in SCORES}
     blocks.append([line for word, text in words.items() for line in _wrapped(f"{word}: {text}")])
     return "\n\n".join("\n".join(lines) for lines in blocks if lines)
@@ -54,7 +54,7 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
     faces = f"{patch['faces']} face{'s' * (patch['faces'] > 1)}"
     head = f"{patch['file']}: {faces}, {patch['loaded_faces']} under pressure, mu = {mu:g}"
     return [head, *(f"  {name:<8} {text}" for name, text in rows), "", *_friction_table(patch), "",
-            *_surface_table(patch["limit_surface"]["curved"])]  # fmt: skip
+            *_surface_table(patch["limit_surface"]["ccm"])]  # fmt: skip
 
 
 def _friction_table(patch: dict[str, Any]) -> list[str]:
@@ -159,5 +159,5 @@ def section(judged: JudgedPatch, kind: str, plane: tuple[int, int], n: int = 361
     u[:, plane[0]], u[:, plane[1]] = np.cos(phi), np.sin(phi)
     u *= [1.0, 1.0, judged.contact.rho]  # torque in proportion to force, for even steps
     with np.errstate(invalid="ignore", divide="ignore"):
-        curve = judged.surface("curved", kind).radius(u)[:, None] * u
+        curve = judged.surface("ccm", kind).radius(u)[:, None] * u
     return curve[:, list(plane)]

@@ -20,7 +20,7 @@ KINDS = {3: 5, 4: 9}  # VTK's numbers for triangles and quadrilaterals, by their
 OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those that no candidate grasps
 ABOUT = (
     "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
-    " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that dent its wall"
+    " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that indent its wall"
     " stand in it. Curved contact model, SI units; NaN: no value. Filled when no case is missing any more."
 )
 
@@ -119,7 +119,7 @@ def fill_grid(writer: Any) -> None:
         start, state = k * cells, states[:, k]
         writer.fill(f"{PATH}/CellData/status", start, np.where(candidate == NOBODY, -1, state[candidate].astype(int)))
         for name, q in maps_of(layout).items():
-            path = f"{name}/curved" if q.by_model else f"{name}/{name}"
+            path = f"{name}/ccm" if q.by_model else f"{name}/{name}"
             values = writer.read(path)[first].reshape(states.shape)[:, k]
             shown = np.where(state == DONE, values, np.nan)
             writer.fill(f"{PATH}/CellData/{name}", start, np.where(candidate == NOBODY, np.nan, shown[candidate]))

@@ -40,21 +40,21 @@ RULES = {
     "probes": "Carried from the probes: at each force twice the root mean square of their changes (of two sides the"
               " larger).",
 }  # fmt: skip
-TIMES = 2.0  # root mean squares of the probes that a band is wide: about 95 of 100 cases lie within
+TIMES = 2.0  # root mean squares of the probes that an uncertainty interval is wide: about 95 of 100 cases lie within
 
 
-def band(name: str) -> str:
+def interval(name: str) -> str:
     """Name of the dataset with the half-widths of a quantity."""
-    return f"{name}_band"
+    return f"{name}_interval"
 
 
 def part(name: str, of: str, signed: bool) -> str:
     """Name of the dataset with one part of them, relative: with a sign where it is known at every case."""
-    return f"{name}_change_{of}" if signed else f"{name}_band_{of}"
+    return f"{name}_change_{of}" if signed else f"{name}_interval_{of}"
 
 
 def derived(scene: Scene) -> list[Derived]:
-    """Bands and their parts, where the scene asks for them."""
+    """Uncertainty intervals and their parts, where the scene asks for them."""
     own = scene.uncertainty
     if not own.parts:
         return []
@@ -65,13 +65,15 @@ def derived(scene: Scene) -> list[Derived]:
             f"Half-width around {name} (curved) within which about 95 of 100 cases lie: root of the sum of squares of"
             f" the parts {', '.join(own.parts)}, times the value."
         )
-        made.append(Derived(band(name), units, f"half-width of the band of {name}", text, over))
+        made.append(Derived(interval(name), units, f"half-width of the uncertainty interval of {name}", text, over))
         for of in own.parts:
             signed = of in SIGNED and of in known
             rule = RULES[_rule(of, known)]
             text = f"Relative change of {name} (curved) by {WORDS[of]}"
             text += ", positive where it grows with it. " if signed else ", without sign. "
-            made.append(Derived(part(name, of, signed), "", f"part of {of} in the band of {name}", text + rule, over))
+            made.append(
+                Derived(part(name, of, signed), "", f"part of {of} in the interval of {name}", text + rule, over)
+            )
     return made
 
 
@@ -82,20 +84,20 @@ def _rule(of: str, known: tuple[str, ...]) -> str:
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
-    """Fill the bands, by one rank, after all cases."""
+    """Fill the uncertainty intervals, by one rank, after all cases."""
     own = scene.uncertainty
     if not own.parts:
         return
     known = by_formula(scene)
     for name in NAMES:
-        values = _done(writer, f"{name}/curved")
+        values = _done(writer, f"{name}/ccm")
         total = np.zeros(values.shape)
         for of in own.parts:
             share = _share(writer, scene, name, values, of, known)
             share = np.where(np.isfinite(values), share, np.nan)
             writer.write_derived(part(name, of, of in SIGNED and of in known), share)
             total += share**2
-        writer.write_derived(band(name), np.sqrt(total) * np.abs(values))
+        writer.write_derived(interval(name), np.sqrt(total) * np.abs(values))
 
 
 def _done(writer: ResultWriter, path: str) -> FloatArray:
@@ -106,7 +108,7 @@ def _done(writer: ResultWriter, path: str) -> FloatArray:
 def _share(
     writer: ResultWriter, scene: Scene, name: str, values: FloatArray, of: str, known: tuple[str, ...]
 ) -> FloatArray:
-    """One part of a band, relative, of every case."""
+    """One part of an uncertainty interval, relative, of every case."""
     own = scene.uncertainty
     if of not in known:
         return _from_probes(writer, scene, name, values, of)
@@ -213,7 +215,7 @@ def _rms(values: FloatArray, axis: int | None) -> FloatArray:
 
 
 def at_least_own(share: FloatArray, change: FloatArray, probes: tuple[int, ...], values: FloatArray) -> FloatArray:
-    """The band of a probe, and of its images, is no narrower than what was seen there.
+    """The uncertainty interval of a probe, and of its images, is no narrower than what was seen there.
 
     ``share`` and ``values`` are ``(candidates, k)``, ``change`` ``(p, k)``.
     """

@@ -89,7 +89,7 @@ class Layout:
     patches: bool = True
     derived: tuple[Derived, ...] = ()
     cor_grid: int = 0
-    planar: str = "flat"
+    planar: str = "pcm"
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()

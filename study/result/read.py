@@ -143,7 +143,7 @@ def axes_of(ds: xr.Dataset) -> tuple[StoredAxis, ...]:
     )
 
 
-def values_of(ds: xr.Dataset, name: str, model: str = "curved") -> np.ndarray:
+def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
     """A map over the cases, of one friction model where it has several; NaN where a case is not done.
 
     What is known of a candidate only has the same value at every force.

@@ -77,7 +77,7 @@ class Result:
         self.file.close()
 
     def read(self, path: str) -> np.ndarray:
-        """A dataset of the layout below ``/study``, for example ``checks/tension`` or ``e_n/flat``."""
+        """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/flat``."""
         dataset = self._checked(path)
         self._compare(self._part.get(f"{ROOT}/{path}", ""))
         return self._believable(path, self.file.values(dataset))

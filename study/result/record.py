@@ -60,5 +60,3 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
         parts = {"level": index, "indicator": indicator, "reason": reason}
         given.update({f"effects/{name}_{part}": value for part, value in parts.items()})
     return given
-
-

@@ -31,7 +31,7 @@ def derived(scene: Scene) -> list[Derived]:
         ))  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
         found.append(Derived(
-            HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the dent passes"
+            HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the indentation passes"
             " object.allowed_dent_mm or the stress the yield strength, between the solved forces by straight lines, and"
             " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that. NaN where the"
             " wall was taken as rigid.", over,
@@ -47,7 +47,7 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
     forces = np.asarray(scene.load.normal_force)
     done = writer.codes().reshape(writer.layout.shape) == DONE
     if LOW in wanted:
-        factor = np.where(done, writer.read("safety_factor/curved"), np.nan)
+        factor = np.where(done, writer.read("safety_factor/ccm"), np.nan)
         writer.write_derived(LOW, first_crossing(forces, factor, 1.0))
     if HIGH in wanted:
         writer.write_derived(HIGH, _largest(writer, scene, forces, done))
@@ -57,9 +57,9 @@ def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArr
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
     from softjaw.study.case.wall import thin_body
 
-    limits = {"dent": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
+    limits = {"indentation": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
     values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
-    known = np.isfinite(values["dent"])
+    known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
     crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
     return np.fmin.reduce([solved, *crossings])

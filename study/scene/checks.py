@@ -182,7 +182,7 @@ def _petsc(table: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _uncertain(own: Uncertainty, shape: Any, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[Finding]:
-    """A friction coefficient that may be negative, a wall that is not there, and a sweep, which has no bands."""
+    """A friction coefficient that may be negative, a wall that is not there, and a sweep, which has no intervals."""
     if own.mu and own.mu >= friction.mu:
         expected = f"less than friction.mu, which is {friction.mu:g}"
         remedy = "the half-width is in the unit of mu, not in per cent"

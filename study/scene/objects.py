@@ -67,7 +67,9 @@ class Walled(Shape):
     yield_strength_mpa: Annotated[float, Field(gt=0, le=1e5)] | None = Field(
         None, description="stress that the wall may bear, instead of the material's"
     )
-    allowed_dent_mm: Length | None = Field(None, description="dent that the wall may get, for the window of forces")
+    allowed_dent_mm: Length | None = Field(
+        None, description="indentation that the wall may get, for the window of forces"
+    )
     open_top: bool = Field(True, description="whether the last section is open, as a cup's and a bottle's without cap")
     support: Literal["standing", "clamped", "free"] = Field(
         "standing", description="standing on its bottom, clamped there, or held by the fingers alone"

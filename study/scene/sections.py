@@ -83,7 +83,7 @@ class Friction(Section):
     """Friction between pad and object. Every model is computed; ``model`` is the planar one shown first."""
 
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
-    model: Literal["flat", "projected"] = Field("flat", description="planar variant that is shown first")
+    model: Literal["pcm", "pcm_projected"] = Field("pcm", description="planar variant that is shown first")
     cor_grid: int = Field(0, ge=0, le=1000, description="n of an n x n grid of centres of rotation; 0 is off")
 
 
@@ -234,7 +234,7 @@ class Effects(Section):
     )
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
-    friction: Literal["auto", "curved"] = Field("auto", description="friction model behind the score")
+    friction: Literal["auto", "ccm"] = Field("auto", description="friction model behind the score")
     limit_surface: Literal["auto", "three_motions", "fitted_ellipsoid", "quartic"] = Field(
         "auto", description="form of the limit surface; auto is that of [limit_surface]"
     )

@@ -24,13 +24,13 @@ WIDE = 5e-3  # relative difference of widths that makes no place wider
 # What a check may be at most (or, for the last two, must exceed), and how the reader should take it.
 LIMITS = {
     "force_balance": 1e-6,
-    "tension": 1e-6,
+    "adhesion": 1e-6,
     "penetration": 1e-6,
     "complementarity": 1e-6,
     "min_det_f": 0.0,
-    "acoustic": 0.0,
+    "ellipticity": 0.0,
 }
-ABOVE = ("min_det_f", "acoustic")
+ABOVE = ("min_det_f", "ellipticity")
 
 
 def shown(units: str) -> tuple[str, float]:
@@ -117,11 +117,11 @@ class Data:
             self._fields[path] = np.where((self.status == DONE)[..., None, None], self.result.read(path), np.nan)
         return self._fields.get(path)
 
-    def map(self, name: str, model: str = "curved") -> np.ndarray | None:
+    def map(self, name: str, model: str = "ccm") -> np.ndarray | None:
         """A map over all cases, of one friction model where it has several."""
         return self._known(name, model)
 
-    def _known(self, name: str, model: str = "curved") -> np.ndarray | None:
+    def _known(self, name: str, model: str = "ccm") -> np.ndarray | None:
         if (name, model) not in self._read:
             self._read[name, model] = self._floats(name, model)
         return self._read[name, model]
@@ -137,7 +137,7 @@ class Data:
             values[self.status != DONE] = np.nan  # codes have integers there
         return values if np.isfinite(values).any() else None
 
-    def at(self, name: str, index: Sequence[int], model: str = "curved") -> float:
+    def at(self, name: str, index: Sequence[int], model: str = "ccm") -> float:
         """A map's value at one case, NaN if there is none."""
         found = self.map(name, model)
         return float("nan") if found is None else float(found[tuple(index)])

@@ -18,11 +18,11 @@ from softjaw.study.pictures import span as span  # one range for plotly and matp
 
 INK, SOFT, GRID, EMPTY = "#1d2429", "#6b747b", "#e3e6e8", "#eceef0"
 MODELS = {  # name, colour, line, marker
-    "curved": ("CCM", "#12436d", "solid", "circle"),
-    "flat": ("PCM", "#c05a00", "dash", "square"),
-    "projected": ("PCM scaled by F_N", "#2a8c82", "dot", "triangle-up"),
+    "ccm": ("CCM", "#12436d", "solid", "circle"),
+    "pcm": ("PCM", "#c05a00", "dash", "square"),
+    "pcm_projected": ("PCM scaled by F_N", "#2a8c82", "dot", "triangle-up"),
 }
-COLOURS = {"e_n": "Cividis", "pressure": "Magma_r", "dent": "Plasma_r", "wall_stress": "Inferno_r"}
+COLOURS = {"e_n": "Cividis", "pressure": "Magma_r", "indentation": "Plasma_r", "wall_stress": "Inferno_r"}
 MARGIN = {"l": 60, "r": 20, "t": 58, "b": 50}
 
 
@@ -64,7 +64,7 @@ def lines(
         if not np.isfinite(y).any():
             continue
         name, colour, dash, symbol = MODELS[model]
-        bars = None if errors is None or model != "curved" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
+        bars = None if errors is None or model != "ccm" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
         made.add_scatter(
             x=x, y=y, name=name, legendgroup=model, mode="lines+markers", error_y=bars, row=row, col=column,
             line={"color": colour, "dash": dash}, marker={"symbol": symbol, "size": 6},

@@ -86,9 +86,9 @@ def stored_surface(data: Data, index: tuple[int, ...], finger: int, model: str) 
     if data.status[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in found):
         return None
     semi_axes, rho, S, f_x = (f[index][finger] for f in found if f is not None)
-    if not (S > 0 and rho > 0 and f_x[MODELS.index("flat")] > 0 and semi_axes[m].min() >= 0):
+    if not (S > 0 and rho > 0 and f_x[MODELS.index("pcm")] > 0 and semi_axes[m].min() >= 0):
         return None
-    mu = float(f_x[MODELS.index("flat")] / S)
+    mu = float(f_x[MODELS.index("pcm")] / S)
     unit = mu * S * np.array([1.0, 1.0, rho])
     ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
     chosen, patch = _chosen(data, index, finger, m), _patch(data, index, finger)

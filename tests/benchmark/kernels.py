@@ -17,7 +17,7 @@ from softjaw.friction.quadrature import gauss_patch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.six import convex_span_quartic, six_samples
@@ -107,7 +107,7 @@ def limit_surfaces() -> None:
         "convex quartic with its certificate": (lambda: convex_quartic(W, T, gamma=0.0).surface, "at most 1 ms"),
     }
     for name, (fit, goal) in fits.items():
-        errors = misfit(fit(), W, T)
+        errors = fit_error(fit(), W, T)
         figures = f"radius {errors.Erad:.4f}, direction {errors.Edir:.2f} degrees"
         line(name, span(fastest(fit, 0.3)), goal, figures)
     constrained()
@@ -211,7 +211,7 @@ def linearised(points: tuple[int, ...]) -> None:
 
 
 def _hull(vertices: list[np.ndarray]) -> tuple[float, float, str]:
-    """Volume of the sums of both contacts' wrenches, the empty wrench among them, its time and a remark."""
+    """Volume of the sums of both contacts' wrenches, the empty wrench among them, its time and a note."""
     cones = []
     for side, (f_x, f_y, tau) in zip((1.0, -1.0), (v.T for v in vertices), strict=True):
         N, x = np.array([side, 0, 0]), np.array([0.0, 0, 1])

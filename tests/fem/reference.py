@@ -173,4 +173,4 @@ def facing(a):
 def e_n(state):
     """Eccentricity parameter of a pressed pad, curved model [m]."""
     patch = extract(state.pad, state)
-    return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "curved").e_n
+    return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "ccm").e_n

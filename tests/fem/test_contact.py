@@ -24,17 +24,17 @@ def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), 
     return ContactProblem(pad, gap)
 
 
-def contacting_state(problem, travel=1.2e-3):
+def contacting_state(problem, closing=1.2e-3):
     """A pad pressed into the object, out of balance, with about half of its front active, no node near the switch."""
     pad, rng = problem.pad, np.random.default_rng(4)
     x = np.zeros(problem.size)
     u = np.zeros_like(pad.nodes)
-    u[:, 2] = travel
+    u[:, 2] = closing
     u += 1e-4 * rng.uniform(-1, 1, u.shape)
-    own = (pad.dofs >= 0) & (pad.dofs < pad.travel_dof)
+    own = (pad.dofs >= 0) & (pad.dofs < pad.closing_dof)
     x[pad.dofs[own]] = u[own]
-    x[pad.travel_dof] = travel
-    x[pad.travel_dof + 1 :] = np.abs(1e-3 * rng.uniform(0.2, 1, len(pad.node_area)))
+    x[pad.closing_dof] = closing
+    x[pad.closing_dof + 1 :] = np.abs(1e-3 * rng.uniform(0.2, 1, len(pad.node_area)))
     return x
 
 
@@ -45,7 +45,7 @@ def dense(problem, values):
     return K
 
 
-@pytest.mark.parametrize("control", [Control(force=2.0), Control(travel=1e-3)], ids=["force", "travel"])
+@pytest.mark.parametrize("control", [Control(force=2.0), Control(closing=1e-3)], ids=["force", "closing"])
 @pytest.mark.parametrize("complementarity", [False, True], ids=["active set", "bounds"])
 @pytest.mark.parametrize("contact", ["weighted", "nodal"])
 @pytest.mark.parametrize("name", OBJECTS)
@@ -81,7 +81,7 @@ def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed
     problem = problem_of(OBJECTS["sphere"])
     problem.control, problem.complementarity = Control(force=2.0), True
     K = dense(problem, problem.tangent(contacting_state(problem)))
-    n = problem.pad.travel_dof + 1
+    n = problem.pad.closing_dof + 1
     assert np.abs(K[:n, :n] - K[:n, :n].T).max() < 1e-13 * np.abs(K).max()
     assert np.abs(K[:n, n:] + K[n:, :n].T).max() < 1e-15 * np.abs(K).max()
     assert not K[n:, n:].any()
@@ -92,7 +92,7 @@ def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed
 def test_a_confined_pad_pressed_flat(element, symmetry):
     """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``.
 
-    With that pressure the rows along z, of the travel and of the pressures vanish; only the sides had to be held.
+    With that pressure the rows along z, of the closing and of the pressures vanish; only the sides had to be held.
     """
     pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material("blatz_ko", G), symmetry)
     problem = ContactProblem(pad, reference.plane)
@@ -103,11 +103,11 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
     x = np.zeros(problem.size)
     vertical = pad.dofs[:, 2]
     x[vertical] = -squeeze * pad.nodes[:, 2] / SIZE[2]
-    x[pad.travel_dof + 1 :] = pressure / problem.kappa
+    x[pad.closing_dof + 1 :] = pressure / problem.kappa
     R = problem.residual(x)
     scale = problem.control.force
-    assert abs(R[pad.travel_dof]) < 1e-13 * scale
-    assert np.abs(R[pad.travel_dof + 1 :]).max() < 1e-13 * scale
+    assert abs(R[pad.closing_dof]) < 1e-13 * scale
+    assert np.abs(R[pad.closing_dof + 1 :]).max() < 1e-13 * scale
     assert np.abs(R[vertical]).max() < 1e-13 * scale
     assert problem.sheet_force(x) == pytest.approx(scale, rel=1e-13)
     nodal, gap, points = problem.contact_state(x)
@@ -122,8 +122,8 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
 def test_pressures_are_bounded_and_nothing_else():
     problem = problem_of(reference.plane)
     lower, upper = problem.bounds()
-    assert (lower[problem.pad.travel_dof + 1 :] == 0).all()
-    assert np.isneginf(lower[: problem.pad.travel_dof + 1]).all()
+    assert (lower[problem.pad.closing_dof + 1 :] == 0).all()
+    assert np.isneginf(lower[: problem.pad.closing_dof + 1]).all()
     assert np.isposinf(upper).all()
 
 
@@ -131,12 +131,12 @@ def test_active_set_row_switches_between_pressure_and_gap():
     """``A l - max(0, A l - G)`` is ``A l`` where the pad is off the object, and the weighted gap where it presses."""
     problem = problem_of(reference.plane)
     pad = problem.pad
-    for travel in (-1e-3, 1e-3):
+    for closing in (-1e-3, 1e-3):
         x = np.zeros(problem.size)
-        x[pad.dofs[:, 2]] = travel
-        pressures = slice(pad.travel_dof + 1, None)
+        x[pad.dofs[:, 2]] = closing
+        pressures = slice(pad.closing_dof + 1, None)
         x[pressures] = 0.3e-3
-        expected = pad.node_area * (0.3e-3 if travel < 0 else -travel)
+        expected = pad.node_area * (0.3e-3 if closing < 0 else -closing)
         assert problem.residual(x)[pressures] == pytest.approx(problem.kappa * expected, rel=1e-12)
 
 
@@ -147,12 +147,12 @@ def test_an_inverted_pad_has_no_residual():
     assert np.isnan(problem.residual(x)).all()
 
 
-def test_steps_are_shortened_by_travel_and_by_squeezing():
+def test_steps_are_shortened_by_closing_and_by_squeezing():
     problem = problem_of(reference.plane)
     pad, step = problem.pad, np.zeros(problem.size)
     x = np.zeros(problem.size)
     assert problem.shorten(x, step) == 1
-    step[pad.dofs[:, 2]] = -SIZE[2]  # the whole pad moves: no element is squeezed, but the travel is too long
+    step[pad.dofs[:, 2]] = -SIZE[2]  # the whole pad moves: no element is squeezed, but the closing is too long
     assert problem.shorten(x, step) == pytest.approx(0.1)
     step[:] = 0
     step[pad.dofs[pad.front_nodes, 2]] = SIZE[2]  # x - step: the front is pushed back through the sheet

@@ -41,7 +41,7 @@ def test_way_grows_evenly():
 
 def test_without_friction_nothing_changes():
     for one, other in zip(press(BALL, 0.0).ladder([2.0, 5.0]), Press(pad_of(), BALL).ladder([2.0, 5.0]), strict=True):
-        assert one.travel == pytest.approx(other.travel, rel=1e-9)
+        assert one.closing == pytest.approx(other.closing, rel=1e-9)
         assert np.abs(one.pressure - other.pressure).max() < 1e-8 * other.pressure.max()
 
 
@@ -49,7 +49,7 @@ def test_a_pad_that_does_not_spread_rubs_nowhere():
     """Without Poisson's effect columns on a plane only shorten, so that friction has nothing to resist."""
     pad = pad_of(law=material("neo_hookean", 0.04e6, 0.0))
     (rough,), (smooth,) = press(reference.plane, 0.8, pad).ladder([5.0]), Press(pad, reference.plane).ladder([5.0])
-    assert rough.travel == pytest.approx(smooth.travel, rel=1e-9)
+    assert rough.closing == pytest.approx(smooth.closing, rel=1e-9)
     assert np.abs(rough.points.friction).max() < 1e-9 * rough.points.load.max()
 
 
@@ -59,7 +59,7 @@ def test_a_rough_plane_holds_the_front():
     home = pad_of().nodes[pad_of().front_nodes][:, :2]
     spread = [np.abs(state.front[:, :2] - home).max() for state in (rough, smooth)]
     assert spread[0] < 0.05 * spread[1]
-    assert rough.travel < 0.98 * smooth.travel  # a held pad is stiffer
+    assert rough.closing < 0.98 * smooth.closing  # a held pad is stiffer
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.8])
@@ -79,7 +79,7 @@ def test_coulombs_law_and_balance_hold(mu):
     assert state.checks.force_balance < 1e-8
 
 
-@pytest.mark.parametrize("control", [Control(force=3.0), Control(travel=0.003)], ids=["force", "travel"])
+@pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.003)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control):
     """From a state with a history: some points stick, some slip, some are open."""
     pad = pad_of((True, False), (6, 4, 2))
@@ -88,7 +88,7 @@ def test_tangent_by_finite_differences(control):
     bed = SpringBed(pad, BALL)
     rng = np.random.default_rng(3)
     before, x = bed.guess(0.0020), bed.guess(0.0021)
-    x[: pad.travel_dof] += 3e-6 * rng.normal(size=pad.travel_dof)
+    x[: pad.closing_dof] += 3e-6 * rng.normal(size=pad.closing_dof)
     problem.accept(before)
     problem.accept(before + 0.5 * (x - before))
     K = np.zeros((pad.size + 1, pad.size + 1))  # negative indices fall into the last row and column
@@ -110,5 +110,5 @@ def test_finer_steps_and_a_stiffer_stick_change_little(gap, monkeypatch):
         with monkeypatch.context() as changed:
             changed.setattr(coupling, name, value)
             (finer,) = press(gap, 0.4).ladder([6.0])
-        assert finer.travel == pytest.approx(state.travel, rel=2e-3)
+        assert finer.closing == pytest.approx(state.closing, rel=2e-3)
         assert finer.points.load.sum() == pytest.approx(state.points.load.sum(), rel=2e-3)

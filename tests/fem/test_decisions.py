@@ -120,7 +120,7 @@ ACCEPTED = {  # mesh, and its volume
 }
 REFUSED = {  # mesh, and a word of the refusal
     "open": ((CUBE[0], CUBE[1][1:]), "closed"),
-    "flat": (FLAT_PIECE, "volume"),
+    "pcm": (FLAT_PIECE, "volume"),
     "flat beside another": (union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])), "volume"),
     "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), "intersects"),
     "corners on another": (union(CUBE, shifted(OCTAHEDRON, 1.0)), "two pieces"),
@@ -182,9 +182,7 @@ def crossings(other, seed):
     return len(crossing_pairs(turned(np.concatenate([BASE, other]), seed)[0], np.arange(6).reshape(2, 3)))
 
 
-@pytest.mark.parametrize(
-    "tip", [(0.3, 0.2), (0.5, 0.5), (0.0, 0.0)], ids=["face", "edge", "corner"]
-)
+@pytest.mark.parametrize("tip", [(0.3, 0.2), (0.5, 0.5), (0.0, 0.0)], ids=["face", "edge", "corner"])
 @tries
 @given(seed=seeds)
 def test_a_triangle_that_touches_another_with_its_tip_does_not_cross_it(tip, seed):
@@ -285,7 +283,7 @@ def test_centres_near_the_axis_are_on_it(seed):
 
 
 def travel_past(shape, place, seed, reach=20.0):
-    """Travel along y until one of three points, the first at ``place``, meets a shape; all of it turned at random."""
+    """Distance along y until one of three points, the first at ``place``, meets a shape; all of it turned at random."""
     rng = np.random.default_rng(seed)
     turn = Rotation.random(random_state=rng).as_matrix()
     body = SimpleNamespace(gap=lambda x: shape.gap(x @ turn))
@@ -318,14 +316,14 @@ def test_a_pad_that_starts_at_the_surface_touches_at_once(seed):
     R = Rotation.random(random_state=rng).as_matrix()
     radius = rng.uniform(0.01, 0.05)
 
-    def travel(outside):
+    def closing(outside):
         pose = Pose(moved(R, seed), moved(-(radius + outside) * R[:, 2], seed))
         return first_touch(Sphere(radius), pose, np.array([[0.0, 0.0, 0.0], [0.0, 0.005, 0.0]]), 0.5)
 
-    assert travel(0.0) == pytest.approx(0.0, abs=2e-9)
-    assert travel(1e-3) == pytest.approx(1e-3, abs=2e-12)
+    assert closing(0.0) == pytest.approx(0.0, abs=2e-9)
+    assert closing(1e-3) == pytest.approx(1e-3, abs=2e-12)
     with pytest.raises(NoContactError, match="inside"):
-        travel(-1e-8)
+        closing(-1e-8)
 
 
 @tries
@@ -382,10 +380,10 @@ def test_a_way_of_whole_steps_has_as_many_forces(seed, steps):
 
 @tries
 @given(seeds)
-def test_a_travel_that_stays_is_no_fall(seed):
-    travel = np.random.default_rng(seed).uniform(1e-4, 1e-2)
+def test_a_closing_that_stays_is_no_fall(seed):
+    closing = np.random.default_rng(seed).uniform(1e-4, 1e-2)
     for after, kept in ((1.0, True), (0.96, True), (0.94, False)):
-        (one, other) = moved([travel, after * travel], seed)
+        (one, other) = moved([closing, after * closing], seed)
         assert (outcome(refuse_fall, (1.0, one), (2.0, other)) is None) is kept
 
 

@@ -76,8 +76,8 @@ def test_points_beyond_the_ends_face_nothing(wall):
 def test_derivatives_agree_with_finite_differences(wall, points):
     rng = np.random.default_rng(5)
     X, normal = nodes(wall)
-    dent = -1.5e-3 * np.exp(-((X[:, 0] - R) ** 2 + (X[:, 2] - 0.05) ** 2) / 0.02**2)
-    v, w = normal * dent[:, None], 2e-4 * rng.normal(size=X.shape) * 0.1
+    indentation = -1.5e-3 * np.exp(-((X[:, 0] - R) ** 2 + (X[:, 2] - 0.05) ** 2) / 0.02**2)
+    v, w = normal * indentation[:, None], 2e-4 * rng.normal(size=X.shape) * 0.1
     places = wall.places(points)
     at = face(wall, points, places, v, w)
     dx, dv, dw = rng.normal(size=points.shape), rng.normal(size=v.shape), 0.01 * rng.normal(size=w.shape)

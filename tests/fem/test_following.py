@@ -40,7 +40,7 @@ def test_a_state_does_not_depend_on_the_list_of_forces(forces):
     """Neo-Hookean foam at 500 N: [5, 500] gave e_n = 15.14 mm and p_max = 2566 kPa, seven forces 14.79 mm and 2848."""
     state = last(press_of(), forces)
     assert not state.path_dependent
-    assert state.travel == pytest.approx(13.85589900e-3, rel=1e-7)
+    assert state.closing == pytest.approx(13.85589900e-3, rel=1e-7)
     assert reference.e_n(state) == pytest.approx(14.84071815e-3, rel=1e-7)
     assert state.pressure.max() == pytest.approx(2816.678244e3, rel=1e-7)
 
@@ -67,7 +67,7 @@ def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
         press = press_of(stepping=stepping)
         state = last(press, [5, 500])
         entries, held = press.problem.symmetric_tangent(state.unknowns)
-        K, n = dense(press, entries), press.pad.travel_dof + 1
+        K, n = dense(press, entries), press.pad.closing_dof + 1
         np.testing.assert_allclose(K, K.T, atol=1e-12 * np.abs(K).max())
         B = K[n:, :n][np.abs(K[n:, :n]).any(axis=1)]
         assert len(B) == held == np.count_nonzero(state.pressure > 0)
@@ -80,15 +80,15 @@ def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
 
 
 @pytest.mark.parametrize("symmetry", [(True, True), (False, True)])
-@pytest.mark.parametrize("control", ["force", "travel"])
+@pytest.mark.parametrize("control", ["force", "closing"])
 def test_tangent_of_the_path_by_finite_differences(symmetry, control):
     """Of states at forces 1 % lower and higher, whose nodes in contact are the same."""
     press = press_of(symmetry=symmetry)
     low, state, high = press.ladder([19.8, 20.0, 20.2])
     problem, work = press.problem, Work()
     x = state.unknowns
-    if control == "travel":
-        x = press._stepping.solve(x * (1 + 1e-9), Control(travel=state.travel), work)
+    if control == "closing":
+        x = press._stepping.solve(x * (1 + 1e-9), Control(closing=state.closing), work)
     else:
         x = press._stepping.solve(x * (1 + 1e-9), Control(force=20.0), work)
     tangent = problem.path_tangent(x, press.solver.answer)
@@ -107,14 +107,14 @@ def test_looking_for_stability_leaves_the_solver_as_it_was():
 
 
 def force(x):
-    """Force [N] at a travel of x [mm]."""
+    """Force [N] at a closing displacement of x [mm]."""
     return x**3 - 4.5 * x**2 + 6 * x
 
 
 class Curve:
-    """One unknown, the travel; strained by ``strain(x)``."""
+    """One unknown, the closing displacement; strained by ``strain(x)``."""
 
-    complementarity, travel_dof, control = False, 0, Control(travel=0.0)
+    complementarity, closing_dof, control = False, 0, Control(closing=0.0)
 
     def __init__(self, strain=lambda x: 0.0):
         self.strain = strain
@@ -122,7 +122,7 @@ class Curve:
     def sheet_force(self, x):
         return float(force(x[0] / MM))
 
-    def travel(self, x):
+    def closing(self, x):
         return float(x[0])
 
     def path_tangent(self, x, answer):
@@ -137,14 +137,14 @@ class Curve:
 
 
 class Crossings:
-    """Finds the state under travel control, and under force control the crossing next to the start."""
+    """Finds the state under displacement control, and under force control the crossing next to the start."""
 
     def __init__(self, problem):
         self.problem, self.at = problem, None
 
     def solve(self, x, tolerance, iterations=None):
         control = self.problem.control
-        self.at = np.array([control.travel])
+        self.at = np.array([control.closing])
         if control.force is not None:
             roots = np.roots([1.0, -4.5, 6.0, -control.force])
             roots = MM * roots[np.abs(roots.imag) < 1e-9].real
@@ -225,7 +225,7 @@ def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
     assert not any(state.path_dependent for state in states)
     for state in states:
         assert reference.e_n(state) == pytest.approx(reference.e_n(states[0]), rel=1e-8)
-        assert state.travel == pytest.approx(states[0].travel, rel=1e-9)
+        assert state.closing == pytest.approx(states[0].closing, rel=1e-9)
 
 
 def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():

@@ -68,7 +68,7 @@ def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
     *_, stepwise = grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1.0, 2.5, 3.0, 4.0])
     assert at_once.wall.snapped
     assert stepwise.wall.snapped
-    assert at_once.fingers[0].travel == pytest.approx(stepwise.fingers[0].travel, rel=1e-6)
+    assert at_once.fingers[0].closing == pytest.approx(stepwise.fingers[0].closing, rel=1e-6)
 
 
 @pytest.mark.long
@@ -76,7 +76,7 @@ def test_a_foil_and_tiny_forces_are_solved():
     *_, foil = grip(thin(5e-5), elements=(6, 4, 2), mesh=ROUGH).ladder([0.005, 0.01])
     assert foil.fingers[0].checks.force_balance < 1e-8
     *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1e-3, 1e-2])
-    assert tiny.fingers[0].travel < 1e-4
+    assert tiny.fingers[0].closing < 1e-4
 
 
 @pytest.mark.long
@@ -84,7 +84,7 @@ def test_many_levels_end_where_few_do():
     forces = np.linspace(0.05, 1.5, 30)
     *_, many = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder(forces)
     *_, few = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder([1.5])
-    assert many.fingers[0].travel == pytest.approx(few.fingers[0].travel, rel=1e-7)
+    assert many.fingers[0].closing == pytest.approx(few.fingers[0].closing, rel=1e-7)
 
 
 def test_pads_and_wall_must_balance():
@@ -157,7 +157,7 @@ def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
     height = 0.198 + patch.centroid[:, 0]
     assert patch.pressure[height > 0.2051].max() == 0.0
     assert patch.pressure[height > 0.2025].max() > 0.3 * patch.pressure.max()
-    assert finger.checks.overlap < 0.15 * finger.travel
+    assert finger.checks.penetration_depth < 0.15 * finger.closing
 
 
 def test_the_wall_of_a_partly_meshed_body_is_not_closed():
@@ -166,25 +166,25 @@ def test_the_wall_of_a_partly_meshed_body_is_not_closed():
     assert whole.closed
 
 
-def travel_and_e_n(elements, size):
+def closing_and_e_n(elements, size):
     sizes = WallMesh(size * 0.002, size * 0.003, size * 0.006)
     state = next(grip(thin(), elements=elements, mesh=sizes).ladder([3.0])).fingers[0]
-    return np.array([state.travel, e_n(state)])
+    return np.array([state.closing, e_n(state)])
 
 
 @pytest.mark.long
-def test_travel_and_e_n_converge_with_order_two_in_the_walls_mesh_and_by_a_percent_in_the_pads():
-    coarse, middle, fine = (travel_and_e_n((16, 8, 4), size) for size in (2.0, 1.0, 0.5))
+def test_closing_and_e_n_converge_with_order_two_in_the_walls_mesh_and_by_a_percent_in_the_pads():
+    coarse, middle, fine = (closing_and_e_n((16, 8, 4), size) for size in (2.0, 1.0, 0.5))
     order = np.log2((middle - coarse) / (fine - middle))
     assert (order > 1.8).all()
     assert (np.abs(fine / middle - 1.0) < 0.005).all()
-    np.testing.assert_allclose(travel_and_e_n((32, 16, 8), 1.0), middle, rtol=0.01)
+    np.testing.assert_allclose(closing_and_e_n((32, 16, 8), 1.0), middle, rtol=0.01)
 
 
 @pytest.mark.long
-def test_linear_walls_agree_within_one_percent_while_the_dent_is_small():
+def test_linear_walls_agree_within_one_percent_while_the_indentation_is_small():
     for thickness, force in ((5e-4, 1.0), (8e-4, 3.0), (1.2e-3, 8.0)):
         sides = [next(grip(thin(thickness), level=level).ladder([force])) for level in ("nonlinear", "linear")]
-        dent = np.linalg.norm(sides[0].wall.q.reshape(-1, 6)[:, :3], axis=1).max()
-        assert dent < 0.3 * thickness
+        indentation = np.linalg.norm(sides[0].wall.q.reshape(-1, 6)[:, :3], axis=1).max()
+        assert indentation < 0.3 * thickness
         assert e_n(sides[1].fingers[0]) == pytest.approx(e_n(sides[0].fingers[0]), rel=0.01)

@@ -14,7 +14,7 @@ MM = 1e-3
 
 
 def force(x):
-    """Force [N] at a travel of x [mm]: 2.5 at most before it falls to 2.0, by way of x = 1 and x = 2."""
+    """Force [N] at a closing displacement of x [mm]: 2.5 at most before it falls to 2.0, by way of x = 1 and x = 2."""
     return x**3 - 4.5 * x**2 + 6 * x
 
 
@@ -25,14 +25,14 @@ def crossings(F):
 
 
 class Curve:
-    """One unknown, the travel."""
+    """One unknown, the closing displacement."""
 
-    control = Control(travel=0.0)
+    control = Control(closing=0.0)
 
     def sheet_force(self, x):
         return float(force(x[0] / MM))
 
-    def travel(self, x):
+    def closing(self, x):
         return float(x[0])
 
 
@@ -45,7 +45,7 @@ class Jumping:
     def solve(self, x, tolerance, iterations=None):
         control = self.problem.control
         if control.force is None:
-            return np.array([control.travel]), 1
+            return np.array([control.closing]), 1
         found = crossings(control.force)
         near = found[np.abs(found - x[0] / MM) < self.close]
         return np.array([(near[0] if len(near) else found[-1]) * MM]), 1
@@ -117,9 +117,9 @@ def test_beyond_the_limit_the_force_is_said_to_have_fallen():
 def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
     grip = climbing()
     first = np.array([0.1 * MM])
-    grip._stepping.first = lambda travel, F, work: (first, grip.problem.sheet_force(first))
-    grip._beds = [SimpleNamespace(travel=lambda F: 0.1 * MM)]
-    grip._stepping.problem.travel = lambda x: float(x[0])
+    grip._stepping.first = lambda closing, F, work: (first, grip.problem.sheet_force(first))
+    grip._beds = [SimpleNamespace(closing=lambda F: 0.1 * MM)]
+    grip._stepping.problem.closing = lambda x: float(x[0])
     x, _, fell = grip._level(None, 0.0, 6.0, np.inf, Work())
     assert x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
     assert fell
@@ -135,4 +135,4 @@ def test_steps_that_keep_failing_end_the_walk():
     work = Work()
     with pytest.raises(ConvergenceError, match="stuck at 0 N of 1 N: no luck"):
         steps.walk(np.zeros(1), 1.0, work, 0.5 * MM)
-    assert work.cuts < 12
+    assert work.halvings < 12

@@ -106,7 +106,7 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8",
                 profile_error(pad, pressed, r, hertz),
             )
         )
-        lacking.append((hertz.approach - pressed.travel) * E_star * W / pressed.force)
+        lacking.append((hertz.approach - pressed.closing) * E_star * W / pressed.force)
     return np.sqrt(np.mean(np.square(errors), axis=0)), np.array(lacking)
 
 

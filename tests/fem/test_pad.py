@@ -34,7 +34,7 @@ def test_volumes_and_areas_add_up(element, contact, symmetry):
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_every_unknown_has_its_place(element, symmetry):
-    """Free displacements first, one travel for the bonded back, one pressure per node of the front."""
+    """Free displacements first, one closing displacement for the bonded back, one pressure per node of the front."""
     pad = Pad(PadShape(SIZE, (4, 6, 3), element=element), FOAM, symmetry)
     order = pad.shape.per_side - 1
     n = [order * (k // 2 if s else k) + 1 for k, s in zip((4, 6, 3), (*symmetry, False), strict=True)]
@@ -42,13 +42,13 @@ def test_every_unknown_has_its_place(element, symmetry):
     assert pad.front_grid == (n[0], n[1])
     above = np.prod(n[:2]) * (n[2] - 1)
     fixed = sum(np.prod([n[j] for j in range(2) if j != i]) * (n[2] - 1) for i in range(2) if symmetry[i])
-    assert pad.travel_dof == 3 * above - fixed
-    assert pad.size == pad.travel_dof + 1 + n[0] * n[1]
-    own = pad.dofs[(pad.dofs >= 0) & (pad.dofs < pad.travel_dof)]
-    assert (np.sort(own) == np.arange(pad.travel_dof)).all()
+    assert pad.closing_dof == 3 * above - fixed
+    assert pad.size == pad.closing_dof + 1 + n[0] * n[1]
+    own = pad.dofs[(pad.dofs >= 0) & (pad.dofs < pad.closing_dof)]
+    assert (np.sort(own) == np.arange(pad.closing_dof)).all()
     back = np.isclose(pad.nodes[:, 2], -SIZE[2])
-    assert (pad.dofs[back] == [-1, -1, pad.travel_dof]).all()
-    assert (pad.dofs == pad.travel_dof).sum() == back.sum() == n[0] * n[1]
+    assert (pad.dofs[back] == [-1, -1, pad.closing_dof]).all()
+    assert (pad.dofs == pad.closing_dof).sum() == back.sum() == n[0] * n[1]
     for axis in range(2):
         mirror = symmetry[axis] & np.isclose(pad.nodes[:, axis], 0)
         assert (pad.dofs[mirror, axis] == -1).all()
@@ -71,10 +71,10 @@ def test_front_nodes_run_along_the_width_first(element, elements, symmetry):
     assert (np.diff(middle[..., 1], axis=2) > 0).all()
 
 
-def test_the_travel_moves_the_back_and_nothing_else(element):
+def test_the_closing_moves_the_back_and_nothing_else(element):
     pad = Pad(PadShape(SIZE, (2, 2, 2), element=element), FOAM)
     x = np.zeros(pad.size)
-    x[pad.travel_dof] = 1e-3
+    x[pad.closing_dof] = 1e-3
     u = pad.displacement(x)
     back = np.isclose(pad.nodes[:, 2], -SIZE[2])
     assert (u[back] == [0, 0, 1e-3]).all()

@@ -34,7 +34,7 @@ def relative(a, b):
 def test_active_set_and_bounds_agree(gap, element, contact):
     pad = pad_of((8, 4, 2) if element == "hex27" else (12, 6, 4), contact=contact, element=element)
     for one, other in zip(Press(pad, gap).ladder(FORCES), Press(pad, gap, VI).ladder(FORCES), strict=True):
-        assert one.travel == pytest.approx(other.travel, rel=3e-9)
+        assert one.closing == pytest.approx(other.closing, rel=3e-9)
         assert relative(one.pressure, other.pressure) < 3e-9
         assert relative(one.unknowns, other.unknowns) < 3e-9
 
@@ -50,7 +50,7 @@ def test_quarter_half_and_full_pads_are_the_same(gap, element):
         part = pad_of(elements, symmetry, element=element)
         same = [where[tuple(np.round(x * 1e9).astype(int))] for x in part.nodes[part.front_nodes]]
         for one, other in zip(Press(part, gap).ladder(forces), whole, strict=True):
-            assert one.travel == pytest.approx(other.travel, rel=1e-10)
+            assert one.closing == pytest.approx(other.closing, rel=1e-10)
             assert relative(one.pressure, other.pressure[same]) < 1e-10
             assert relative(one.front, other.front[same]) < 1e-10
             assert one.points.force[2] / part.share == pytest.approx(other.points.force[2], rel=1e-12)
@@ -62,7 +62,7 @@ def test_the_path_does_not_matter():
     (at_once,) = Press(pad, OVAL).ladder([20.0])
     for forces in (FORCES, np.linspace(0.5, 20, 12), [5.0, 35.0, 20.0]):
         *_, last = Press(pad, OVAL).ladder(forces)
-        assert last.travel == pytest.approx(at_once.travel, rel=1e-9)
+        assert last.closing == pytest.approx(at_once.closing, rel=1e-9)
         assert relative(last.pressure, at_once.pressure) < 1e-9
         assert relative(last.unknowns, at_once.unknowns) < 1e-9
 
@@ -82,18 +82,18 @@ def test_the_same_ladder_twice_gives_the_same_bits():
     assert bits(first.ladder(FORCES)) == once
 
 
-def test_force_and_travel_control_are_inverse():
+def test_force_and_closing_control_are_inverse():
     press = Press(pad_of(), OVAL)
     for pressed in press.ladder(FORCES):
         for start in (None, pressed.unknowns):
-            x, force = press.at_travel(pressed.travel, start)
+            x, force = press.at_closing(pressed.closing, start)
             assert force == pytest.approx(pressed.force, rel=1e-8)
             assert relative(x, pressed.unknowns) < 1e-8
 
 
-def test_force_grows_with_travel():
+def test_force_grows_with_closing():
     press = Press(pad_of(), BALL)
-    forces = [press.at_travel(d)[1] for d in np.linspace(0.5e-3, 4e-3, 5)]
+    forces = [press.at_closing(d)[1] for d in np.linspace(0.5e-3, 4e-3, 5)]
     assert (np.diff(forces) > 0).all()
     assert (np.diff(forces, 2) > 0).all()  # the contact area grows
 
@@ -103,7 +103,7 @@ def test_units_do_not_matter():
     mm = pad_of(size=tuple(1e3 * s for s in SIZE), law=material("blatz_ko", G * 1e-6))
     gap = reference.placed(EllipticCylinder(25.0, 20.0, 100.0), reference.facing(25.0))
     for si, other in zip(Press(pad_of(), OVAL).ladder(FORCES), Press(mm, gap).ladder(FORCES), strict=True):
-        assert other.travel * 1e-3 == pytest.approx(si.travel, rel=1e-9)
+        assert other.closing * 1e-3 == pytest.approx(si.closing, rel=1e-9)
         assert relative(other.pressure * 1e6, si.pressure) < 1e-9
         assert other.iterations == si.iterations
 
@@ -113,7 +113,7 @@ def test_a_stiffer_foam_under_a_greater_force_deforms_the_same(factor):
     stiff = pad_of(law=material("blatz_ko", factor * G))
     scaled = Press(stiff, OVAL).ladder(factor * np.array(FORCES))
     for one, other in zip(Press(pad_of(), OVAL).ladder(FORCES), scaled, strict=True):
-        assert other.travel == pytest.approx(one.travel, rel=1e-9)
+        assert other.closing == pytest.approx(one.closing, rel=1e-9)
         assert relative(other.pressure, factor * one.pressure) < 1e-9
 
 
@@ -131,13 +131,13 @@ def test_other_materials_press_too(law):
     soft = list(Press(pad_of(), OVAL).ladder([0.05, 10.0]))
     own = list(Press(pad_of(law=law), OVAL).ladder([0.05, 10.0]))
     if law.law == "hyperfoam":
-        assert own[1].travel == pytest.approx(soft[1].travel, rel=1e-9)
+        assert own[1].closing == pytest.approx(soft[1].closing, rel=1e-9)
         assert relative(own[1].pressure, soft[1].pressure) < 1e-8
     elif law.law == "linear":
-        assert own[0].travel == pytest.approx(soft[0].travel, rel=0.02)
-        assert abs(own[1].travel / soft[1].travel - 1) > 0.02
+        assert own[0].closing == pytest.approx(soft[0].closing, rel=0.02)
+        assert abs(own[1].closing / soft[1].closing - 1) > 0.02
     else:
-        assert own[1].travel < soft[1].travel
+        assert own[1].closing < soft[1].closing
         assert own[1].checks.min_det_f > 0.95  # it hardly yields in volume
 
 
@@ -145,7 +145,7 @@ def test_a_confined_layer_pressed_by_a_plane():
     """A pad 40 times as wide as thick is confined but for its rim: ``F = G (l^-3 - 1)`` per area in the middle."""
     size = (0.4, 0.4, 0.01)
     pad = Pad(PadShape(size, (16, 16, 4), (0.1, 0.1, 1.0)), FOAM, (True, True))
-    x, force = (press := Press(pad, reference.plane)).at_travel(2e-3)
+    x, force = (press := Press(pad, reference.plane)).at_closing(2e-3)
     pressure, _, _ = press.problem.contact_state(x)
     exact = G * (0.8**-3 - 1)
     middle = np.linalg.norm(pad.nodes[pad.front_nodes][:, :2], axis=1) < 0.1
@@ -158,7 +158,7 @@ def test_a_confined_layer_pressed_by_a_plane():
 
 def pulls(press, x):
     """A node pulls, its neighbours press more: the forces still balance."""
-    p, area = x[press.pad.travel_dof + 1 :], press.pad.node_area
+    p, area = x[press.pad.closing_dof + 1 :], press.pad.node_area
     i, j = np.argsort(p)[-2:]
     p[j] += 1.1 * p[i] * area[i] / area[j]
     p[i] *= -0.1
@@ -173,11 +173,11 @@ def lifts(press, x):
 
 
 def is_unbalanced(press, x):
-    x[press.pad.travel_dof + 1 :] *= 1 + 1e-7
+    x[press.pad.closing_dof + 1 :] *= 1 + 1e-7
 
 
 def inner_dof(pad):
-    inside = (pad.nodes[:, 2] < -1e-6) & (pad.dofs[:, 2] < pad.travel_dof)
+    inside = (pad.nodes[:, 2] < -1e-6) & (pad.dofs[:, 2] < pad.closing_dof)
     return pad.dofs[np.flatnonzero(inside)[0], 2]
 
 
@@ -219,10 +219,10 @@ def test_wrong_states_are_refused_whatever_the_solver_says(tamper, words):
 def test_checks_of_a_right_state_are_small():
     for pressed in Press(pad_of(), OVAL).ladder(FORCES):
         checks = pressed.checks
-        assert max(checks.force_balance, checks.tension, checks.penetration, checks.complementarity) < 1e-11
+        assert max(checks.force_balance, checks.adhesion, checks.penetration, checks.complementarity) < 1e-11
         assert 0 < checks.min_det_f < 1
         assert 0 < checks.max_strain < 0.5
-        assert 0 < checks.acoustic < 1
+        assert 0 < checks.ellipticity < 1
 
 
 def test_failure_says_why_and_how_to_see_it():
@@ -230,7 +230,7 @@ def test_failure_says_why_and_how_to_see_it():
     with pytest.raises(
         ConvergenceError, match=r"DIVERGED_MAX_IT after 1 iterations at residual \d.*N; .*-contact_snes_monitor"
     ):
-        press.at_travel(2e-3)
+        press.at_closing(2e-3)
     with pytest.raises(ConvergenceError, match=r"no first contact for 5 N.*DIVERGED_MAX_IT"):
         list(press.ladder([5.0]))
 
@@ -247,12 +247,12 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     solve = short.solver.solve
     short.solver.solve = lambda x, tolerance, iterations=None: solve(x, tolerance, 3)
     pressed = next(ladder)
-    assert pressed.cuts > 0
+    assert pressed.halvings > 0
     assert pressed.steps > last.steps
     for state in (last, pressed):
-        assert state.travel == pytest.approx(free.travel, rel=1e-9)
+        assert state.closing == pytest.approx(free.closing, rel=1e-9)
         assert relative(state.pressure, free.pressure) < 1e-9
-    assert first.cuts == last.cuts == 0
+    assert first.halvings == last.halvings == 0
 
 
 def test_petsc_options_are_taken_back():
@@ -277,6 +277,6 @@ def test_the_ladder_goes_on_with_the_fallback_where_the_pad_has_no_solution():
     alone = list(Press(nodal, OVAL).ladder(FORCES))[1:]
     for pressed, expected in zip(rest, alone, strict=True):
         assert pressed.pad is nodal
-        assert pressed.travel == pytest.approx(expected.travel, rel=1e-9)
+        assert pressed.closing == pytest.approx(expected.closing, rel=1e-9)
         assert relative(pressed.pressure, expected.pressure) < 1e-9
-    assert rest[0].cuts > 0
+    assert rest[0].halvings > 0

@@ -73,17 +73,17 @@ def test_a_stiff_sheet_is_rigid():
 
 
 def test_a_slightly_soft_sheet_adds_its_own_deflection():
-    """To first order the travel grows by the sheet's mean deflection under the pad's even pressure on a plane."""
+    """To first order the closing grows by the sheet's mean deflection under the pad's even pressure on a plane."""
     law, force = material("neo_hookean", 0.04e6, 0.0), 1e-3
-    travel = {}
+    closing = {}
     for modulus in (None, 1e11):
         sheet = wings(modulus) if modulus else None
         (state,) = Press(pad_of(sheet, WHOLE, (10, 4, 2), law), reference.plane).ladder([force])
-        travel[modulus] = state.travel
+        closing[modulus] = state.closing
     lines = tuple(np.linspace(-0.025, 0.025, 11)), Y
     expected = relative_compliance(*lines, WHOLE, wings(1e11), SIZE[2] / law.young_modulus)
     assert 1e-3 < expected < 1e-2
-    assert travel[1e11] / travel[None] - 1.0 == pytest.approx(expected, rel=0.02)
+    assert closing[1e11] / closing[None] - 1.0 == pytest.approx(expected, rel=0.02)
 
 
 def test_a_sheet_that_is_no_larger_than_its_support_is_rigid():
@@ -102,11 +102,11 @@ def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
     where = {tuple(np.round(x * 1e9).astype(int)): i for i, x in enumerate(full.nodes[full.front_nodes])}
     same = [where[tuple(np.round(x * 1e9).astype(int))] for x in quarter.nodes[quarter.front_nodes]]
     for one, other in zip(*(Press(pad, gap).ladder([2.0, 8.0]) for pad in (quarter, full)), strict=True):
-        assert one.travel == pytest.approx(other.travel, rel=1e-9)
+        assert one.closing == pytest.approx(other.closing, rel=1e-9)
         assert np.abs(one.pressure - other.pressure[same]).max() < 1e-9 * other.pressure.max()
 
 
-@pytest.mark.parametrize("control", [Control(force=3.0), Control(travel=0.002)], ids=["force", "travel"])
+@pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.002)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control):
     pad = pad_of(PLASTIC, (True, False), (4, 2, 2))
     problem = ContactProblem(pad, BALL)

@@ -39,7 +39,7 @@ def test_nonlinear_table(name):
     found = np.array([case.read(state.q) for state in states])
     # printed with three digits: half a unit of the last one is theirs
     assert (np.abs(found - rows[:, 1:]) <= table["tol_rel"] * rows[:, 1:] + 0.0005).all()
-    assert sum(state.cuts for state in states) == 0
+    assert sum(state.halvings for state in states) == 0
 
 
 @pytest.mark.parametrize("name", NONLINEAR)
@@ -47,7 +47,7 @@ def test_full_load_in_one_step(name):
     """Guard on the tangent of mixed integration points: the plain one takes hundreds of iterations, or fails."""
     table, case = TABLES[name], NONLINEAR[name]()
     (state,) = load_steps(problem(case), [1.0])
-    assert (state.iterations, state.cuts) <= (20, 0)
+    assert (state.iterations, state.halvings) <= (20, 0)
     assert case.read(state.q) == pytest.approx(table["table"][-1][1:], rel=table["tol_rel"])
 
 

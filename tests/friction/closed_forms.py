@@ -42,7 +42,7 @@ class Form:
     f_y: float
     tau_z: float
     order: float = 2.0
-    model: str = "curved"
+    model: str = "ccm"
     arcs: Callable[[int], np.ndarray] | None = None
 
 
@@ -112,7 +112,7 @@ def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
     """Unit cylinder along x; the unrolled arms make it the rectangle of its surface."""
     args = {"R": 1.0, "alpha": alpha, "L": L}
     S, F_N = 2 * alpha * L, 2 * sin(alpha) * L
-    curved = model == "curved"
+    curved = model == "ccm"
     tau = S * mean_distance(L, 2 * alpha) if model == "unrolled" else cylinder_torque(1, 1, alpha, L, not curved)
 
     def arcs(n: int) -> np.ndarray:
@@ -124,7 +124,7 @@ def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
 
 def elliptic_cylinder(model: str, a: float = 2.0, b: float = 1.0, tm: float = 1.0, L: float = 2.0) -> Form:
     S, F_N = 2 * L * b * ellipeinc(tm, 1 - (a / b) ** 2), 2 * L * b * sin(tm)
-    curved = model == "curved"
+    curved = model == "ccm"
     tau = S * mean_distance(L, S / L) if model == "unrolled" else cylinder_torque(a, b, tm, L, not curved)
 
     def arcs(n: int) -> np.ndarray:
@@ -138,8 +138,8 @@ def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
     """Two rectangles that meet in a ridge along x."""
     S, c = 2 * W * L, cos(tilt)
     arm = {
-        "curved": c * mean_distance(L, 2 * W),
-        "flat": mean_distance(L, 2 * W * c),
+        "ccm": c * mean_distance(L, 2 * W),
+        "pcm": mean_distance(L, 2 * W * c),
         "unrolled": mean_distance(L, 2 * W),
     }[model]
 
@@ -147,14 +147,14 @@ def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
         return arc_lengths("wedge", {"W": W, "L": L, "nw": n, "nx": 2 * n})
 
     patch = lambda n: wedge(tilt, W, L, n, 2 * n)  # noqa: E731
-    f_y = c * S if model == "curved" else S
+    f_y = c * S if model == "ccm" else S
     return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model, arcs if model == "unrolled" else None)
 
 
 def flat_cap(model: str, alpha: float = ALPHA) -> Form:
     """Planar models of the uniform cap: flat has the curved model's torque, unrolled longer arms."""
     S = 2 * pi * (1 - cos(alpha))
-    tau = pi * (alpha - sin(alpha) * cos(alpha)) if model == "flat" else 2 * pi * (sin(alpha) - alpha * cos(alpha))
+    tau = pi * (alpha - sin(alpha) * cos(alpha)) if model == "pcm" else 2 * pi * (sin(alpha) - alpha * cos(alpha))
     F_N = pi * sin(alpha) ** 2
 
     def arcs(n: int) -> np.ndarray:
@@ -194,15 +194,15 @@ FORMS = {
     "cap, root of the depth": replace(
         cap(lambda t: math.sqrt(max(0, 1 - (1 - cos(t)) / DEPTH)), "hertzdepth", h=DEPTH), order=1.5
     ),
-    "cap, flat": flat_cap("flat"),
+    "cap, flat": flat_cap("pcm"),
     "cap, unrolled": flat_cap("unrolled"),
-    "cylinder": cylinder("curved"),
-    "cylinder, flat": cylinder("flat"),
+    "cylinder": cylinder("ccm"),
+    "cylinder, flat": cylinder("pcm"),
     "cylinder, unrolled": cylinder("unrolled"),
-    "elliptic cylinder": elliptic_cylinder("curved"),
-    "elliptic cylinder, flat": elliptic_cylinder("flat"),
+    "elliptic cylinder": elliptic_cylinder("ccm"),
+    "elliptic cylinder, flat": elliptic_cylinder("pcm"),
     "elliptic cylinder, unrolled": elliptic_cylinder("unrolled"),
-    "wedge": roof("curved"),
-    "wedge, flat": roof("flat"),
+    "wedge": roof("ccm"),
+    "wedge, flat": roof("pcm"),
     "wedge, unrolled": roof("unrolled"),
 }

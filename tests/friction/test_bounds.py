@@ -32,7 +32,7 @@ def patches(draw):
 @given(patches(), arrays(float, (5, 3), elements=COMPONENT))
 def test_projected_is_inside_curved_is_inside_flat(patch, twist):
     """Face by face: the shadow of a tilted friction disc is an ellipse with semi-axes 1 and n_z."""
-    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("projected", "curved", "flat"))
+    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("pcm_projected", "ccm", "pcm"))
     slack = ROUNDING * np.maximum(flat, patch.load.sum())
     assert (projected <= curved + slack).all()
     assert (curved <= flat + slack).all()
@@ -64,7 +64,7 @@ def test_three_motions_give_the_largest_force_and_torque(patch):
 def test_tilted_faces_leave_room_between_the_models(seed):
     """The bounds are strict where normals and pressures are generic: 60 faces, 200 motions."""
     patch, twist = lcg_patch(seed, 60), fibonacci_twists(200, rho=2.0)
-    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("projected", "curved", "flat"))
+    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("pcm_projected", "ccm", "pcm"))
     assert (curved / projected).min() > 1.001
     assert (flat / curved).min() > 1.001
 
@@ -72,7 +72,7 @@ def test_tilted_faces_leave_room_between_the_models(seed):
 def test_a_cylinder_touches_both_bounds():
     """Along its axis it carries as much as the flat model, across as little as the projected one."""
     patch, slide = cylinder_grid(0.03, 1.0, 0.05, 30, 10), np.stack([SLIDE_X, SLIDE_Y, TURN_Z])
-    projected, curved, flat = (friction_support(patch, slide, 0.8, m) for m in ("projected", "curved", "flat"))
+    projected, curved, flat = (friction_support(patch, slide, 0.8, m) for m in ("pcm_projected", "ccm", "pcm"))
     assert curved[0] == pytest.approx(flat[0], rel=1e-13)
     assert curved[1] == pytest.approx(projected[1], rel=1e-13)
     assert projected[2] * 1.01 < curved[2] < flat[2] / 1.01

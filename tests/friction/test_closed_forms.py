@@ -43,11 +43,11 @@ def test_the_closed_forms_are_those_of_the_books():
     assert FORMS["cap"].F_N == pytest.approx(FORMS["cap, flat"].F_N)
 
 
-@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.model == "curved"])
+@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.model == "ccm"])
 def test_the_projected_model_carries_the_normal_force(name):
     """Each face weighs ``p a n_z``: both forces are F_N whatever the shape, and the normalised parameter is flat."""
     patch = FORMS[name].patch(16)
-    limits = friction_limits(patch, 1.0, "projected")
+    limits = friction_limits(patch, 1.0, "pcm_projected")
     assert limits.f_x == pytest.approx(limits.F_N, rel=1e-13)
     assert limits.f_y == pytest.approx(limits.F_N, rel=1e-13)
     arm = np.hypot(patch.centroid[:, 0], patch.centroid[:, 1])
@@ -59,8 +59,8 @@ def test_unrolled_arms_are_the_longest():
     args = {"R": 1.0, "alpha": ALPHA, "L": 2.0, "nphi": 64, "nx": 64}
     patch = cylinder_grid(**args)
     e_n = [
-        friction_limits(patch, 1.0, "curved").e_n,
-        friction_limits(patch, 1.0, "flat").e_n,
+        friction_limits(patch, 1.0, "ccm").e_n,
+        friction_limits(patch, 1.0, "pcm").e_n,
         friction_limits(patch, 1.0, "unrolled", arc_lengths("cylinder_grid", args)).e_n,
     ]
     assert e_n[2] == pytest.approx(mean_distance(2, 2 * ALPHA), rel=3e-4)
@@ -95,7 +95,7 @@ def test_what_a_planar_model_claims_too_much_on_elliptic_cylinders(ratio, f_y, t
     """
     b = 1 / ratio
     patch = ellcyl_grid(1.0, b, math.asin(0.3 / b), 1.0, 80, 80)
-    curved, flat = friction_limits(patch, 1.0), friction_limits(patch, 1.0, "flat")
+    curved, flat = friction_limits(patch, 1.0), friction_limits(patch, 1.0, "pcm")
     assert flat.f_x == pytest.approx(curved.f_x, rel=1e-12)
     digit = 1e-3 if f_y > 0.05 else 1e-4
     assert 1 - curved.f_y / flat.f_y == pytest.approx(f_y, abs=0.51 * digit)

@@ -120,7 +120,7 @@ def test_share_of_the_torque_about_the_centre_of_pressure(name):
     assert ratio == pytest.approx(share, abs=0.5e-4)
 
 
-@pytest.mark.parametrize("model", ["curved", "flat", "projected"])
+@pytest.mark.parametrize("model", ["ccm", "pcm", "pcm_projected"])
 def test_the_share_does_not_depend_on_units_or_on_friction(model):
     patch = lcg_patch(3, 40)
     one = pure_torque(patch, 1.0, model)

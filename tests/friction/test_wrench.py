@@ -65,19 +65,19 @@ def test_flipped_and_overhanging_normals_do_not_disturb_the_curved_model():
     flipped = replace(patch, normal=sign * patch.normal)
     one, two = friction_limits(patch, 0.5), friction_limits(flipped, 0.5)
     assert (one.f_x, one.f_y, one.tau_z) == (two.f_x, two.f_y, two.tau_z)
-    projected = friction_limits(flipped, 0.5, "projected")
-    assert projected.tau_z == friction_limits(patch, 0.5, "projected").tau_z
+    projected = friction_limits(flipped, 0.5, "pcm_projected")
+    assert projected.tau_z == friction_limits(patch, 0.5, "pcm_projected").tau_z
     assert abs(two.F_N) < 0.2 * one.F_N
 
 
 def test_a_turn_of_a_cap_costs_no_friction_to_curvature():
     """A sphere turning about its axis slides along itself: curved and flat agree face by face."""
     patch = cap_polar(0.03, 1.0, 8, 24)
-    assert friction_limits(patch, 0.7).tau_z == pytest.approx(friction_limits(patch, 0.7, "flat").tau_z, rel=1e-14)
+    assert friction_limits(patch, 0.7).tau_z == pytest.approx(friction_limits(patch, 0.7, "pcm").tau_z, rel=1e-14)
 
 
 def test_planar_models_have_no_force_out_of_their_plane():
-    W = friction_wrench(lcg_patch(3, 30), np.random.default_rng(1).normal(size=(9, 6)), 0.5, "flat")
+    W = friction_wrench(lcg_patch(3, 30), np.random.default_rng(1).normal(size=(9, 6)), 0.5, "pcm")
     np.testing.assert_array_equal(W[:, [2, 3, 4]], 0)
 
 

@@ -60,17 +60,17 @@ def linked(path, link):
 
 def external(file):
     """Data that stand in another file."""
-    shape = file["study/e_n/curved"].shape
-    del file["study/e_n/curved"]
-    file["study/e_n"].create_dataset("curved", shape, "<f8", external=[("/etc/passwd", 0, 8 * int(np.prod(shape)))])
+    shape = file["study/e_n/ccm"].shape
+    del file["study/e_n/ccm"]
+    file["study/e_n"].create_dataset("ccm", shape, "<f8", external=[("/etc/passwd", 0, 8 * int(np.prod(shape)))])
 
 
 def virtual(file):
-    shape = file["study/e_n/curved"].shape
-    del file["study/e_n/curved"]
+    shape = file["study/e_n/ccm"].shape
+    del file["study/e_n/ccm"]
     layout = h5py.VirtualLayout(shape, "<f8")
     layout[...] = h5py.VirtualSource("other.h5", "d", shape=shape)
-    file["study/e_n"].create_virtual_dataset("curved", layout)
+    file["study/e_n"].create_virtual_dataset("ccm", layout)
 
 
 def enormous(path):
@@ -126,24 +126,24 @@ SCENE = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm =
 DERIVED = {"name": "x", "units": "", "long_name": "", "definition": "", "axes": [], "shape": []}
 DEEP = "[" * 100_000
 LIES = {
-    "external link": linked("study/e_n/curved", h5py.ExternalLink("/etc/hosts", "/x")),
-    "soft link": linked("study/e_n/curved", h5py.SoftLink("/study/e_n/flat")),
-    "soft link to nothing": linked("study/e_n/curved", h5py.SoftLink("/nowhere")),
-    "soft link to itself": linked("study/e_n/curved", h5py.SoftLink("/study/e_n/curved")),
+    "external link": linked("study/e_n/ccm", h5py.ExternalLink("/etc/hosts", "/x")),
+    "soft link": linked("study/e_n/ccm", h5py.SoftLink("/study/e_n/pcm")),
+    "soft link to nothing": linked("study/e_n/ccm", h5py.SoftLink("/nowhere")),
+    "soft link to itself": linked("study/e_n/ccm", h5py.SoftLink("/study/e_n/ccm")),
     "external group": linked("study/fingers", h5py.ExternalLink("other.h5", "/")),
     "external data": external,
     "virtual data": virtual,
-    "enormous map": enormous("study/e_n/curved"),
+    "enormous map": enormous("study/e_n/ccm"),
     "enormous axis": enormous("study/axes/station"),
     "enormous scene": enormous("study/scene"),
     "enormous states": enormous("study/status/code"),
     "recursive group": loop,
-    "a map of texts": data("study/e_n/curved", np.array(["a", "b"], object)),
-    "a map of integers": data("study/e_n/curved", np.zeros((5, 6, 4), int)),
-    "a map of records": data("study/e_n/curved", np.zeros((5, 6, 4), [("a", "f8")])),
-    "a map of another shape": data("study/e_n/curved", np.zeros((5, 6, 5))),
-    "a map without shape": data("study/e_n/curved", h5py.Empty("f8")),
-    "a group for a map": lambda file: (file["study/e_n"].pop("curved"), file.create_group("study/e_n/curved")),
+    "a map of texts": data("study/e_n/ccm", np.array(["a", "b"], object)),
+    "a map of integers": data("study/e_n/ccm", np.zeros((5, 6, 4), int)),
+    "a map of records": data("study/e_n/ccm", np.zeros((5, 6, 4), [("a", "f8")])),
+    "a map of another shape": data("study/e_n/ccm", np.zeros((5, 6, 5))),
+    "a map without shape": data("study/e_n/ccm", h5py.Empty("f8")),
+    "a group for a map": lambda file: (file["study/e_n"].pop("ccm"), file.create_group("study/e_n/ccm")),
     "a dataset for a group": data("study/fingers", np.zeros(3)),
     "no maps": lambda file: file["study"].pop("e_n"),
     "no status": lambda file: file["study"].pop("status"),

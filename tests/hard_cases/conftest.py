@@ -7,11 +7,11 @@ from pathlib import Path
 from tests.hard_cases.hard_case import CASES, HardCase, Outcome
 from tests.hard_cases.verdict import Verdict
 
-HEAD = ("class", "case", "outcome", "its.", "cuts", "s", "balance", "tension", "penetr.", "det F", "acoustic",
+HEAD = ("class", "case", "outcome", "its.", "halvings", "s", "balance", "adhesion", "penetr.", "det F", "ellipticity",
         "agrees to", "verdict")  # fmt: skip
 INTRODUCTION = """# Hard cases
 
-Written by `make hard-cases` from `tests/hard_cases/cases.toml`. its., cuts: Newton iterations and shortened steps;
+Written by `make hard-cases` from `tests/hard_cases/cases.toml`. its., halvings: Newton iterations and shortened steps;
 balance of the force, tension over the largest pressure, penetration over an element's size, smallest det F and smallest
 eigenvalue of the acoustic tensor over the shear modulus (not positive: the foam has lost ellipticity): the worst of all
 forces and both fingers; agrees to: largest relative difference to the same case posed in another way.
@@ -23,10 +23,10 @@ _rows: dict[str, list[str]] = {}
 def row(case: HardCase, found: Outcome, verdict: Verdict) -> list[str]:
     """Cells of one case."""
     some = bool(found.done.any())
-    sizes = [f"{found.checks[name]:.0e}" if some else "" for name in ("force_balance", "tension", "penetration")]
-    numbers = [f"{found.checks[name]:.3g}" if some else "" for name in ("min_det_f", "acoustic")]
+    sizes = [f"{found.checks[name]:.0e}" if some else "" for name in ("force_balance", "adhesion", "penetration")]
+    numbers = [f"{found.checks[name]:.3g}" if some else "" for name in ("min_det_f", "ellipticity")]
     agrees = "" if verdict.difference is None else f"{verdict.difference:.0e} of {verdict.within:.0e}"
-    work = [str(found.iterations), str(found.cuts)] if some else ["", ""]
+    work = [str(found.iterations), str(found.halvings)] if some else ["", ""]
     seconds = f"{found.seconds:.1f}" if some else ""
     return [
         case.kind,

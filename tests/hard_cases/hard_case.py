@@ -24,7 +24,7 @@ from softjaw.study.scene.text import toml_text
 FOLDER = Path(__file__).parent
 MAPS = {q.name: q for q in quantities(NEEDS) if q.group == "maps"}
 WHOLE = {"object": ("shape",), "candidates": sum(ALTERNATIVES, ())}  # keys that make a section replace its base's
-CHECKS = {"force_balance": max, "tension": max, "penetration": max, "min_det_f": min, "acoustic": min}
+CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Same:
 
     case: str
     within: float
-    quantities: tuple[str, ...] = ("travel", "e_n", "S")
+    quantities: tuple[str, ...] = ("closing", "e_n", "S")
     length: float = 1.0
     force: float = 1.0
 
@@ -65,7 +65,7 @@ class HardCase:
     base: str = "plain"
     expect: str = "solved"
     reason: str = ""
-    remark: str = ""
+    note: str = ""
     up_to_n: float = 0.0
     quick: bool = False
     same_as: Same | None = None
@@ -84,9 +84,9 @@ class Outcome:
     forces, done : (n,) arrays
         Force of every row [N], and whether it was solved.
     messages : tuple of str
-        Remark or reason of every row.
-    iterations, cuts, seconds : numbers
-        Newton iterations, step cuts and time of the solved rows, both fingers.
+        Note or reason of every row.
+    iterations, halvings, seconds : numbers
+        Newton iterations, step halvings and time of the solved rows, both fingers.
     checks : dict
         The worst value of every check over rows and fingers.
     maps, errors : dict
@@ -98,7 +98,7 @@ class Outcome:
     done: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     messages: tuple[str, ...] = ()
     iterations: int = 0
-    cuts: int = 0
+    halvings: int = 0
     seconds: float = 0.0
     checks: dict[str, float] = field(default_factory=dict)
     maps: dict[str, np.ndarray] = field(default_factory=dict)
@@ -182,6 +182,7 @@ def _outcome(forces: tuple[float, ...], results: tuple[CaseResult | CaseFailure,
     checks = {name: worst(x for v in good for x in v[f"checks/{name}"]) for name, worst in CHECKS.items() if good}
     return Outcome(
         "", np.array(forces), np.array([isinstance(r, CaseResult) for r in results]),
-        tuple(r.message for r in results), int(total("newton_iterations")), int(total("cuts")), total("seconds_total"),
+        tuple(r.message for r in results), int(total("newton_iterations")), int(total("step_halvings")),
+        total("seconds_total"),
         checks, maps(""), maps("_error"),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from tests.hard_cases.conftest import ROW, row, table_text
 from tests.hard_cases.hard_case import CASES, HardCase, Known, Outcome, Same, outcome, scene_of
 from tests.hard_cases.verdict import FINITE, Verdict, judge
 
-GOOD = {"force_balance": 0.0, "tension": 0.0, "penetration": 0.0, "min_det_f": 0.9, "acoustic": 0.9}
+GOOD = {"force_balance": 0.0, "adhesion": 0.0, "penetration": 0.0, "min_det_f": 0.9, "ellipticity": 0.9}
 
 
 NAMES = [pytest.param(case.name, marks=() if case.quick else pytest.mark.long) for case in CASES.values()]
@@ -53,14 +53,14 @@ def wrong(found, **keys):
 
 def test_what_is_right_is_ok():
     assert wrong(solved()) == ""
-    assert wrong(solved(messages=("", "it slips")), remark="slips") == ""
+    assert wrong(solved(messages=("", "it slips")), note="slips") == ""
     assert wrong(Outcome(refused="mu is wrong"), expect="refused", reason="mu") == ""
     failed = solved(messages=("", "the wall collapsed"), done=(True, False))
     assert wrong(failed, expect="failed", reason="collapsed", up_to_n=1.0) == ""
     assert wrong(solved(0.0101), same_as=Same("other", 0.02)) == ""
     assert wrong(solved(), known=Known("e_n", 0.01, 1e-6)) == ""
-    lost = solved(messages=(Flag.UNSTABLE.sentence, ""), checks=GOOD | {"acoustic": -0.1})
-    assert wrong(lost, remark="ellipticity") == ""
+    lost = solved(messages=(Flag.UNSTABLE.sentence, ""), checks=GOOD | {"ellipticity": -0.1})
+    assert wrong(lost, note="ellipticity") == ""
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,12 @@ def test_what_is_right_is_ok():
         (solved(messages=("x", "x"), done=(False, False)), {"expect": "failed", "reason": "x", "up_to_n": 1.0},
          "not solved at 1 N"),
         (solved(messages=("coarse", "")), {}, "remarked, but not expected: coarse"),
-        (solved(messages=("coarse; slips", "")), {"remark": "coarse"}, "remarked, but not expected: slips"),
-        (solved(), {"remark": "coarse"}, "'coarse' is not remarked"),
+        (solved(messages=("coarse; slips", "")), {"note": "coarse"}, "remarked, but not expected: slips"),
+        (solved(), {"note": "coarse"}, "'coarse' is not remarked"),
         (solved(checks=GOOD | {"force_balance": 1e-6}), {}, "force_balance is 1.0e-06"),
-        (solved(checks=GOOD | {"tension": np.nan}), {}, "tension is nan"),
+        (solved(checks=GOOD | {"adhesion": np.nan}), {}, "tension is nan"),
         (solved(checks=GOOD | {"min_det_f": -0.1}), {}, "an element is inverted"),
-        (solved(checks=GOOD | {"acoustic": -0.1}), {}, "lost ellipticity"),
+        (solved(checks=GOOD | {"ellipticity": -0.1}), {}, "lost ellipticity"),
         (solved(np.nan), {}, "a map is not finite: e_n"),
         (solved(0.011), {"same_as": Same("other", 0.02)}, "1.0e-01 apart"),
         (solved(0.011), {"known": Known("e_n", 0.01, 0.05)}, "off its closed form"),
@@ -89,7 +89,7 @@ def test_what_is_wrong_is_found(found, keys, words):
 
 def test_scales_and_mesh_errors_count_in_a_comparison():
     scaled = solved(0.02)
-    scaled.maps["travel"], scaled.maps["S"] = 2 * scaled.maps["travel"], 4 * scaled.maps["S"]
+    scaled.maps["closing"], scaled.maps["S"] = 2 * scaled.maps["closing"], 4 * scaled.maps["S"]
     assert wrong(scaled, same_as=Same("other", 1e-9, length=2.0, force=4.0)) == ""
     assert "e_n is 0.02" in wrong(scaled, same_as=Same("other", 1e-9, ("e_n",)))
     error = {"e_n": np.array([0.03, 0.03])}

@@ -19,8 +19,8 @@ from tests.fem import reference
 STUCK = ConvergenceError("stuck at 3 N")
 
 
-def foam(det, strain, acoustic):
-    return SimpleNamespace(strains=lambda x, directions: (det, strain, acoustic))
+def foam(det, strain, ellipticity):
+    return SimpleNamespace(strains=lambda x, directions: (det, strain, ellipticity))
 
 
 @pytest.mark.parametrize(
@@ -38,8 +38,8 @@ def test_the_state_of_the_foam_is_the_reason_where_it_is(state, error, words):
     assert str(error) in str(told.value)
 
 
-def test_a_travel_that_falls_while_the_force_grows_is_refused():
-    with pytest.raises(CheckError, match=r"the travel falls from 23 mm at 1 N to 12 mm at 4 N"):
+def test_a_closing_that_falls_while_the_force_grows_is_refused():
+    with pytest.raises(CheckError, match=r"the closing displacement falls from 23 mm at 1 N to 12 mm at 4 N"):
         refuse_fall((1.0, 0.023), (4.0, 0.012))
     refuse_fall((4.0, 0.023), (1.0, 0.012))  # on the way back
     refuse_fall((1.0, 0.0100), (1.1, 0.0098))  # weighted and nodal gaps differ by as much

@@ -12,10 +12,10 @@ from softjaw.fem.contact import checks
 from softjaw.study.flags import Flag
 from tests.hard_cases.hard_case import HardCase, Outcome
 
-FINITE = ("travel", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
+FINITE = ("closing", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
 LIMITS = {
     "force_balance": checks.BALANCE,
-    "tension": checks.TENSION,
+    "adhesion": checks.ADHESION,
     "penetration": checks.PENETRATION,
 }
 
@@ -60,7 +60,7 @@ def _outcome(case: HardCase, found: Outcome) -> Iterator[str]:
 
 
 def _solved(case: HardCase, found: Outcome) -> Iterator[str]:
-    """Judge the forces that were solved: laws, numbers, remarks."""
+    """Judge the forces that were solved: laws, numbers, notes."""
     if not found.done.any():
         return
     told = [m for m, good in zip(found.messages, found.done, strict=True) if good]
@@ -70,14 +70,14 @@ def _solved(case: HardCase, found: Outcome) -> Iterator[str]:
             yield f"{name} is {found.checks[name]:.1e}, above {limit:.0e}, without a flag"
     if not found.checks["min_det_f"] > 0:
         yield f"an element is inverted: det F = {found.checks['min_det_f']:.2g}"
-    if not found.checks["acoustic"] > 0 and Flag.UNSTABLE.sentence not in parts:
-        yield "the foam lost ellipticity, and no remark says so"
+    if not found.checks["ellipticity"] > 0 and Flag.UNSTABLE.sentence not in parts:
+        yield "the foam lost ellipticity, and no note says so"
     if any(not np.isfinite(found.maps[name]).all() for name in FINITE):
         yield "a map is not finite: " + ", ".join(n for n in FINITE if not np.isfinite(found.maps[n]).all())
-    if strange := [part for part in parts if not case.remark or not re.search(case.remark, part)]:
+    if strange := [part for part in parts if not case.note or not re.search(case.note, part)]:
         yield f"remarked, but not expected: {'; '.join(strange)}"
-    if case.remark and not any(re.search(case.remark, part) for part in parts):
-        yield f"'{case.remark}' is not remarked"
+    if case.note and not any(re.search(case.note, part) for part in parts):
+        yield f"'{case.note}' is not remarked"
 
 
 def _known(case: HardCase, found: Outcome) -> Iterator[str]:

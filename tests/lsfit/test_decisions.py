@@ -14,11 +14,11 @@ from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import ExactSurface, hull_volume
 from softjaw.lsfit.closed import Closed, closed
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.flag import FitError, FitFlag, OpenBodyError, UndecidedError
 from softjaw.lsfit.form import exponents, substitute
 from softjaw.lsfit.geometry import directions
 from softjaw.lsfit.gram import ball_gram, gram_certificate, gram_map
-from softjaw.lsfit.misfit import misfit
 from softjaw.lsfit.quartic import Quartic, convex_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.six import convex_span_quartic, six_samples, span_quartic
@@ -319,11 +319,11 @@ def test_the_exact_surface_of_one_face_is_flat_and_that_of_two_is_not():
 def test_a_wrench_that_is_the_rounding_of_none_is_left_out():
     """Margin 1e-12 of the largest: one such sample had a radius of 1e17."""
     surface = convex_quartic(*ONE).surface
-    whole = misfit(surface, *ONE)
+    whole = fit_error(surface, *ONE)
 
     def decide(rng):
         W = np.vstack([ONE[0], 1e-17 * rng.integers(0, 2) * rng.normal(size=(1, 3))])
-        return misfit(surface, W, np.vstack([ONE[1], [[0, 0, 1]]])) == whole
+        return fit_error(surface, W, np.vstack([ONE[1], [[0, 0, 1]]])) == whole
 
     assert outcomes(decide) == {True: TURNS}
 
@@ -333,7 +333,7 @@ def test_a_motion_against_a_flat_body_is_at_a_right_angle_to_its_normals():
 
     def decide(rng):
         B = turn(rng)[:, :2]
-        return round(misfit(TiltedEllipsoid.of_ball(B), [B[:, 0]], [-B[:, 0]]).Edir, 6)
+        return round(fit_error(TiltedEllipsoid.of_ball(B), [B[:, 0]], [-B[:, 0]]).Edir, 6)
 
     assert outcomes(decide) == {90.0: TURNS}
 
@@ -345,6 +345,6 @@ def test_a_polynomial_that_is_zero_at_a_sample_is_endless_there():
     def decide(rng):
         R = turn(rng)
         surface = Quartic(shaken(rng, substitute(cylinder, E, R.T)), E)
-        return misfit(surface, [R[:, 2]], [R[:, 0]]).Erad
+        return fit_error(surface, [R[:, 2]], [R[:, 0]]).Erad
 
     assert outcomes(decide) == {np.inf: TURNS}

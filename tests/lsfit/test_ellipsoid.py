@@ -7,7 +7,7 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import body_volume, hull_volume, shadow_area
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.misfit import misfit
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 
@@ -24,7 +24,7 @@ def test_an_ellipsoid_fits_itself():
     W, T = on_the_surface()
     ellipsoid = Ellipsoid(AXES)
     np.testing.assert_allclose(ellipsoid.value(W), 1, rtol=1e-14)
-    np.testing.assert_allclose(misfit(ellipsoid, W, T), 0, atol=1e-13)
+    np.testing.assert_allclose(fit_error(ellipsoid, W, T), 0, atol=1e-13)
     np.testing.assert_allclose(ellipsoid.support(T), (W * T).sum(axis=1), rtol=1e-14)
     assert all(ellipsoid.holds(w) for w in W * (1 - 1e-9))
     assert not any(ellipsoid.holds(w) for w in W * (1 + 1e-9))
@@ -40,7 +40,7 @@ def test_the_gradient_is_the_derivative_of_the_value():
 def test_errors_of_a_swollen_ellipsoid():
     """Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1."""
     W, T = on_the_surface()
-    errors = misfit(Ellipsoid(1.1 * AXES), W, T)
+    errors = fit_error(Ellipsoid(1.1 * AXES), W, T)
     np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
 
 

@@ -13,10 +13,10 @@ from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import ExactSurface, body_volume
 from softjaw.lsfit.certificate import certify
 from softjaw.lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.flag import FitError, FitFlag
 from softjaw.lsfit.geometry import directions
 from softjaw.lsfit.lowest import lowest_eigenvalues, smallest_eigenvalue
-from softjaw.lsfit.misfit import misfit
 from softjaw.lsfit.quartic import Quartic, convex_quartic, least_squares_quartic
 from softjaw.lsfit.round import ball_coefficients
 from softjaw.lsfit.samples import normalised_samples, sample_rank
@@ -88,7 +88,7 @@ def test_errors_and_volumes_of_known_patches(name):
     W, T = samples(patch, 500, rho)
     limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, rho]
     models = Ellipsoid(limits), full_ellipsoid(W), least_squares_quartic(W, T, gamma=0)
-    found = np.array([misfit(model, W, T) for model in models])
+    found = np.array([fit_error(model, W, T) for model in models])
     np.testing.assert_allclose(found - numbers(errors), 0, atol=0.06)
     np.testing.assert_allclose((found - numbers(errors))[:, :2], 0, atol=6e-5)
     assert smallest_eigenvalue(models[2].coefficients, 3) == pytest.approx(eigenvalue, abs=0.06)
@@ -104,8 +104,8 @@ def test_only_two_points_need_the_programme(name):
     assert (fit.flag, fit.rank) == (FitFlag.CLEAN, 3)
     if name == "two points":
         assert fit.certificate.by == "semidefinite programme"
-        np.testing.assert_allclose(misfit(fit.surface, W, T), [0.0129, 0.0033, 6.62], atol=6e-3)
-        np.testing.assert_allclose(misfit(fit.surface, W, T)[:2], [0.0129, 0.0033], atol=6e-5)
+        np.testing.assert_allclose(fit_error(fit.surface, W, T), [0.0129, 0.0033, 6.62], atol=6e-3)
+        np.testing.assert_allclose(fit_error(fit.surface, W, T)[:2], [0.0129, 0.0033], atol=6e-5)
         assert fit.objective > fit.least_objective
     else:
         assert fit.certificate.by == "least squares"
@@ -132,7 +132,7 @@ def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, ampl
         warnings.simplefilter("error")
         fit = convex_quartic(W, T, gamma=gamma)
         surfaces = fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)
-        sizes = [(*s.semi_axes, s.volume, s.shadow_area, *misfit(s, W, T)[1:]) for s in surfaces]
+        sizes = [(*s.semi_axes, s.volume, s.shadow_area, *fit_error(s, W, T)[1:]) for s in surfaces]
     assert np.isfinite(sizes).all()
     assert fit.certificate.gram_eigenvalue > 0
     assert fit.certificate.smallest_eigenvalue > 0
@@ -214,23 +214,23 @@ def test_a_convex_quartic_finds_itself():
     T = surface.gradient(W)
     fit = convex_quartic(W, T / np.linalg.norm(T, axis=1, keepdims=True))
     np.testing.assert_allclose(fit.surface.coefficients, surface.coefficients, rtol=1e-8, atol=1e-9)
-    np.testing.assert_allclose(misfit(fit.surface, W, T / np.linalg.norm(T, axis=1, keepdims=True)), 0, atol=1e-8)
+    np.testing.assert_allclose(fit_error(fit.surface, W, T / np.linalg.norm(T, axis=1, keepdims=True)), 0, atol=1e-8)
 
 
 def test_directions_of_motion_improve_directions():
     W, T = samples(PATCHES["Gauss"][0], 60)
     far, near = (convex_quartic(W, T, gamma=g).surface for g in (0.0, 1.0))
     test = samples(PATCHES["Gauss"][0], 333)
-    assert misfit(near, *test).Edir < misfit(far, *test).Edir
-    assert misfit(near, *test).Erad > misfit(far, *test).Erad
+    assert fit_error(near, *test).Edir < fit_error(far, *test).Edir
+    assert fit_error(near, *test).Erad > fit_error(far, *test).Erad
 
 
 def test_the_grid_of_the_paper_flatters_its_own_fit():
     """Errors on evenly spread motions are several times those on the grid, which hardly samples large torques."""
     disc = disc_polar(1, 40, 96)
     W, T = samples(disc, twist=cor_grid(21, 2.0))
-    own = [misfit(f, W, T).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
-    even = [misfit(f, *samples(disc)).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
+    own = [fit_error(f, W, T).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
+    even = [fit_error(f, *samples(disc)).E1 for f in (full_ellipsoid(W), convex_quartic(W, T, gamma=0).surface)]
     np.testing.assert_allclose(own, [0.0040, 0.0003], atol=6e-5)
     assert (np.array(even) > 3 * np.array(own)).all()
 
@@ -256,7 +256,7 @@ def test_one_face_gives_a_flat_fit():
         assert (surface.rank, surface.volume) == (2, 0)
         np.testing.assert_allclose(surface.semi_axes, [1, 1, 0], atol=1e-12)
         assert surface.shadow_area == pytest.approx(np.pi, rel=1e-12)
-        np.testing.assert_allclose(misfit(surface, W, T), 0, atol=1e-6)
+        np.testing.assert_allclose(fit_error(surface, W, T), 0, atol=1e-6)
 
 
 def test_colinear_centres_of_rotation_are_flagged():
@@ -268,7 +268,7 @@ def test_colinear_centres_of_rotation_are_flagged():
         assert surface.flag & FitFlag.RANK_DEFICIENT
         assert (surface.rank, surface.volume, surface.semi_axes[0]) == (2, 0, pytest.approx(0, abs=1e-15))
         assert surface.semi_axes[1] == pytest.approx(1, abs=0.05)
-        errors = misfit(surface, *samples(patch, 100))
+        errors = fit_error(surface, *samples(patch, 100))
         assert not np.isnan(errors).any()
         assert errors.Erad == pytest.approx(1)
 
@@ -310,7 +310,7 @@ def test_few_samples_are_flagged_and_stay_bounded(K):
     assert fit.flag & (FitFlag.UNDERDETERMINED | FitFlag.RANK_DEFICIENT)
     for surface in (fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)):
         assert (surface.semi_axes < 30 * np.abs(W).max()).all()
-        assert np.isfinite(misfit(surface, W, T)).all()
+        assert np.isfinite(fit_error(surface, W, T)).all()
 
 
 def test_an_endless_ellipsoid_is_bounded():
@@ -380,8 +380,8 @@ def test_the_exact_surface_has_the_measures_of_its_samples():
     W, T = samples(patch, 150)
     assert body.holds(0.994 * W).all()
     assert not body.holds(1.0001 * W).any()
-    np.testing.assert_allclose(misfit(body, W, T), 0, atol=1.5)
-    assert misfit(body, W, T).Erad < 1e-3
+    np.testing.assert_allclose(fit_error(body, W, T), 0, atol=1.5)
+    assert fit_error(body, W, T).Erad < 1e-3
     other = body.scaled([3.0, 3.0, 0.5])
     assert other.volume == pytest.approx(4.5 * body.volume, rel=1e-3)
     np.testing.assert_allclose(other.semi_axes, body.semi_axes * [3, 3, 0.5], rtol=1e-12)

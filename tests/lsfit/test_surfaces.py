@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.flag import FitFlag, OpenBodyError, UndecidedError
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.geometry import directions, quartic_volume, shadow_area, sphere_rule, supported_shadow
 from softjaw.lsfit.lowest import smallest_eigenvalue, smallest_value
-from softjaw.lsfit.misfit import misfit
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import Image
 from softjaw.lsfit.tilted import TiltedEllipsoid
@@ -196,9 +196,9 @@ def test_errors_of_flat_bodies_are_numbers(surface):
     w = u * surface.radius(u)[:, None]
     t = surface.gradient(w)
     t = t / np.linalg.norm(t, axis=1, keepdims=True) + np.linalg.svd(surface.span.T)[2][2]
-    errors = misfit(surface, w, t / np.linalg.norm(t, axis=1, keepdims=True))
+    errors = fit_error(surface, w, t / np.linalg.norm(t, axis=1, keepdims=True))
     np.testing.assert_allclose(errors, 0, atol=1e-8)
-    off = misfit(surface, w + np.array([0.1, 0.2, 0.3]), t / np.linalg.norm(t, axis=1, keepdims=True))
+    off = fit_error(surface, w + np.array([0.1, 0.2, 0.3]), t / np.linalg.norm(t, axis=1, keepdims=True))
     assert not np.isnan(off).any()
     assert off.Erad == pytest.approx(1)
 
@@ -229,7 +229,7 @@ def test_how_thin_a_body_may_be_is_judged_in_its_units(measure):
     assert thin.volume == pytest.approx(1e-5 * rounded_box().volume, rel=1e-11)
 
 
-def dented(seed):
+def indented(seed):
     """A closed quartic with negative curvature somewhere."""
     rng = np.random.default_rng(seed)
     ball = squared(np.eye(3)).coefficients
@@ -242,7 +242,7 @@ def dented(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_the_shadow_of_a_body_that_is_not_convex(seed):
     """The lowest value of the polynomial in tau counts, at one of the roots of its slope."""
-    surface, total, n = dented(seed), 0.0, 1500
+    surface, total, n = indented(seed), 0.0, 1500
     for phi in np.pi * (np.arange(n) + 0.5) / n:
         along = np.zeros(5)
         np.add.at(along, E[:, 2], surface.coefficients * np.cos(phi) ** E[:, 0] * np.sin(phi) ** E[:, 1])
@@ -255,7 +255,7 @@ def test_the_shadow_of_a_body_that_is_not_convex(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_the_support_of_a_body_that_is_not_convex(seed):
     """No sampled point of the surface is farther out, and some are nearly as far."""
-    surface, rng = dented(seed), np.random.default_rng(seed)
+    surface, rng = indented(seed), np.random.default_rng(seed)
     u, t = rng.normal(size=(100_000, 3)), rng.normal(size=(30, 3))
     reached = (t @ (u * surface.radius(u)[:, None]).T).max(axis=1)
     gain = surface.support(t) / reached - 1
@@ -288,7 +288,7 @@ def test_monomials_in_any_order_make_the_same_quartic():
     np.testing.assert_allclose(Quartic(c[shuffled], E[shuffled]).value(w), Quartic(c, E).value(w), rtol=1e-13)
 
 
-def test_flags_travel_with_the_surface():
+def test_flags_closing_with_the_surface():
     for surface in (
         Ellipsoid(AXES, FitFlag.BOUNDED),
         TiltedEllipsoid(np.eye(3), flag=FitFlag.BOUNDED),

@@ -7,8 +7,8 @@ import pytest
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.flag import FitFlag
-from softjaw.lsfit.misfit import misfit
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.six import six_samples
 from softjaw.lsfit.span import CollapsedFitError, sphere_motions
@@ -47,7 +47,7 @@ def test_a_uniform_disc(fit, value, E1, Edir):
     """Figures of an independent implementation with a modelling language."""
     W, T = samples(DISC, 100)
     found = fit(W, T, ZhouWeights(1.0, 10.0, 1.0), scaling="none")
-    errors = misfit(found.surface, W, T)
+    errors = fit_error(found.surface, W, T)
     assert found.objective == pytest.approx(value, rel=1e-5)
     assert (errors.E1, errors.Edir) == pytest.approx((E1, Edir), rel=1e-3)
 
@@ -108,7 +108,7 @@ def test_component_scaling_makes_the_fit_free_of_units(fit):
 
 def test_the_quartic_fits_better_than_the_ellipsoid():
     W, T = samples(DISC, 121)
-    far, near = (misfit(fit(W, T, SIX_WEIGHTS).surface, W, T) for fit in (zhou_ellipsoid, zhou_quartic))
+    far, near = (fit_error(fit(W, T, SIX_WEIGHTS).surface, W, T) for fit in (zhou_ellipsoid, zhou_quartic))
     assert near.Erad < far.Erad / 4
     assert near.Edir < far.Edir / 4
 
@@ -195,7 +195,7 @@ def test_a_programme_that_is_almost_solved_is_judged_by_what_it_reached():
     S = T * scaled / np.linalg.norm(T * scaled, axis=1, keepdims=True)
     value = objective(best.surface.scaled(1 / scaled), best.rates, W / scaled, S, ZhouWeights())
     assert best.objective == pytest.approx(value, rel=1e-6)
-    assert misfit(best.surface, W, T).Erad < 0.01
+    assert fit_error(best.surface, W, T).Erad < 0.01
 
 
 def test_published_weights_may_collapse_without_scaling():
@@ -203,7 +203,7 @@ def test_published_weights_may_collapse_without_scaling():
     W, T = samples(lcg_patch(6, 40), 60)
     with pytest.raises(CollapsedFitError, match=r"the surface lies \d\d"):
         zhou_quartic(W, T, scaling="none")
-    assert misfit(zhou_quartic(W, T).surface, W, T).Erad < 0.02
+    assert fit_error(zhou_quartic(W, T).surface, W, T).Erad < 0.02
 
 
 @FITS

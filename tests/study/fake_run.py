@@ -51,7 +51,7 @@ def fake_result(row):
 
     random = np.random.default_rng(row)
     values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n", "f_x_max", "tau_z_max")}
-    values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/tension": random.random(2)}
+    values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/adhesion": random.random(2)}
     values |= {"work/seconds_assembly": 1e-3, "fingers/pose_rotation": random.random((2, 3, 3))}
     patch = {"pressure": random.random((2, FACES)), "normal": random.random((2, FACES, 3))}
     return CaseResult(values, patch, "a note" if row % 7 == 3 else "", {"sheet": ("elastic plate", 0.5, 1)})
@@ -86,7 +86,7 @@ def fake_ladder(options):
 
 def finalise(writer):
     """Fill the derived dataset."""
-    e_n = writer.read("e_n/curved")
+    e_n = writer.read("e_n/ccm")
     writer.write_derived("slope", (e_n[:, 0, -1] - e_n[:, 0, 0]) / 4.0)
 
 

@@ -64,7 +64,7 @@ def make(path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(
     two = np.stack([force, force], axis=-1)
     with h5py.File(path, "r+") as file:
         study = file["study"]
-        for k, model in enumerate(("curved", "flat", "projected")):
+        for k, model in enumerate(("ccm", "pcm", "pcm_projected")):
             study[f"e_n/{model}"][...] = e_n * (1 + 0.1 * k)
             study[f"quality/{model}"][...] = 10 * e_n
             study[f"tau_z_max/{model}"][...] = e_n * force

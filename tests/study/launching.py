@@ -40,7 +40,7 @@ def study(ranks, *words):
 def start(ranks, *words):
     """Start the fake study and come back at once; a process group of its own, without ``timeout`` in between."""
     words = command(ranks, SCRIPT, *words)
-    words = words[words.index("mpirun"):] if ranks else words
+    words = words[words.index("mpirun") :] if ranks else words
     return subprocess.Popen(
         words, env=launch_environment(), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         stdin=subprocess.DEVNULL,

@@ -126,13 +126,13 @@ def test_xarray_has_coordinates_with_units(result, python):
     )
     value, units = answer([python, "-c", code, result]).split()
     with open_result(result) as read:
-        assert float(value) == read.map("e_n", "curved")[2, 0, 1]
+        assert float(value) == read.map("e_n", "ccm")[2, 0, 1]
     assert units == "m"
 
 
 @pytest.mark.skipif(shutil.which("h5ls") is None, reason="no h5ls on this machine; apt: hdf5-tools")
 def test_h5ls_shows_units_and_the_report(result):
-    told = answer(["h5ls", "-vd", f"{result}/study/tau_z_max/curved"])
+    told = answer(["h5ls", "-vd", f"{result}/study/tau_z_max/ccm"])
     assert re.search(r'Attribute: units.*\n.*\n +Data:\n +"N m"', told)
     assert '"station", "angle", "normal_force"' in told
     told = answer(["h5dump", "-d", "/study/report", result])
@@ -156,7 +156,7 @@ def test_pyvista_opens_the_result_file_itself(result):
     grid = pv.read(result)
     assert isinstance(grid, pv.UnstructuredGrid)
     with open_result(result) as read:
-        S, quality = read.fingers("S"), read.map("quality", "curved")
+        S, quality = read.fingers("S"), read.map("quality", "ccm")
     for k, (force, grid) in enumerate(steps_of(result)):
         assert force == k + 1
         load = grid["pressure"] * grid.compute_cell_sizes()["Area"]

@@ -115,7 +115,7 @@ def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
 
 
 def test_programs_get_every_common_case_in_si(pair):
-    found = compared(*pair, quantity="quality", model="flat")
+    found = compared(*pair, quantity="quality", model="pcm")
     data = json.loads(comparison_json(found))
     assert data["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
     assert data["axes"]["station"]["only_b"] == [0.1]
@@ -128,7 +128,7 @@ def test_programs_get_every_common_case_in_si(pair):
     assert len(empty) == 1
     assert empty[0]["difference"] is None
     with open_result(pair[0]) as result:
-        assert data["cases"][0]["a"] == result.map("quality", "flat")[1, 0, 1]
+        assert data["cases"][0]["a"] == result.map("quality", "pcm")[1, 0, 1]
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch)
     a, b = pair
     assert told(["compare", a, b, "--top", 2], monkeypatch) == 0
     assert "2 of 35 differences, the largest first" in capsys.readouterr().out
-    assert told(["compare", a, b, "--json", "--model", "flat"], monkeypatch) == 0
+    assert told(["compare", a, b, "--json", "--model", "pcm"], monkeypatch) == 0
     assert json.loads(capsys.readouterr().out)["quantity"] == "e_n"
     assert told(["compare", a, b, "--quantity", "beauty"], monkeypatch) == USAGE
     assert "expected one that both files have: quality, " in capsys.readouterr().err
@@ -183,8 +183,8 @@ def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch)
 
 def test_every_case_is_exported_with_its_state(pair):
     ds = softjaw.open(pair[1])
-    data, rows = json.loads(as_json(ds, "flat")), list(csv.DictReader(io.StringIO(as_csv(ds, "flat"))))
-    e_n = ds.e_n.sel(model="flat").values.ravel()
+    data, rows = json.loads(as_json(ds, "pcm")), list(csv.DictReader(io.StringIO(as_csv(ds, "pcm"))))
+    e_n = ds.e_n.sel(model="pcm").values.ravel()
     assert len(data["cases"]) == len(rows) == 4 * 6 * 3
     assert data["meaning"] == MEANING
     row = int(np.ravel_multi_index((2, 1, 1), (4, 6, 3)))
@@ -208,7 +208,7 @@ def test_frames_are_those_of_the_object(tmp_path):
     one = case["fingers"][0]
     assert one["frame_origin"] == pytest.approx(turn @ [0, 0, 0.001] + [0, 0, -0.02])
     assert one["frame_axes"] == pytest.approx(turn.T)  # rows x, y, N of a frame that is the pad's
-    assert data["flag_words"] == ["askew", "coarse"]
+    assert data["flag_words"] == ["not antipodal", "coarse"]
 
 
 def test_an_exported_surface_is_the_one_that_is_looked_up(tmp_path):

@@ -30,7 +30,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
         (["show", "--fo"], {"--force"}),
         (["show", "--force", "2", "a"], {"a.hdf"}),
         (["run", "sc"], {"scene.toml"}),
-        (["export", "a.hdf", "--model", ""], {"curved", "flat", "projected"}),
+        (["export", "a.hdf", "--model", ""], {"ccm", "pcm", "pcm_projected"}),
         (["init", "c"], {"cup", "cylinder"}),
     ],
 )

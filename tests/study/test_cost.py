@@ -75,7 +75,7 @@ def test_an_order_that_is_not_there_is_not_seen(values, why):
 
     found = limit([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
     assert math.isnan(found.order)
-    assert why in found.remark
+    assert why in found.note
     assert found.value == values[-1]  # the finest level, not a guess
 
 
@@ -110,14 +110,14 @@ def finger_on(obj, gripper):
 
 
 def test_springs_on_a_plane_carry_alike():
-    """Uniform pressure, travel F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
+    """Uniform pressure, closing displacement F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
     from softjaw.fem.objects.shapes import Plane
     from softjaw.study.case.probes import winkler_pad
 
     gripper = scene().gripper
     pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
     area = gripper.pad_length * gripper.pad_width
-    assert pad.travel(5.0) == pytest.approx(5.0 * gripper.pad_thickness / (3 * gripper.shear_modulus * area), rel=1e-9)
+    assert pad.closing(5.0) == pytest.approx(5.0 * gripper.pad_thickness / (3 * gripper.shear_modulus * area), rel=1e-9)
     assert pad.patch(5.0).pressure == pytest.approx(5.0 / area, rel=1e-6)
 
 
@@ -131,8 +131,8 @@ def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     k, L = stiffness(gripper), gripper.pad_length
     a = (1.5 * force * R / (k * L)) ** (1 / 3)
     assert a < gripper.pad_width / 2
-    travel = [winkler_pad(gripper, finger, (4, n)).travel(force) for n in (40, 160)]
-    errors = np.abs(np.array(travel) / (a**2 / (2 * R)) - 1)
+    closing = [winkler_pad(gripper, finger, (4, n)).closing(force) for n in (40, 160)]
+    errors = np.abs(np.array(closing) / (a**2 / (2 * R)) - 1)
     assert errors[0] < 0.02
     assert errors[1] < 1.5e-3
     patch = winkler_pad(gripper, finger, (4, 160)).patch(force)
@@ -282,7 +282,7 @@ def test_what_the_scene_gives_itself_stays():
     choice = choose(what, study, 0.01, given, probes, (), solve)
     assert choice.values.get("gripper.elements", [12, 6, 4]) == [12, 6, 4]
     assert not choice.met
-    assert "no measured setting meets the target" in choice.remark
+    assert "no measured setting meets the target" in choice.note
 
 
 def test_a_second_choice_solves_nothing_and_chooses_the_same():

@@ -21,11 +21,11 @@ def test_levels_and_what_they_change():
     assert (np.abs(off) < 0.05).all()
     assert (np.abs(off) > 1e-3).all()
     for one, other in zip(cases(OVAL, COUPLED), cases(OVAL), strict=True):
-        assert one["maps/travel"] < other["maps/travel"]
+        assert one["maps/closing"] < other["maps/closing"]
         assert one["work/load_steps"][0] > other["work/load_steps"][0]
     smooth = ("friction.mu=0", COUPLED)
-    travel = [[v["maps/travel"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0",))]
-    np.testing.assert_allclose(*travel, rtol=1e-9)
+    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0",))]
+    np.testing.assert_allclose(*closing, rtol=1e-9)
 
 
 @pytest.mark.long

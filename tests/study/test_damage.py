@@ -192,8 +192,8 @@ def test_a_block_of_zeros_is_refused_or_changes_no_number(copy, answers, length,
 
 
 READ = [  # datasets, and who must notice
-    ("study/e_n/curved", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
-    ("study/quality/curved", ["show", "export --csv", "lookup"]),
+    ("study/e_n/ccm", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
+    ("study/quality/ccm", ["show", "export --csv", "lookup"]),
     ("study/status/code", [*COMMANDS, "compare", "lookup"]),
     ("study/status/message", ["status", "export --csv"]),
     ("study/fingers/pose_origin", ["export --csv", "export --json"]),
@@ -263,11 +263,11 @@ def test_a_row_that_is_begun_anew_while_somebody_reads_is_missing(copy):
     with open_result(copy) as result:
         codes = result.status.copy()
     with h5py.File(copy, "r+") as file:
-        file["study/e_n/curved"][0, 0, 0] = 1.0  # as a run that solves it again writes it
+        file["study/e_n/ccm"][0, 0, 0] = 1.0  # as a run that solves it again writes it
         file["study/status/code"][0, 0, 0] = MISSING
     with open_result(copy) as result:
         result.__dict__["status"] = codes  # read just before
-        assert result.map("e_n", "curved")[0, 0, 1] > 0
+        assert result.map("e_n", "ccm")[0, 0, 1] > 0
         assert result.status.ravel().tolist() == [MISSING, DONE, DONE, DONE]
 
 

@@ -99,12 +99,12 @@ def test_a_difference_above_the_errors_is_still_one():
 
 @tries
 @given(seeds)
-def test_a_band_of_a_probe_is_that_of_its_images(seed):
+def test_a_interval_of_a_probe_is_that_of_its_images(seed):
     from softjaw.study.result.interval import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])
-    band = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
-    assert band.tolist() == [[0.05, 0.02], [0.05, 0.02], [0.01, 0.01], [0.01, 0.01]]
+    interval = at_least_own(np.full((4, 2), 0.01), np.array([[0.05, -0.02]]), (0,), moved(values, seed))
+    assert interval.tolist() == [[0.05, 0.02], [0.05, 0.02], [0.01, 0.01], [0.01, 0.01]]
 
 
 # --- windows of forces ------------------------------------------------------------------------------------------------
@@ -131,7 +131,7 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
     factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
     over = ("angle", "normal_force")
     known = {"flags": (over, np.zeros((1, 4), np.int64)), "force_low": ("angle", [1.0])}
-    ds = xr.Dataset(known | {"safety_factor": ((*over, "model"), factor[..., None])}, {"model": ["curved"]})
+    ds = xr.Dataset(known | {"safety_factor": ((*over, "model"), factor[..., None])}, {"model": ["ccm"]})
     assert (judged(ds) & Flag.TOO_WEAK > 0).tolist() == [[False, False, True, False]]
 
 
@@ -152,12 +152,12 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
     assert effects.REASONS[reason].startswith("left out")
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
-    for dent, ratio, level in (
+    for indentation, ratio, level in (
         (wall.STIFF * on, 0.1, wall.LINEAR),
-        (1.0, wall.SMALL_DENT * on, wall.NONLINEAR),
+        (1.0, wall.SMALL_INDENTATION * on, wall.NONLINEAR),
         (0.5 * wall.STIFF, 0.1, wall.RIGID),
     ):
-        monkeypatch.setattr(wall, "estimated_dent", lambda *_, found=(dent, ratio): found)
+        monkeypatch.setattr(wall, "estimated_indentation", lambda *_, found=(indentation, ratio): found)
         assert wall.choose_level(scene, None, 1.0).number == level
 
 
@@ -176,7 +176,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0):
         made.append(SimpleNamespace(
             mu=mu, normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
             frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose),
-            state=SimpleNamespace(checks=SimpleNamespace(acoustic=1.0), path_dependent=False),
+            state=SimpleNamespace(checks=SimpleNamespace(ellipticity=1.0), path_dependent=False),
         ))  # fmt: skip
     return made
 
@@ -191,8 +191,8 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
 
     turn = Rotation.random(random_state=seed)
     assert pose_flags(facing(turn, 0.0, 0.0)) == 0
-    assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.ASKEW
-    assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.OVERLAP
+    assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.NOT_ANTIPODAL
+    assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.COLLISION
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.0299)) == 0
 
 

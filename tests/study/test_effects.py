@@ -63,7 +63,7 @@ def test_friction_that_does_not_act_back_is_told_where_it_matters(moved, overrid
 def test_reasons_of_levels_that_no_target_chooses():
     effects = [result.effects for _, ladder in solved(OVAL) for result in ladder]
     for name, level, reason in (
-        ("friction", "curved", "never skipped, because it costs next to nothing"),
+        ("friction", "ccm", "never skipped, because it costs next to nothing"),
         ("limit_surface", "convex quartic", "never skipped, because it costs next to nothing"),
         ("wrench", "3-D", "e_n and quality do not depend on it"),
     ):

@@ -59,7 +59,7 @@ def test_what_cannot_be_drawn_is_told(tmp_path, capsys):
 def force_file(path):
     """One place over four forces: the curved model has seven eighths of the flat one's friction across."""
     F = np.array([1.0, 2.0, 4.0, 8.0])
-    known = {"S__S": F, "f_y_max__curved": 0.7 * F, "f_y_max__flat": 0.8 * F, "f_y_max__projected": 0.75 * F}
+    known = {"S__S": F, "f_y_max__ccm": 0.7 * F, "f_y_max__pcm": 0.8 * F, "f_y_max__pcm_projected": 0.75 * F}
     return make(path, axes=grid_axes([0.0], [0.0], F), **known)
 
 
@@ -67,13 +67,13 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     path = force_file(tmp_path / "force.hdf")
     with open_result(path) as result:
         lines = fig7.quantities(Data(result))
-        e_n = 1e3 * result.map("e_n", "curved")[0, 0]
+        e_n = 1e3 * result.map("e_n", "ccm")[0, 0]
     _, force = lines["force"]
-    assert force["flat"] == pytest.approx(np.full(4, 0.8))
-    assert force["curved"] == pytest.approx(np.full(4, 0.7))
+    assert force["pcm"] == pytest.approx(np.full(4, 0.8))
+    assert force["ccm"] == pytest.approx(np.full(4, 0.7))
     title, torque = lines["torque"]
     assert "50 mm" in title
-    assert torque["curved"] == pytest.approx(e_n / 50)  # tau_z / (F l) of a torque e_n F
+    assert torque["ccm"] == pytest.approx(e_n / 50)  # tau_z / (F l) of a torque e_n F
     said = draw(Figure("7", ("x",), fig7.force_study), {"x": path}, tmp_path / "7.png")
     assert "force 0.7 to 0.7, below flat by 13 to 13 %" in said
     assert (tmp_path / "7.png").read_bytes().startswith(PNG)
@@ -191,7 +191,7 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
         known = {m: fig5.stored_surface(data(name), index, 0, m) for m in fig5.MODELS}
         t = fig6.fibonacci_twists(200, 1.0)
         H = {m: np.einsum("ki,ki->k", found.wrenches(t), t) for m, found in known.items()}
-        assert (H["curved"] <= H["flat"] * (1 + 1e-12)).all()
+        assert (H["ccm"] <= H["pcm"] * (1 + 1e-12)).all()
 
 
 @pytest.mark.long
@@ -199,7 +199,7 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
 @pytest.mark.parametrize("name", ["bottle", "cup", "fig4-curvature", "fig5-candidate", "fig7-force-study"])
 def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
     found = data(name)
-    assert (found.map("misfit") < found.map("misfit_ellipsoid")).all()
+    assert (found.map("fit_error") < found.map("fit_error_ellipsoid")).all()
 
 
 @pytest.mark.long
@@ -207,19 +207,19 @@ def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
 def test_fig7_torque_e_n_and_score_grow_with_the_force_and_so_does_what_the_planar_model_claims_too_much(data):
     lines = {name: values for name, (_, values) in fig7.quantities(data("fig7-force-study")).items()}
     for name in ("torque", "e_n", "score"):
-        assert (np.diff(lines[name]["curved"]) > 0).all(), name
-    assert lines["force"]["flat"] == pytest.approx(np.full(4, 2.0))  # mu, at every force
+        assert (np.diff(lines[name]["ccm"]) > 0).all(), name
+    assert lines["force"]["pcm"] == pytest.approx(np.full(4, 2.0))  # mu, at every force
     for name in ("force", "score"):
-        lost = 1 - lines[name]["curved"] / lines[name]["flat"]
+        lost = 1 - lines[name]["ccm"] / lines[name]["pcm"]
         assert (lost > 0).all(), name
         assert (np.diff(lost) > 0).all(), name
     # unlike in the paper: the patch is on a slope, but hardly curved where arms are long
-    assert (1 - lines["e_n"]["curved"] / lines["e_n"]["flat"]).max() < 2e-3
+    assert (1 - lines["e_n"]["ccm"] / lines["e_n"]["pcm"]).max() < 2e-3
 
 
 @pytest.mark.long
 @pytest.mark.launches
-def test_fig8_a_dent_lowers_the_quality_but_raises_e_n_and_the_best_place_is_not_the_widest(data):
+def test_fig8_a_indentation_lowers_the_quality_but_raises_e_n_and_the_best_place_is_not_the_widest(data):
     walled, rigid = data("bottle"), data("bottle, rigid")
     ratio = {name: walled.map(name)[..., 1] / rigid.map(name)[..., 1] for name in ("e_n", "quality")}
     waist, upper = 1, 2
@@ -230,6 +230,6 @@ def test_fig8_a_dent_lowers_the_quality_but_raises_e_n_and_the_best_place_is_not
     assert wide.tolist() == [True, False, True, False]
     for name in ("e_n", "quality"):
         assert walled.map(name)[waist].max() > walled.map(name)[wide].max(), name
-    cup = data("cup")  # here it is the widest: nothing of the wall's dent takes it away
+    cup = data("cup")  # here it is the widest: nothing of the wall's indentation takes it away
     assert cup.map("e_n")[..., 1].argmax() // 2 == 2
-    assert cup.map("dent")[2].max() > cup.map("dent")[0].max()
+    assert cup.map("indentation")[2].max() > cup.map("indentation")[0].max()

@@ -55,9 +55,9 @@ def test_the_smoke_scene_runs_as_it_is(once, shared_path):
     assert "4 of 4 cases done, 0 failed, 0 missing" in output
     with open_result(path) as result:
         assert (result.status == DONE).all()
-        e_n = {model: result.map("e_n", model) for model in ("curved", "flat")}
+        e_n = {model: result.map("e_n", model) for model in ("ccm", "pcm")}
         # forces along the axis of angles: the cylinder's blunt and sharp side lose differently much
-        assert (e_n["curved"] < e_n["flat"]).all()
+        assert (e_n["ccm"] < e_n["pcm"]).all()
         assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=1e-8)
 
 
@@ -79,8 +79,8 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
         assert (result.status == DONE).all()
         F_N, S = (result.read(f"{name}/{name}") for name in ("F_N", "S"))
         assert (S >= F_N * (1 - 1e-12)).all()
-        assert (result.map("quality", "curved") > 0).all()
-        assert (result.map("quality", "curved") <= result.map("quality", "flat") * (1 + 1e-9)).all()
+        assert (result.map("quality", "ccm") > 0).all()
+        assert (result.map("quality", "ccm") <= result.map("quality", "pcm") * (1 + 1e-9)).all()
         assert result.checks("force_balance").max() < 1e-8
         assert result.checks("min_det_f").min() > 0
 
@@ -88,16 +88,16 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
 @pytest.mark.launches
 @pytest.mark.parametrize("name", quick(WALLED, "bottle"))
 def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
-    path, (overrides, dents) = shared_path / f"{name}.hdf", WALLED[name]
+    path, (overrides, indentations) = shared_path / f"{name}.hdf", WALLED[name]
     words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]
     code, output, errors = once(run, name, path, *COARSE, *words)
     assert (code, errors) == (0, ""), output
     assert ", 0 failed, 0 missing" in output
     with open_result(path) as result:
         assert (result.status == DONE).all()
-        dent = 1e3 * result.map("dent")
-        assert (np.diff(dent, axis=-1) > 0).all()  # every newton more dents the wall deeper
-        assert dents[0] < dent.max() < dents[1]
+        indentation = 1e3 * result.map("indentation")
+        assert (np.diff(indentation, axis=-1) > 0).all()  # every newton more dents the wall deeper
+        assert indentations[0] < indentation.max() < indentations[1]
         assert (result.map("wall_stress") > 0).all()
         assert result.checks("force_balance").max() < 1e-8
         if name == "fig5-candidate":
@@ -124,7 +124,7 @@ def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw
         # along the cylinder sliding is in every face's plane: the paper's planar model is exact there
         assert result.read("f_x_overestimate/f_x_overestimate") == pytest.approx(0.0, abs=1e-9)
         for name in ("f_x", "tau_z"):
-            claimed = result.read(f"{name}_overestimate_projected/{name}_overestimate_projected")
+            claimed = result.read(f"{name}_overestimate_pcm_projected/{name}_overestimate_pcm_projected")
             assert (claimed <= 1e-12).all(), name
         for name in ("e_n", "tau_z_max", "f_y_overestimate"):
             assert np.isfinite(result.read(f"{name}_error/{name}_error")).all()

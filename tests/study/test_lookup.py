@@ -51,7 +51,7 @@ def test_what_is_linear_between_the_cases_is_met_and_says_so(straight):
     assert found.ok.all()
     assert found.e_n == pytest.approx(linear(*points(300)), rel=1e-12)
     assert found.error("e_n") == pytest.approx(np.zeros(300), abs=1e-15)
-    assert found.value("e_n", "flat") == pytest.approx(1.1 * found.e_n, rel=1e-12)
+    assert found.value("e_n", "pcm") == pytest.approx(1.1 * found.e_n, rel=1e-12)
 
 
 def test_solved_cases_come_back_as_they_were_stored(tmp_path):

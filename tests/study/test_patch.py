@@ -67,7 +67,7 @@ def test_a_uniform_cylinder_has_the_friction_of_its_closed_form(tmp_path, told):
     file = centres(tmp_path / "cylinder.csv", replace(patch, pressure=p * patch.pressure), "mm", "kpa")
     found = told(file, "--long-side", "1,0,0")["patches"][0]
     S, F_N = 2 * R * t * L * p, 2 * R * math.sin(t) * L * p
-    curved, flat = found["friction"]["curved"], found["friction"]["flat"]
+    curved, flat = found["friction"]["ccm"], found["friction"]["pcm"]
     assert found["S"] == pytest.approx(S, rel=1e-12)
     assert found["F_N"] == pytest.approx(F_N, rel=5e-5)
     assert curved["f_x_max"] == pytest.approx(MU * S, rel=1e-12)
@@ -109,7 +109,7 @@ def test_centres_and_corners_agree_where_the_pressure_is_symmetric(tmp_path, tol
     assert friction(two) == pytest.approx(friction(one), **SAME)
     flags = [answer["patches"][0]["frame"]["flag"] for answer in (one, two)]
     assert flags == [0, 4]
-    assert any("no corners" in text for text in two["remarks"])
+    assert any("no corners" in text for text in two["notes"])
 
 
 def test_pressure_at_points_is_averaged_over_each_face_and_said(tmp_path, told):
@@ -118,7 +118,7 @@ def test_pressure_at_points_is_averaged_over_each_face_and_said(tmp_path, told):
     file = vtk(tmp_path / "p.vtu", points, cells, on_points=[("pressure", at_points)])
     answer = told(file, "--unit", "m", "--pressure-unit", "pa")
     assert answer["patches"][0]["S"] == pytest.approx(at_points[cells].mean(axis=1) @ patch.area, rel=1e-12)
-    assert any("mean of its corners" in text for text in answer["remarks"])
+    assert any("mean of its corners" in text for text in answer["notes"])
 
 
 def test_triangles_among_quadrilaterals_leave_their_last_corner_empty(tmp_path, told):
@@ -131,7 +131,7 @@ def test_triangles_among_quadrilaterals_leave_their_last_corner_empty(tmp_path, 
     points = [[0, 0, 0], [0.5, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 1, 0], [0, 1, 0]]
     mixed = vtk(tmp_path / "mixed.vtu", points, [[0, 1, 4, 5], [1, 2, 3], [1, 3, 4]], [("pressure", [2, 2, 2])])
     assert answer["patches"][0]["S"] == pytest.approx(2.0, rel=1e-14)
-    assert answer["patches"][0]["friction"]["curved"]["f_x_max"] == pytest.approx(MU * 2.0, rel=1e-14)
+    assert answer["patches"][0]["friction"]["ccm"]["f_x_max"] == pytest.approx(MU * 2.0, rel=1e-14)
     assert friction(told(mixed, "--unit", "m", "--pressure-unit", "pa")) == pytest.approx(friction(answer), **SAME)
 
 
@@ -160,8 +160,8 @@ def test_unused_columns_are_named_and_the_pressure_can_be_chosen(tmp_path, told)
     file.write_text("node,x_m,y_m,z_m,area_m2,nx,ny,nz,CPRESS,pressure_pa\n7,0,0,0,1e-4,0,0,1,100,9\n")
     chosen = told(file, "--pressure-name", "CPRESS", "--pressure-unit", "kpa")
     assert chosen["patches"][0]["S"] == pytest.approx(10.0)
-    assert f"not used of {file}: node, pressure_pa" in chosen["remarks"]
-    assert f"not used of {file}: node, CPRESS" in told(file)["remarks"]
+    assert f"not used of {file}: node, pressure_pa" in chosen["notes"]
+    assert f"not used of {file}: node, CPRESS" in told(file)["notes"]
 
 
 def test_x_follows_the_long_direction_unless_it_is_given(tmp_path, told):
@@ -169,10 +169,10 @@ def test_x_follows_the_long_direction_unless_it_is_given(tmp_path, told):
     long = told(file := centres(tmp_path / "long.csv", patch))
     given = told(file, "--long-side=0,1,0")
     assert np.abs(long["patches"][0]["frame"]["axes"][0]) == pytest.approx([1, 0, 0], abs=1e-9)
-    assert any("no --long-side" in text for text in long["remarks"])
-    curved, turned = (a["patches"][0]["friction"]["curved"] for a in (long, given))
+    assert any("no --long-side" in text for text in long["notes"])
+    curved, turned = (a["patches"][0]["friction"]["ccm"] for a in (long, given))
     assert turned["f_y_max"] == pytest.approx(curved["f_x_max"], rel=1e-12)
-    assert not any("no --long-side" in text for text in given["remarks"])
+    assert not any("no --long-side" in text for text in given["notes"])
 
 
 def test_turned_normals_change_no_friction(tmp_path, told):
@@ -184,7 +184,7 @@ def test_turned_normals_change_no_friction(tmp_path, told):
 
 
 def test_surfaces_that_know_more_fit_better(told):
-    surfaces = told(EXAMPLE)["patches"][0]["limit_surface"]["curved"]
+    surfaces = told(EXAMPLE)["patches"][0]["limit_surface"]["ccm"]
     assert list(surfaces) == ["exact", *SURFACES]
     three, full, quartic = (surfaces[name] for name in ("three_motions", "full", "quartic"))
     assert full["E_rad"] < three["E_rad"]
@@ -216,16 +216,16 @@ def test_the_default_lengths_are_the_distance_and_the_contact(told):
     assert answer["grasp"]["object_length"] == pytest.approx(0.06)
     assert answer["grasp"]["contact_length"] == answer["patches"][0]["rho"]
     assert answer["grasp"]["surface"] == "quartic"
-    lower, upper = answer["grasp"]["score"]["curved"]["epsilon"]
+    lower, upper = answer["grasp"]["score"]["ccm"]["epsilon"]
     assert 0.5 * upper < lower <= upper
 
 
 def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
     picture = tmp_path / "sections.svg"
-    limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["curved"]
+    limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["ccm"]
     assert picture.read_text().count("<path") > 20
     judged = judge(read_patch(str(EXAMPLE), Reading()), MU)
-    largest = [limits[f"{name}_max"] / judged.contact.limits["curved"].S for name in ("f_x", "f_y", "tau_z")]
+    largest = [limits[f"{name}_max"] / judged.contact.limits["ccm"].S for name in ("f_x", "f_y", "tau_z")]
     for name in ("exact", "three_motions"):
         for plane in PLANES:
             reach = section(judged, name, plane).max(axis=0)
@@ -259,8 +259,8 @@ def test_a_grasp_that_slips_is_told(tmp_path, told):
     two = centres(tmp_path / "two.csv", replace(aside, centroid=np.add(aside.centroid, [0.05, 0, 0])))
     answer = told(one, "--other", two, "--surface", "three_motions")
     assert answer["grasp"]["slips"]
-    assert any("slips" in text for text in answer["remarks"])
-    assert any("from antipodal" in text for text in answer["remarks"])
+    assert any("slips" in text for text in answer["notes"])
+    assert any("from antipodal" in text for text in answer["notes"])
 
 
 def test_a_single_face_carries_no_torque_and_scores_nothing(tmp_path, told):
@@ -268,11 +268,11 @@ def test_a_single_face_carries_no_torque_and_scores_nothing(tmp_path, told):
     answer = told(file, "--distance", 50, "--contact-length", 20)
     patch = answer["patches"][0]
     assert patch["rank"] == 2
-    assert any("rank 2" in text for text in answer["remarks"])
+    assert any("rank 2" in text for text in answer["notes"])
     for model in patch["friction"].values():
         assert model["f_x_max"] == pytest.approx(MU * 3.0)
         assert model["tau_z_max"] == model["tau_pure"] == model["e_n"] == 0.0
-    assert patch["limit_surface"]["curved"]["quartic"]["E_rad"] is None
+    assert patch["limit_surface"]["ccm"]["quartic"]["E_rad"] is None
     assert {score["quality"] for score in answer["grasp"]["score"].values()} == {0.0}
 
 
@@ -283,7 +283,7 @@ def test_overhanging_faces_are_counted(tmp_path, told):
     beyond = int((patch.normal[:, 2] < 0).sum())
     assert beyond > 0
     assert answer["patches"][0]["frame"]["overhang_count"] == beyond
-    assert any(f"more than 90 deg from the contact normal: {beyond}" in text for text in answer["remarks"])
+    assert any(f"more than 90 deg from the contact normal: {beyond}" in text for text in answer["notes"])
 
 
 def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):
@@ -298,7 +298,7 @@ def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):
     one, two = told(right, *reading), told(other, *reading)
     assert friction(two) == pytest.approx(friction(one), **SAME)
     assert (one["patches"][0]["frame"]["flag"], two["patches"][0]["frame"]["flag"]) == (0, int(FrameFlag.WINDING))
-    [note] = set(two["remarks"]) - set(one["remarks"])
+    [note] = set(two["notes"]) - set(one["notes"])
     assert "1 of 135 loaded faces" in note
     assert "cell 40" in note
 
@@ -365,7 +365,7 @@ def test_the_json_keeps_its_names(told):
         "full": fit,
         "quartic": fit,
     }
-    models = ("curved", "flat", "projected")
+    models = ("ccm", "pcm", "pcm_projected")
     frame = ["origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share"]
     patch = dict.fromkeys(["file", "faces", "loaded_faces", "area", "pressure", "S", "F_N", "rho"])
     patch |= {"frame": dict.fromkeys(frame), "rank": None, "friction": dict.fromkeys(models, limits)}
@@ -373,7 +373,7 @@ def test_the_json_keeps_its_names(told):
     grasp = dict.fromkeys(["surface", "distance", "object_length", "contact_length", "misalignment", "slips"])
     grasp |= {"score": dict.fromkeys(models, dict.fromkeys(["quality", "quality_l1", "epsilon"]))}
     answer = told(EXAMPLE, "--distance", 60, "--surface", "three_motions")
-    assert keys(answer) == {"mu": None, "patches": [patch], "grasp": grasp, "remarks": None}
+    assert keys(answer) == {"mu": None, "patches": [patch], "grasp": grasp, "notes": None}
     numbers = {*limits, "S", "F_N", "rho", "distance", "object_length", "contact_length", "misalignment", "E_dir"}
     assert numbers <= answer["units"].keys()
 
@@ -397,7 +397,7 @@ def test_the_text_says_the_same_as_the_json(told, capsys):
 def test_the_example_shows_what_its_closed_form_says(told):
     """Along a cylinder friction is mu S, across it mu F_N, whatever the pressure."""
     patch = told(EXAMPLE)["patches"][0]
-    curved = patch["friction"]["curved"]
+    curved = patch["friction"]["ccm"]
     assert curved["f_x_max"] == pytest.approx(MU * patch["S"], rel=1e-9)
     assert curved["f_y_max"] == pytest.approx(MU * patch["F_N"], rel=1e-6)
 

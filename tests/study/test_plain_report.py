@@ -34,4 +34,3 @@ def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
         text = plain_report(result, None)
     assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
     assert "failed 11 x no reason was given" in text
-

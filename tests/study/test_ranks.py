@@ -106,8 +106,8 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     assert not list(shared_path.glob("*.part"))
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
-    for name in ("e_n/curved", "quality/flat", "fingers/cor_wrench", "checks/acoustic", "patch/pressure",
-                 "checksums/patch", "quality_fitted/flat", "limit_surface/coefficients",
+    for name in ("e_n/ccm", "quality/pcm", "fingers/cor_wrench", "checks/ellipticity", "patch/pressure",
+                 "checksums/patch", "quality_fitted/pcm", "limit_surface/coefficients",
                  "wrenches/wrench"):  # fmt: skip
         assert f"study/{name}" in expected
     assert once(differing, path, expected) == []
@@ -148,7 +148,7 @@ def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path
     with open_result(path) as found, open_result(alone) as expected:
         assert 'contact_snes_type = "vinewtonrsls"' in found.scene
         for name in ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max"):
-            for model in ("curved", "flat", "projected"):
+            for model in ("ccm", "pcm", "pcm_projected"):
                 assert found.map(name, model)[0, 0] == pytest.approx(expected.map(name, model)[1, 1], rel=1e-8), name
         pressure = expected.read("patch/pressure")[expected.row(1, 1, 0) : expected.row(1, 1, 1) + 1]
         assert found.read("patch/pressure") == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())

@@ -43,7 +43,7 @@ def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):
     for name, values in zip(ds.e_n.dims, (STATIONS, ANGLES, FORCES), strict=False):
         assert ds[name].values.tolist() == values.tolist()
     here = ds.e_n.sel(station=0.02, angle=0, normal_force=4.0, method="nearest")
-    assert here.sel(model="flat") == pytest.approx(1.1 * float(here.sel(model="curved")))
+    assert here.sel(model="pcm") == pytest.approx(1.1 * float(here.sel(model="ccm")))
     assert (ds.e_n.units, ds.station.units, ds.angle.units, ds.normal_force.units) == ("m", "m", "rad", "N")
     for name, variable in ds.data_vars.items():
         assert variable.attrs["long_name"], name
@@ -62,7 +62,7 @@ def test_every_dataset_of_the_file_is_reached_and_has_its_numbers(half):
             if group in ("map", "checksums", "status", "wrenches", "patch", "derived") or path in FIELDS:
                 continue
             one = name if group not in ("fingers", "checks", "effects") else f"{group[:-1]}_{name}"
-            if name in ("curved", "flat", "projected"):
+            if name in ("ccm", "pcm", "pcm_projected"):
                 found = ds[group].sel(model=name)
             else:
                 found = ds[one if one in ds and group not in ("limit_surface", "work") else f"{group}_{name}"]
@@ -120,7 +120,7 @@ def test_what_is_no_sound_result_file_is_refused(half, tmp_path):
     torn = tmp_path / "torn.hdf"
     torn.write_bytes(half.read_bytes())
     with h5py.File(torn, "r+") as file:
-        file["study/e_n/flat"][0, 0, 0] += 1
+        file["study/e_n/pcm"][0, 0, 0] += 1
     with pytest.raises(StudyError) as refused:
         softjaw.open(torn)
     assert refused.value.code == OTHER_FILE

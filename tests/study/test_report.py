@@ -281,7 +281,7 @@ def test_failures_that_differ_in_numbers_alone_are_one_kind(ordinary):
     assert "ConvergenceError" in text
     assert page.text.count("ConvergenceError: residual") == 1 + 6  # once as a kind, and in the table of all cases
     with open_result(path) as result:
-        assert "residual 2.5e-03" in tables.remark(Data(result), (3, 2, 0))
+        assert "residual 2.5e-03" in tables.note(Data(result), (3, 2, 0))
 
 
 def test_definitions_scene_checks_and_time_are_there(ordinary):
@@ -424,4 +424,3 @@ def test_a_page_escapes_every_kind_of_block():
 )
 def test_numbers_for_people(value, text):
     assert number(value) == text
-

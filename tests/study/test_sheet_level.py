@@ -49,17 +49,17 @@ def test_what_is_neglected_stays_below_the_target():
            for name, own in (("steel", STEEL), ("plastic", PLASTIC))}  # fmt: skip
     assert np.abs(off["steel"]).max() < 1e-3
     assert (off["plastic"] < -0.02).all()  # the ends of the pad give way and carry less
-    travel = [values["maps/travel"] for values in cases(OVAL, *PLASTIC)]
-    assert (np.array(travel) > [values["maps/travel"] for values in cases(OVAL, RIGID)]).all()
+    closing = [values["maps/closing"] for values in cases(OVAL, *PLASTIC)]
+    assert (np.array(closing) > [values["maps/closing"] for values in cases(OVAL, RIGID)]).all()
 
 
 @pytest.mark.long
 def test_sheets_behind_the_pads_on_a_thin_wall():
-    """Steel is as good as rigid, plastic is softer: the same force takes more travel."""
-    travel = {}
+    """Steel is as good as rigid, plastic is softer: the same force takes more closing displacement."""
+    closing = {}
     for name, overrides in (("rigid", (RIGID,)), ("steel", STEEL), ("plastic", PLASTIC)):
         forced = () if name == "rigid" else ('effects.sheet="elastic"',)
         (result,) = on_wall(CUP, *overrides, *forced, forces="[1]")
-        travel[name] = result.values["maps/travel"]
-    assert travel["steel"] == pytest.approx(travel["rigid"], rel=1e-3)
-    assert travel["plastic"] > 1.02 * travel["rigid"]
+        closing[name] = result.values["maps/closing"]
+    assert closing["steel"] == pytest.approx(closing["rigid"], rel=1e-3)
+    assert closing["plastic"] > 1.02 * closing["rigid"]

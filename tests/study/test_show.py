@@ -38,7 +38,7 @@ def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
             "angle": (np.arange(shape[1]) * np.pi / 2, "rad"), "normal_force": (FORCES, "N")}  # fmt: skip
     coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
     coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
-    return xr.Dataset(maps, coordinates, {"planar": "flat", "poses": bool(labels), "derived": ()})
+    return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": ()})
 
 
 def stored(ds, message):
@@ -65,7 +65,7 @@ def test_images_of_a_grasp_are_never_torn_apart_and_count_as_one(top):
         (raised(FrameFlag.OVERHANG), "overhang"),
         (raised(FrameFlag.WINDING), "winding"),
         (Flag.SLIPS, "slips"),
-        (Flag.OVERLAP, "overlap"),
+        (Flag.COLLISION, "pads collide"),
         (Flag.COARSE, "coarse"),
         (Flag.UNSTABLE, "unstable"),
         (Flag.JUMPED, "jumped"),
@@ -112,7 +112,7 @@ WIDE = ("mass", "wall", "two meshes", "two scores")
 
 @pytest.mark.parametrize("width", [60, 80, 100, 200])
 def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
-    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.ASKEW)], needs=WIDE)
+    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.NOT_ANTIPODAL)], needs=WIDE)
     table = best(walls)
     lines = as_text(table, width).splitlines()
     assert max(map(len, lines)) <= width
@@ -120,7 +120,7 @@ def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
     absent = " ".join(" ".join(lines).partition("letters a line: ")[2].partition(";")[0].split()).split(", ")
     for name in ("quality", "e_n", "flags", "station"):
         assert name in heads
-    for name in ("misfit", "f_x_max", "tau_z_max", "dent"):
+    for name in ("fit_error", "f_x_max", "tau_z_max", "indentation"):
         assert (name in heads) != (name in absent)
     assert len(as_csv(table).splitlines()[0].split(",")) == len(table.columns)
 
@@ -145,8 +145,8 @@ def test_a_pose_is_shown_by_number_and_label_alone():
 
 
 def test_many_flags_go_on_below_and_many_images_are_a_range():
-    text = as_text(best(study([[4, 4, 4]], flags=[float(Flag.SLIPS + Flag.COARSE + Flag.ASKEW)])), 200)
+    text = as_text(best(study([[4, 4, 4]], flags=[float(Flag.SLIPS + Flag.COARSE + Flag.NOT_ANTIPODAL)])), 200)
     lines = text.splitlines()
     assert lines[3].split()[:3] == ["1..3", "0", "0..180"]
-    assert lines[3].endswith("askew, slips,")
+    assert lines[3].endswith("not antipodal, slips,")
     assert lines[4].strip() == "coarse"

@@ -64,7 +64,7 @@ def test_what_was_written_is_read(path):
             assert read.map("e_n", model)[1, 1, 1] == result.values["maps/e_n"][i]
         assert read.map("S")[1, 1, 1] == result.values["maps/S"]
         assert np.array_equal(read.fingers("f_x_max")[1, 1, 1], result.values["fingers/f_x_max"])
-        assert np.array_equal(read.checks("tension")[1, 1, 1], result.values["checks/tension"])
+        assert np.array_equal(read.checks("adhesion")[1, 1, 1], result.values["checks/adhesion"])
         assert np.array_equal(read.patch(10)["normal"], patch["normal"])
         assert np.isnan(read.patch(10)["centroid"]).all()
         assert {k: v[1, 1, 1] for k, v in read.effects("sheet").items()} == {"level": 1, "indicator": 0.5, "reason": 1}
@@ -106,10 +106,10 @@ def test_viewers_find_a_plot_from_the_root_down(path):
             assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["normal_force", "angle", "station"]
         assert plot["quality"].attrs["long_name"] == "grasp quality, curved"
         whole = entry["quality"]
-        assert [whole.attrs["signal"], *whole.attrs["auxiliary_signals"]] == ["curved", "flat", "projected"]
+        assert [whole.attrs["signal"], *whole.attrs["auxiliary_signals"]] == ["ccm", "pcm", "pcm_projected"]
         assert list(whole.attrs["axes"]) == ["station", ".", "normal_force"]
         assert list(whole.attrs["default_slice"]) == [".", ".", "2"]
-        assert entry["e_n/curved"].attrs["units"] == "m"
+        assert entry["e_n/ccm"].attrs["units"] == "m"
         assert entry["patch/normal"].dims[3][0].shape == (3,)
 
 
@@ -200,7 +200,7 @@ def test_damage_in_a_done_row_is_found(path):
     assert torn_rows(path, layout) == []
     with h5py.File(path, "r+") as file:
         file["study/work/seconds_total"][0, 0, 0] = 5.0
-        file["study/e_n/flat"][0, 0, 1] = 7.0  # not a done row
+        file["study/e_n/pcm"][0, 0, 1] = 7.0  # not a done row
         file["study/status/message"][1, 0, 1] = b"other"
         file["study/status/code"][0, 1, 0] = 2
         file["study/patch/area"][29, 1, 3] = 0.0
@@ -309,29 +309,29 @@ def test_what_is_no_hdf5_file_is_refused(path, kind):
 
 
 def evil_external_data(file, secret):
-    file.create_dataset("study/e_n/curved", (5, 2, 3), "<f8", external=[(str(secret), 0, 240)])
+    file.create_dataset("study/e_n/ccm", (5, 2, 3), "<f8", external=[(str(secret), 0, 240)])
 
 
 def evil_link(file, secret):
-    file["study/e_n/curved"] = h5py.ExternalLink(str(secret), "/x")
+    file["study/e_n/ccm"] = h5py.ExternalLink(str(secret), "/x")
 
 
 def evil_soft_link(file, _):
-    file["study/e_n/curved"] = h5py.SoftLink("/study/e_n/flat")
+    file["study/e_n/ccm"] = h5py.SoftLink("/study/e_n/pcm")
 
 
 def evil_virtual(file, secret):
     layout = h5py.VirtualLayout((5, 2, 3), "<f8")
     layout[...] = h5py.VirtualSource(str(secret), "x", (5, 2, 3))
-    file.create_virtual_dataset("study/e_n/curved", layout)
+    file.create_virtual_dataset("study/e_n/ccm", layout)
 
 
 def evil_shape(file, _):
-    file.create_dataset("study/e_n/curved", (50, 2, 3), "<f8")
+    file.create_dataset("study/e_n/ccm", (50, 2, 3), "<f8")
 
 
 def evil_type(file, _):
-    file.create_dataset("study/e_n/curved", (5, 2, 3), "<f4")
+    file.create_dataset("study/e_n/ccm", (5, 2, 3), "<f4")
 
 
 @pytest.mark.parametrize("evil", [evil_external_data, evil_link, evil_soft_link, evil_virtual, evil_shape, evil_type])
@@ -339,12 +339,12 @@ def test_data_from_elsewhere_are_not_read(path, tmp_path, evil):
     secret = tmp_path / "secret"
     secret.write_bytes(b"s" * 400)
     with h5py.File(path, "r+") as file:
-        del file["study/e_n/curved"]
+        del file["study/e_n/ccm"]
         evil(file, secret)
     with open_result(path) as read:
-        assert read.map("e_n", "flat").shape == (5, 2, 3)
+        assert read.map("e_n", "pcm").shape == (5, 2, 3)
         with pytest.raises(StudyError) as caught:
-            read.map("e_n", "curved")
+            read.map("e_n", "ccm")
     assert caught.value.code == OTHER_FILE
 
 
@@ -414,14 +414,14 @@ def test_a_file_of_the_version_before_is_read_and_compared_but_not_gone_on_with(
         file["study/status/code"][1, 0, 1] = 1
         assert "checksums" not in file["study"]
     with open_result(path) as read:
-        assert read.map("e_n", "flat")[1, 0, 1] == 2.0
+        assert read.map("e_n", "pcm")[1, 0, 1] == 2.0
         assert read.messages[1, 0, 1] == "a note"
         assert read.patch(7)["area"].shape == (2, 4)
     with pytest.raises(StudyError, match="can be read, but not gone on with: choose another file"):
         verify(path, small(), HEADER)
     with h5py.File(path, "r+") as file:
-        file["study/e_n/flat"][1, 0, 1] = 2.5
-    for ask in (lambda r: r.map("e_n", "curved"), lambda r: r.messages, lambda r: r.patch(7)):
+        file["study/e_n/pcm"][1, 0, 1] = 2.5
+    for ask in (lambda r: r.map("e_n", "ccm"), lambda r: r.messages, lambda r: r.patch(7)):
         with open_result(path) as read, pytest.raises(StudyError, match="checksum") as refused:
             ask(read)
         assert refused.value.code == OTHER_FILE

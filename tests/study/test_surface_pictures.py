@@ -45,8 +45,8 @@ def file(tmp_path_factory):
         "fingers/S": [S, S],
         "fingers/f_x_max": np.full((2, 3), MU * S),
         "fingers/tau_z_max": np.full((2, 3), 0.01),
-        "maps/misfit": 0.002,
-        "maps/misfit_ellipsoid": 0.013,
+        "maps/fit_error": 0.002,
+        "maps/fit_error_ellipsoid": 0.013,
     }
     layout = Layout(axes(stations=(0.0, 0.01), angles=(0.0,), forces=(1.0,)), 24)
     return make(tmp_path_factory.mktemp("surface") / "s.hdf", layout, **values)
@@ -70,7 +70,7 @@ def test_shadows_of_ellipsoids_are_ellipses(i, j):
 def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file(file):
     with open_result(file) as result:
         data = Data(result)
-        flat, curved = (stored_surface(data, (1, 0, 0), 1, model) for model in ("flat", "curved"))
+        flat, curved = (stored_surface(data, (1, 0, 0), 1, model) for model in ("pcm", "ccm"))
     assert flat.unit == pytest.approx(MU * patch_S() * np.array([1.0, 1.0, RHO]))
     assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
     assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)

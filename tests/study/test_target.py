@@ -13,7 +13,7 @@ import pytest
 from softjaw.study.accuracy.cost.measure import Measured
 from tests.study.test_cost import COARSE, CYLINDER, formula_study, scene
 
-COARSE_FLAG, ASKEW = 4096, 256
+COARSE_FLAG, NOT_ANTIPODAL = 4096, 256
 SIZES = [1.0, 0.7, 0.5, 0.35, 0.25]
 
 
@@ -89,7 +89,7 @@ def test_a_mesh_that_is_good_by_chance_is_not_taken():
     assert judge(levels(3), found[:3], 0.01).best == 2  # and not the coarsest where none is good
 
 
-@pytest.mark.parametrize("flag", [COARSE_FLAG, ASKEW, 8])
+@pytest.mark.parametrize("flag", [COARSE_FLAG, NOT_ANTIPODAL, 8])
 def test_a_mesh_with_a_flag_that_the_finest_has_not_is_not_taken(flag):
     from softjaw.study.accuracy.cost.target import judge
 
@@ -184,13 +184,13 @@ def test_what_no_mesh_keeps_is_said_with_the_best_that_was_reached():
         (json.loads(s)["gripper.elements"] for s, _ in study.measured if "elements" in s), key=math.prod
     )
     assert choice.held_out > 0.01 >= choice.measured
-    assert "other, " in choice.remark
+    assert "other, " in choice.note
 
 
 def test_flagged_meshes_are_passed_over_however_small_their_error():
     choice, _ = made_up(
         lambda point, label: 0.01 * (1 + 0.01 * size(point) ** 2),
-        lambda point, label: ASKEW * (math.prod(point.gripper.elements) < 1000),
+        lambda point, label: NOT_ANTIPODAL * (math.prod(point.gripper.elements) < 1000),
     )
     assert choice.met
     assert math.prod(choice.values["gripper.elements"]) >= 1000
@@ -226,7 +226,7 @@ def test_a_choice_from_a_study_counts_flags_doubts_and_cases_held_out():
 
     setting = next(key for key, _ in study.measured if all(str(v) in key for v in plain_choice.values.values()))
     for key in [key for key in study.measured if key[0] == setting]:
-        study.measured[key] = replace(study.measured[key], flags=np.array([0.0, ASKEW]))
+        study.measured[key] = replace(study.measured[key], flags=np.array([0.0, NOT_ANTIPODAL]))
     assert choose(what, study, 0.02, {}, probes, (), solve).values != plain_choice.values
 
     what, study, probes, solve, _ = formula_study(scene(overrides=COARSE))
@@ -294,7 +294,7 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
         assert choice.measured <= target
         assert not choice.held_out > target
     else:
-        assert choice.predicted > target or "flagged" in choice.remark
+        assert choice.predicted > target or "flagged" in choice.note
     taken = {(p.unit.index, f) for p in found for f in p.forces}
     every = [(unit, f) for unit in units(own, lambda point: point.axis_symmetry) for f in own.load.normal_force]
     left = [(unit, f) for unit, f in every if (unit.index, f) not in taken]

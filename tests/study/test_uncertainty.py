@@ -1,4 +1,4 @@
-"""Bands of e_n and quality: closed forms, what is carried from probes to other cases, and what is said of the best."""
+"""Uncertainty intervals of e_n and quality: closed forms, what probes carry to other cases, the verdict on the best."""
 
 from __future__ import annotations
 
@@ -143,18 +143,24 @@ def test_wrong_uncertainties_are_told_of(override, told):
         scene(override)
 
 
-def test_bands_and_a_sweep_exclude_each_other():
+def test_intervals_and_a_sweep_exclude_each_other():
     text = BALL + '[sweep]\n"object.semi_axis_b_mm" = [15, 20]\n'
     parse_scene(text, "ball.toml")
     with pytest.raises(SceneError, match="without a sweep"):
         parse_scene(text, "ball.toml", ALL[:1])
 
 
-def test_files_of_scenes_without_bands_keep_their_digest():
+def test_files_of_scenes_without_intervals_keep_their_digest():
     assert scene().digest == scene("uncertainty.probes=7").digest != scene(ALL[0]).digest
     assert derived(scene("uncertainty.probes=7")) == []
     names = [d.name for d in derived(scene(*ALL))]
-    assert names[:5] == ["e_n_band", "e_n_band_mesh", "e_n_change_mu", "e_n_change_modulus", "e_n_band_pose"]
+    assert names[:5] == [
+        "e_n_interval",
+        "e_n_interval_mesh",
+        "e_n_change_mu",
+        "e_n_change_modulus",
+        "e_n_interval_pose",
+    ]
 
 
 def test_named_probes_are_those_that_are_solved():
@@ -233,33 +239,36 @@ def test_images_of_the_best_grasp_are_no_rivals():
     assert verdict(None, [0, 1, 2], [(0,)] * 3) == ""
 
 
-def test_show_compare_export_and_lookup_take_bands_from_the_file(tmp_path):
+def test_show_compare_export_and_lookup_take_intervals_from_the_file(tmp_path):
     axes = grid_axes(angles=[0.0])
     over = tuple(axis.name for axis in axes)
-    bands = [Derived(f"{name}_band", units, "band", "", over) for name, units in (("e_n", "m"), ("quality", ""))]
-    parts = [Derived(f"{name}_band_mesh", "", "part", "", over) for name in ("e_n", "quality")]
+    intervals = [
+        Derived(f"{name}_interval", units, "interval", "", over) for name, units in (("e_n", "m"), ("quality", ""))
+    ]
+    parts = [Derived(f"{name}_interval_mesh", "", "part", "", over) for name in ("e_n", "quality")]
     shape = tuple(len(axis.values) for axis in axes)
     quality = np.broadcast_to(np.linspace(1.0, 2.0, shape[0])[:, None, None], shape)
-    given = {"derived__quality_band": 0.1 * quality, "derived__quality_band_mesh": np.full(shape, 0.1),
-             "derived__e_n_band": np.full(shape, 1e-3), "derived__e_n_band_mesh": np.full(shape, 0.01)}  # fmt: skip
-    path = make(tmp_path / "b.hdf", axes=axes, derived=(*bands, *parts), quality__curved=quality, **given)
+    given = {"derived__quality_interval": 0.1 * quality, "derived__quality_interval_mesh": np.full(shape, 0.1),
+             "derived__e_n_interval": np.full(shape, 1e-3),
+             "derived__e_n_interval_mesh": np.full(shape, 0.01)}  # fmt: skip
+    path = make(tmp_path / "b.hdf", axes=axes, derived=(*intervals, *parts), quality__ccm=quality, **given)
     ds = softjaw.open(path)
     table = best(ds)
     text = as_text(table, 200)
     assert compare(ds, ds).asked.error == pytest.approx(np.full(shape, 2e-3))
-    assert next(cases(ds))["maps"]["e_n_band"] == 1e-3
+    assert next(cases(ds))["maps"]["e_n_interval"] == 1e-3
     names = [name for name, _ in table.columns]
-    assert table.rows[0][names.index("quality_band")] == pytest.approx(0.2)
+    assert table.rows[0][names.index("quality_interval")] == pytest.approx(0.2)
     assert (
         "the first 2 grasps cannot be told apart (2.000 +- 0.2 to 1.750 +- 0.1" in text
     )  # 0.25 < root(0.2^2 + 0.175^2)
     assert "half-width" in text
-    assert GraspMap(path).at(station=0.01, angle=0, force=3).value("e_n_band") == pytest.approx(1e-3)
+    assert GraspMap(path).at(station=0.01, angle=0, force=3).value("e_n_interval") == pytest.approx(1e-3)
 
 
 def test_a_file_without_errors_knows_none():
     quality = (("station", "angle", "normal_force", "model"), np.ones((2, 2, 1, 1)))
-    ds = xr.Dataset({"quality": quality}, {"model": ["curved"]}, {"derived": ()})
+    ds = xr.Dataset({"quality": quality}, {"model": ["ccm"]}, {"derived": ()})
     assert sure(ds, "quality", 0) is None
 
 
@@ -300,7 +309,7 @@ def test_the_change_by_the_modulus_is_that_of_further_solves():
 
 
 @pytest.mark.long
-def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
+def test_nine_of_ten_mesh_errors_lie_within_the_interval_that_five_probes_give():
     from softjaw.study.case.variations import probe_candidates
     from softjaw.study.flags import LOST
     from softjaw.study.scene import load_scene
@@ -318,6 +327,6 @@ def test_nine_of_ten_mesh_errors_lie_within_the_band_that_five_probes_give():
     assert np.allclose(np.abs(np.array(again) / found[4][probes[2]] - 1), error[0][probes[2]], rtol=1e-5)
     for own in error:
         change = np.where(sound[probes], own[probes], np.nan)
-        band = interval.carried(change, area[probes], area)
-        assert np.mean(own[others] <= band[others]) >= 0.9
-        assert np.median(band[others]) < 6 * np.median(own[others])  # and it is no empty promise
+        width = interval.carried(change, area[probes], area)
+        assert np.mean(own[others] <= width[others]) >= 0.9
+        assert np.median(width[others]) < 6 * np.median(own[others])  # and it is no empty promise

@@ -29,10 +29,9 @@ from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import corners_of, pads
 from softjaw.study.show.view.server import server
 from tests.study.chromium import PROGRAM, Browser
-from tests.study.view_files import FAILED, PRESSURE, SCENE, SIZE, TRAVEL, make, quality
+from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +74,7 @@ def test_a_cut_through_a_corner_makes_two_triangles():
     assert areas(pieces) == pytest.approx(0.5)
 
 
-def test_each_candidate_owns_its_band_under_both_fingers():
+def test_each_candidate_owns_its_interval_under_both_fingers():
     cells = Cells(np.array([0.03, -0.01, 0.01]), np.radians([0, 90]), 2, 0.05, 0.022)
     corners, cell = coloured(corners_on(EllipticCylinder(0.03, 0.03, 0.2)), cells)
     area = areas(corners)
@@ -153,8 +152,8 @@ def test_pads_stand_where_the_file_says(shown):
     assert one.front[..., 0] == pytest.approx(np.full((5, 5), 0.025))
     assert two.front[..., 0] == pytest.approx(np.full((5, 5), -0.025))
     assert np.ptp(one.front.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
-    assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - TRAVEL))
-    assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, TRAVEL - SIZE[2]))
+    assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - CLOSING))
+    assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, CLOSING - SIZE[2]))
     assert one.sides().shape == (17, 4, 3)
     area = 0.5 * np.linalg.norm(
         np.cross(*np.diff(one.quads()[:, [0, 2, 1, 3]].reshape(-1, 2, 2, 3), axis=2)[:, :, 0].swapaxes(0, 1)), axis=1
@@ -247,7 +246,7 @@ def test_the_page_holds_every_solved_case(shown):
     assert left_out == 0
     assert set(told["cases"]) == {f"{k} {c}" for k in (0, 1) for c in range(6)} - {"1 5", "1 0"}
     assert told["start"] == {"candidate": 2, "force": 1, "quantity": "quality"}
-    assert told["remarks"]["1 5"] == "no &lt;/script&gt; convergence"
+    assert told["notes"]["1 5"] == "no &lt;/script&gt; convergence"
     assert told["words"]["1 5"][-1] == "failed: no </script> convergence"
     assert told["states"] == [[1] * 6, [0, 1, 1, 1, 1, 2]]
     assert told["quantities"][0]["values"][1][2] == pytest.approx(quality(index))

@@ -101,10 +101,10 @@ def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
     assert "0.3 mm PP (1.3 GPa, yields at 31000 kPa), standing, open top, dents up to 1.5 mm allowed" in text
     assert RULE in text
     # the sentence states the numbers that the choice is made by
-    assert f"below {100 * wall.STIFF:g} % of the pads' travel" in RULE
-    assert f"up to {wall.SMALL_DENT:g} of the wall's thickness" in RULE
+    assert f"below {100 * wall.STIFF:g} % of the pads' closing displacement" in RULE
+    assert f"up to {wall.SMALL_INDENTATION:g} of the wall's thickness" in RULE
     forced = solved[0].with_values({"effects.object": "rigid"})
-    assert "rigid for every candidate, no dent and no stress will be known" in scene_text(forced, "can.toml")
+    assert "rigid for every candidate, no indentation and no stress will be known" in scene_text(forced, "can.toml")
 
 
 def test_a_rigid_object_has_no_line_about_a_wall(solved):
@@ -139,13 +139,13 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     assert fine.memory > 4 * size.memory
 
 
-def test_show_has_dents_stress_and_the_window_of_forces(can):
+def test_show_has_indentations_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
         text = as_text(best(dataset(result)), 200)
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
-    assert names.split()[-3:] == ["dent", "stress", "window"]
+    assert names.split()[-3:] == ["indentation", "stress", "window"]
     assert units.split()[-4:] == ["[mm]", "[kPa]", "[N]", "flags"]
     assert "safety" in units
     assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
@@ -156,7 +156,9 @@ def test_show_has_dents_stress_and_the_window_of_forces(can):
     told = json.loads(as_json(strong))
     assert told["force"] == 3.0
     assert told["units"]["wall_stress"] == "Pa"
-    assert {"dent", "wall_stress", "force_low", "force_high", "safety_factor", "flags"} <= told["grasps"][0].keys()
+    assert {"indentation", "wall_stress", "force_low", "force_high", "safety_factor", "flags"} <= told["grasps"][
+        0
+    ].keys()
     assert [g["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for g in told["grasps"]] == [0, 0]  # as in the file
     assert "force_low [N]" in as_csv(strong).splitlines()[0]
 
@@ -178,7 +180,7 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     ds = xr.Dataset({"flags": (over, np.zeros((1, 4), np.int64)), "normal_force": [1.0, 2, 3, 4]})
     assert judged(ds).tolist() == [[0, 0, 0, 0]]
     ds["safety_factor"] = ((*over, "model"), np.array([[[0.5], [1.0], [1.5], [2.0]]]))
-    ds = ds.assign(force_low=("angle", [2.0]), force_high=("angle", [3.0])).assign_coords(model=["curved"])
+    ds = ds.assign(force_low=("angle", [2.0]), force_high=("angle", [3.0])).assign_coords(model=["ccm"])
     flags = judged(ds)
     assert flags.tolist() == [[Flag.TOO_WEAK, 0, 0, Flag.TOO_STRONG]]
     assert borne_level(np.full((1, 4), DONE), flags) == 2
@@ -187,7 +189,7 @@ def test_cases_outside_their_window_are_judged_by_the_force():
 
 
 def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
-    """3 N dent the can by more than is allowed; at 1 N both stations are safe."""
+    """3 N indentation the can by more than is allowed; at 1 N both stations are safe."""
     with open_result(can) as result:
         data = Data(result)
         high = result.derived("force_high")[0, 0]
@@ -202,7 +204,7 @@ def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
         effects = tables.effects(data)
     assert words["text"].startswith("The wall: 0.3 mm PP")
     assert len(limits["rows"]) == 2
-    assert len(figures) == 3  # safe forces, sections of the wall, force over dent
+    assert len(figures) == 3  # safe forces, sections of the wall, force over indentation
     assert bars.customdata[0] == pytest.approx(high)
     assert np.add(bars.base, bars.y) == pytest.approx(bars.customdata)
     assert np.ravel(level.z).tolist() == [2.0, 2.0]  # nonlinear shell
@@ -210,22 +212,22 @@ def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
 
 
 def test_sections_and_the_object_show_the_wall_as_it_is_deformed(can, solved):
-    """The can's radius is 30 mm; its wall comes nearer to the axis by the dent, but for the motion as a whole."""
+    """The can's radius is 30 mm; its wall comes nearer to the axis by the indentation, less the motion as a whole."""
     with open_result(can) as result:
         data, scene = Data(result), solved[0]
         place = result.read("wall/place")[0, 0, 1].reshape(48, 40, 3)
-        dent = data.at("dent", (0, 0, 1))
+        indentation = data.at("indentation", (0, 0, 1))
         section = curves.wall_section(data, scene, (0, 0, 1))["figure"].data
         view, index = view_of(data, 0, (None, None), 3.0)
     before = undeformed(scene.object, 0.0)
     radius, wall_of = (np.hypot(x[..., 0], x[..., 1]) for x in (before, place))
-    assert (radius - wall_of)[:, 20:].max() == pytest.approx(dent, rel=0.1)
+    assert (radius - wall_of)[:, 20:].max() == pytest.approx(indentation, rel=0.1)
     lines = [np.stack([line.x, line.y]) for line in section]  # before: along and across the axis; after: the same
     assert np.hypot(*lines[1]) == pytest.approx(30.0, abs=0.05)
     assert (lines[0][1, 0], lines[0][1, -1]) == (pytest.approx(-30.0, abs=1e-6), pytest.approx(30.0, abs=1e-6))
     assert 30.0 - lines[3][1, 0] > 1.0
     moved = np.hypot(*view.moved(index)[:, :2].T) - np.hypot(*view.surface.points[:, :2].T)
-    assert -moved.min() == pytest.approx(dent, rel=0.2)
+    assert -moved.min() == pytest.approx(indentation, rel=0.2)
 
 
 def test_failed_candidates_are_shown_as_failed(tmp_path, solved):

@@ -70,17 +70,17 @@ def alike(found, expected, tolerance):
     return [n for n in differing(found, expected, tolerance, scales) if n.startswith(("maps/", "wall/", "fingers/"))]
 
 
-def test_the_level_follows_the_dent_and_says_so():
+def test_the_level_follows_the_indentation_and_says_so():
     levels = []
     for thickness, modulus, forces in ((1.0, 200.0, "[0.2]"), (0.7, 5.0, "[0.5]"), (0.2, 200.0, "[4]")):
         wall_ = f"object.wall_mm={thickness}", f"object.young_modulus_gpa={modulus}"
         result = solved(CUP, *wall_, forces=forces)[0]
         levels.append(result.effects["object"])
-        assert np.isfinite(result.values.get("maps/dent", 0.0))
+        assert np.isfinite(result.values.get("maps/indentation", 0.0))
     names, indicators, reasons = zip(*levels, strict=True)
     assert names == ("rigid", "linear shell", "nonlinear shell")
     assert indicators == tuple(sorted(indicators))
-    assert indicators[1] <= wall.SMALL_DENT < indicators[2]
+    assert indicators[1] <= wall.SMALL_INDENTATION < indicators[2]
     assert "below" in REASONS[reasons[0]]
     assert "below" in REASONS[reasons[1]]
     assert "above" in REASONS[reasons[2]]
@@ -98,7 +98,9 @@ def test_quarter_half_and_full_models_of_an_oval_bottle_are_one(angle):
         assert result.effects["model_size"][0] == size
         found, expected = result.values["maps/e_n"], wanted["quarter"].values["maps/e_n"]
         np.testing.assert_allclose(found, expected, rtol=1e-6)
-        assert result.values["maps/dent"] == pytest.approx(wanted["quarter"].values["maps/dent"], rel=1e-5)
+        assert result.values["maps/indentation"] == pytest.approx(
+            wanted["quarter"].values["maps/indentation"], rel=1e-5
+        )
         np.testing.assert_allclose(result.values["wall/place"], wanted["quarter"].values["wall/place"], atol=1e-8)
 
 
@@ -146,7 +148,7 @@ def test_images_of_a_grasp_are_what_their_own_solution_would_be():
     own = solved(CUP, where="stations_mm = [40]\nangles_deg = [37]")[-1]
     np.testing.assert_allclose(image.values["wall/place"], own.values["wall/place"], atol=1e-9)
     np.testing.assert_allclose(image.values["fingers/pose_origin"], own.values["fingers/pose_origin"], atol=1e-9)
-    assert image.values["maps/dent"] == pytest.approx(own.values["maps/dent"], rel=1e-6)
+    assert image.values["maps/indentation"] == pytest.approx(own.values["maps/indentation"], rel=1e-6)
 
 
 def test_results_do_not_depend_on_what_was_solved_before():
@@ -168,8 +170,8 @@ def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
     assert 0 < result.values["maps/e_n_error"] < 0.3
     sweep = '[sweep]\n"object.wall_mm" = [0.4, 0.8]\n'
     one, two = units_of(CUP, forces=f"[1]\n{sweep}")
-    dents = [next(iter(pipeline.solve_unit(u)))[1].values["maps/dent"] for u in (one, two)]
-    assert dents[0] > 2 * dents[1]
+    indentations = [next(iter(pipeline.solve_unit(u)))[1].values["maps/indentation"] for u in (one, two)]
+    assert indentations[0] > 2 * indentations[1]
 
 
 def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):

@@ -14,7 +14,7 @@ from softjaw.study.result.store import ResultWriter, create
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
-TRAVEL, PRESSURE = 2e-3, 3e4
+CLOSING, PRESSURE = 2e-3, 3e4
 SCENE = """
 [object]
 shape = "elliptic_cylinder"
@@ -77,7 +77,7 @@ def solved(layout, index):
     three = np.array([1.0, 1.1, 0.9])
     values = {"maps/quality": quality(index) * three, "maps/e_n": 0.01 * three, "maps/flags": 0.0}
     rotation, origin = (np.stack(found) for found in zip(*poses(index), strict=True))
-    values |= {"fingers/pose_rotation": rotation, "fingers/pose_origin": origin, "fingers/travel": np.full(2, TRAVEL)}
+    values |= {"fingers/pose_rotation": rotation, "fingers/pose_origin": origin, "fingers/closing": np.full(2, CLOSING)}
     values |= {"fingers/frame_origin": np.zeros((2, 3)), "fingers/frame_axes": np.stack([np.eye(3)] * 2)}
     values |= {"fingers/S": np.full(2, force), "fingers/f_x_max": 0.8 * force * np.stack([three] * 2)}
     values |= {"fingers/tau_z_max": 0.01 * force * np.stack([three] * 2)}

@@ -95,7 +95,7 @@ class Choice:
         probes, NaN where the combination was not solved there.
     seconds : float
         CPU time per case [s].
-    remark : str
+    note : str
         How it was chosen, or why not.
     held_out : float
         The largest on cases that it was not chosen by; NaN where there are none.
@@ -108,7 +108,7 @@ class Choice:
     predicted: float
     measured: float
     seconds: float
-    remark: str
+    note: str
     held_out: float = math.nan
     met: bool = False
 
@@ -119,13 +119,13 @@ class Choice:
         verdict = "" if self.met else "; THE TARGET IS NOT MET"
         return (
             f"accuracy.e_n = {self.target:g}: {values_text(self.values)}; predicted error {percent(self.predicted)}"
-            f"{measured}, about {seconds_text(self.seconds)} CPU per case ({self.remark}){verdict}"
+            f"{measured}, about {seconds_text(self.seconds)} CPU per case ({self.note}){verdict}"
         )
 
 
-def nothing(target: float, remark: str, seconds: float = math.nan) -> Choice:
+def nothing(target: float, note: str, seconds: float = math.nan) -> Choice:
     """The scene as it is, with an error that is not known."""
-    return Choice({}, target, math.nan, math.nan, seconds, remark)
+    return Choice({}, target, math.nan, math.nan, seconds, note)
 
 
 def explicit(scene: Scene) -> dict[str, Any]:
@@ -247,8 +247,8 @@ def choose(
     base_seconds = float(np.mean([m.seconds for m in own]))
     if not all(np.isfinite(m.values).all() for m in own):
         told = next(m.message for m in own if not np.isfinite(m.values).all())
-        remark = f"a probe has no solution with the scene as it is, so errors are not known: {told}"
-        return nothing(target, remark, base_seconds)
+        note = f"a probe has no solution with the scene as it is, so errors are not known: {told}"
+        return nothing(target, note, base_seconds)
     made, goal = combinations(tables, base_seconds, given), reference(study, tables)
     doubtful = _unsure_places(own, goal.flags)
     if not made:
@@ -274,8 +274,8 @@ def choose(
     choice = _best(tried, made, target, bool(probes))
     if not doubtful:
         return choice
-    remark = f"{choice.remark}; even the finest levels are flagged at {doubtful[0]}, so the error is not known there"
-    return replace(choice, met=False, remark=remark)
+    note = f"{choice.note}; even the finest levels are flagged at {doubtful[0]}, so the error is not known there"
+    return replace(choice, met=False, note=note)
 
 
 def _solved(
@@ -312,18 +312,18 @@ def _best(tried: Sequence[Choice], made: Sequence[Combination], target: float, m
     """What meets the target, or is predicted to where nothing can be ``measured``; else the best that was reached."""
     if tried and tried[-1].met:
         where = "the probes" if math.isnan(tried[-1].held_out) else "the probes and on cases that it was not chosen by"
-        return replace(tried[-1], remark=f"the cheapest that meets the target on {where}")
+        return replace(tried[-1], note=f"the cheapest that meets the target on {where}")
     known = [choice.values for choice in tried]
     within = next((c for c in made if c.error <= target and dict(c.level.values) not in known), None)
     if within is not None and not measured:
         return _choice(within, target, "predicted from one knob at a time", True)
-    remark = "no measured setting meets the target, this is the best that was reached"
-    remark += "; raise --time-limit of 'softjaw cost'"
+    note = "no measured setting meets the target, this is the best that was reached"
+    note += "; raise --time-limit of 'softjaw cost'"
     finite = [choice for choice in tried if math.isfinite(choice.measured)]
     if not finite:
-        return _choice(_most_accurate(made), target, remark, False)
-    return replace(min(finite, key=lambda c: max(c.measured, np.nan_to_num(c.held_out))), remark=remark)
+        return _choice(_most_accurate(made), target, note, False)
+    return replace(min(finite, key=lambda c: max(c.measured, np.nan_to_num(c.held_out))), note=note)
 
 
-def _choice(chosen: Combination, target: float, remark: str, met: bool) -> Choice:
-    return Choice(dict(chosen.level.values), target, chosen.error, math.nan, chosen.seconds, remark, met=met)
+def _choice(chosen: Combination, target: float, note: str, met: bool) -> Choice:
+    return Choice(dict(chosen.level.values), target, chosen.error, math.nan, chosen.seconds, note, met=met)

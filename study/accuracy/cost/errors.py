@@ -45,7 +45,7 @@ class Limit:
         discrete levels is exact by definition.
     order : float
         Observed order; NaN where none was seen.
-    remark : str
+    note : str
         Why no order was seen; empty where one was.
     """
 
@@ -53,7 +53,7 @@ class Limit:
     uncertainty: FloatArray
     doubt: FloatArray
     order: float
-    remark: str
+    note: str
 
 
 def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
@@ -79,12 +79,12 @@ def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
     step = np.abs(f[-1] - f[-2]) if len(f) > 1 else np.full(finest.shape, np.nan)
     if not np.isfinite(h).all():
         return Limit(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
-    order, remark = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
-    used = ASSUMED if remark else order if np.isnan(formal) else min(order, formal)
+    order, note = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
+    used = ASSUMED if note else order if np.isnan(formal) else min(order, formal)
     correction, before = (_correction(h[k - 2 : k or None], f[k - 2 : k or None], used) for k in (0, -1))
-    if remark:
+    if note:
         shrunk = np.abs(before) * (h[-1] / h[-2]) ** used if len(h) > 1 else before
-        return Limit(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, remark)
+        return Limit(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, note)
     known = np.isfinite(correction)
     value = np.where(known, finest + np.where(known, correction, 0.0), finest)
     doubt = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))

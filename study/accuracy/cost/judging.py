@@ -98,7 +98,7 @@ def judge(found: SolvedProbe, knob: str, level: str) -> Measured:
 def _contact_model(found: SolvedProbe, level: str) -> Callable:
     if level == WINKLER:
         return lambda _, force: winkler_case(found, force)
-    number = MODELS.index("flat" if level.endswith("planar") else "curved")
+    number = MODELS.index("pcm" if level.endswith("planar") else "ccm")
     return lambda contacts, _: _judged(found, contacts, found.scene.limit_surface, number)
 
 
@@ -118,7 +118,7 @@ def _surface(found: SolvedProbe, level: str) -> Callable:
 
 def _score(found: SolvedProbe, level: str) -> Callable:
     def ellipsoids(contacts: list[Contact]) -> list[EllipsoidBody]:
-        return [EllipsoidBody(c.ellipsoids["curved"].semi_axes) for c in contacts]
+        return [EllipsoidBody(c.ellipsoids["ccm"].semi_axes) for c in contacts]
 
     if level == "exact":
         return lambda contacts, _: _with_quality(found, contacts, ellipsoids(contacts))
@@ -132,7 +132,7 @@ def _score(found: SolvedProbe, level: str) -> Callable:
             loads = contact.wrench_map(settings.arms, settings.torques, np.zeros(3))
             cones.append(np.vstack([np.zeros(6), np.hstack([np.ones((len(V), 1)), V]) @ loads.T]))
         sums = (cones[0][:, None] + cones[1][None]).reshape(-1, 6)
-        return np.array([*_limits(contacts, "curved"), hull_volume(sums)])
+        return np.array([*_limits(contacts, "ccm"), hull_volume(sums)])
 
     return hull
 
@@ -153,13 +153,13 @@ def _limits(contacts: list[Contact], name: str) -> tuple[float, float, float]:
 
 def _with_quality(found: SolvedProbe, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
     """`QUANTITIES` with the exact quality of any bodies in the pose that the contacts have."""
-    return np.array([*_limits(contacts, "curved"), volume_in_pose(contacts, bodies, found.settings)])
+    return np.array([*_limits(contacts, "ccm"), volume_in_pose(contacts, bodies, found.settings)])
 
 
 def _wrench_hull(scene: Scene, contact: Contact) -> PolytopeBody:
     """The limit surface itself, from inside: the hull of many friction wrenches per unit of S."""
     twists = fibonacci_twists(HULL, contact.rho)
-    wrench = friction_wrench(contact.local, twists, scene.friction.mu)[:, [0, 1, 5]] / contact.limits["curved"].S
+    wrench = friction_wrench(contact.local, twists, scene.friction.mu)[:, [0, 1, 5]] / contact.limits["ccm"].S
     wrench = np.vstack([wrench, -wrench])  # the reverse of a motion
     try:
         return PolytopeBody(wrench[ConvexHull(wrench / [1.0, 1.0, contact.rho]).vertices])
@@ -173,4 +173,4 @@ def winkler_case(found: SolvedProbe, force: float) -> FloatArray:
     for pose in found.probe.unit.candidate.poses:
         finger = model.approach(found.obj, pose, scene.gripper.pad_size)
         contacts.append(Contact(winkler_pad(scene.gripper, finger).patch(force), scene.friction.mu, finger.pose))
-    return np.array([*_limits(contacts, "flat"), quality(contacts, found.settings, "flat")])
+    return np.array([*_limits(contacts, "pcm"), quality(contacts, found.settings, "pcm")])

@@ -122,7 +122,7 @@ def _orders(table: KnobErrors) -> str:
         reference = "the limit of the pad meshes" if table.family else "the last row"
         return f"No order is expected; the reference is {reference}."
     seen = [
-        f"{name}: order {found.order:.1f}" if not found.remark else f"{name}: order not seen ({found.remark})"
+        f"{name}: order {found.order:.1f}" if not found.note else f"{name}: order not seen ({found.note})"
         for name, found in zip(NAMES, table.limits, strict=True)
     ]
     end = " Both kinds of pad meshes are measured against the better known of their limits." if table.family else ""

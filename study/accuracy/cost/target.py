@@ -239,7 +239,7 @@ def judge(levels: Sequence[Level], found: Sequence[Sequence[Measured]], target: 
     carried = flagged(flags[sound], last)[:, sure].any(axis=1)
     told += [f"{level.name} is flagged where the finest mesh is not" for level in np.array(kept, object)[carried]]
     good = (np.nanmax(error, axis=1) <= target) & ~_no_luck(carried)
-    told.insert(0, f"no order seen: {end.remark}" if end.remark else f"observed order {end.order:.1f}")
+    told.insert(0, f"no order seen: {end.note}" if end.note else f"observed order {end.order:.1f}")
     return Judged(kept, names, error, good, carried, bool((sure | ~alive).all()), "; ".join(told))
 
 
@@ -258,8 +258,8 @@ def quick_choice(
     """
     target, own, levels = float(scene.accuracy.e_n), plain(scene), ladder(scene)
     if len(levels) < FEWEST:
-        remark = "the scene gives the mesh itself, so nothing is left to choose and its error is not known"
-        return nothing(target, remark)
+        note = "the scene gives the mesh itself, so nothing is left to choose and its error is not known"
+        return nothing(target, note)
 
     def solved(level: Level, probes: Sequence[Probe]) -> list[Measured]:
         setting = setting_of(own, level)

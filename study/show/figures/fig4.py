@@ -21,8 +21,8 @@ LONGEST = 3.6  # arrow [mm]
 FREE = "#eef0f1"  # faces that touch nothing
 COMPONENTS = {"f_y": ("across, f_y", "-", "o"), "tau_z": ("torque, tau_z", "--", "s"), "f_x": ("along, f_x", ":", "^")}
 AGAINST = {
-    "flat": "planar model scaled by S, the paper's",
-    "projected": "planar model scaled by the force F_N",
+    "pcm": "planar model scaled by S, the paper's",
+    "pcm_projected": "planar model scaled by the force F_N",
 }
 
 
@@ -96,7 +96,7 @@ def curvature(data: Data) -> tuple[Any, str]:
 
 def _lost(data: Data, name: str, model: str, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Overestimate along the sweep at a force ``(r,)`` [%], and its difference to the coarser mesh."""
-    key = f"{name}_overestimate" + ("" if model == "flat" else "_projected")
+    key = f"{name}_overestimate" + ("" if model == "pcm" else "_pcm_projected")
     found, error = data.map(key)[:, 0, 0, k], data.map(f"{key}_error")
     return 100 * found, 100 * np.abs(np.zeros(len(found)) if error is None else error[:, 0, 0, k])
 
@@ -105,9 +105,9 @@ def _grows(data: Data, x: np.ndarray, order: np.ndarray) -> str:
     last = len(data.forces) - 1
     words = []
     for name in ("f_y", "tau_z"):
-        lost = _lost(data, name, "flat", last)[0][order]
+        lost = _lost(data, name, "pcm", last)[0][order]
         words.append(f"{name} {number(lost[0], 2)} to {number(lost[-1], 2)} %")
-    along = np.abs(_lost(data, "f_x", "flat", last)[0]).max()
+    along = np.abs(_lost(data, "f_x", "pcm", last)[0]).max()
     return (
         f"at {number(data.forces[last])} N the flat model overestimates, from a/b {number(x.min(), 2)} to "
         f"{number(x.max(), 2)}: {', '.join(words)}; f_x at most {number(along, 2)} %"

@@ -16,7 +16,7 @@ from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad, pads
 
 MAP = "bottle"  # the scene whose candidates are shown
-MODELS = ("flat", "curved")
+MODELS = ("pcm", "ccm")
 PLANES = ((0, 1), (1, 2))
 NAMES = ("f_x", "f_y", "tau_z")
 UNITS = ("N", "N", "N mm")
@@ -118,7 +118,7 @@ def _shadows(panel: Any, known: dict[str, StoredSurface], i: int, j: int) -> Non
         outline = found.outline(i, j, TURN) * (found.unit * MILLI)[[i, j]]
         closed = np.vstack([outline, outline[:1]])
         style = {k: v for k, v in pictures.MODEL_STYLE[model].items() if k != "marker"}
-        panel.plot(*closed.T, **style, label={"curved": "curved (CCM)", "flat": "flat (PCM)"}[model])
+        panel.plot(*closed.T, **style, label={"ccm": "curved (CCM)", "pcm": "flat (PCM)"}[model])
     panel.set(xlabel=f"{NAMES[i]} [{UNITS[i]}]", ylabel=f"{NAMES[j]} [{UNITS[j]}]")
     if (i, j) == (0, 1):
         panel.set_aspect("equal", adjustable="datalim")
@@ -132,7 +132,7 @@ def _gaps(panel: Any, known: dict[str, StoredSurface]) -> float:
         t = circle(i, j, TURN)[: TURN // 2 + 1]
         # along a motion the wrench resists as much as the body reaches: its support
         reach = {model: np.einsum("ki,ki->k", found.wrenches(t), t) for model, found in known.items()}
-        gap = 100 * (1 - reach["curved"] / reach["flat"])
+        gap = 100 * (1 - reach["ccm"] / reach["pcm"])
         largest = max(largest, float(gap.max()))
         panel.plot(np.linspace(0, 180, len(gap)), gap, color=pictures.INK, label=f"{NAMES[i]} to {NAMES[j]}", **look)
     panel.set(xlabel="direction in the plane [°]", ylabel="1 - curved / flat [%]", xlim=(0, 180), ylim=(0, None))

@@ -18,16 +18,16 @@ MOTIONS = 250  # slip motions whose wrenches are drawn, and their opposites
 SUPPORTS = 8000  # planes that bound the exact body
 ROWS, COLUMNS = 61, 121  # directions from pole to pole, and round
 ERRORS = "viridis"
-FITS = {"misfit_ellipsoid": ("ellipsoid from three motions", "#801650", "--", "D"),
-        "misfit": ("convex quartic", pictures.INK, "-", "v")}  # fmt: skip
+FITS = {"fit_error_ellipsoid": ("ellipsoid from three motions", "#801650", "--", "D"),
+        "fit_error": ("convex quartic", pictures.INK, "-", "v")}  # fmt: skip
 FORCE = 3.0  # at which the error is drawn along the object [N]
 
 
 def fitted_surfaces(data: Data) -> tuple[Any, str]:
     """(a) The ellipsoid and (b) the convex quartic, in the colours of their distance from the exact body."""
     index = (0, 0, len(data.forces) - 1)
-    found = stored_surface(data, index, 0, "curved")
-    shapes = {"misfit_ellipsoid": found.ellipsoid, "misfit": found.chosen}
+    found = stored_surface(data, index, 0, "ccm")
+    shapes = {"fit_error_ellipsoid": found.ellipsoid, "fit_error": found.chosen}
     u = _directions() * _most(found)
     exact = exact_radius(found, u)
     errors = {name: 100 * np.abs(shape.radius(u) / exact - 1) for name, shape in shapes.items()}
@@ -74,7 +74,7 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
     solids.labels(plotter, 1.33 * np.eye(3), ["f_x", "f_y", "tau_z"])
 
 
-def misfit_along(data: Data) -> tuple[Any, str]:
+def fit_error_along(data: Data) -> tuple[Any, str]:
     """(c) Mean error of both fitted surfaces at every candidate along the object."""
     k = nearest(data.forces, FORCE)
     z = 1e3 * data.axes[-3].values

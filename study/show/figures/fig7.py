@@ -13,11 +13,11 @@ from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene
 
 LOOKS = {
-    "flat": {"ms": 6, "mfc": "none", "lw": 1.0},
-    "projected": {"ms": 3.5, "lw": 1.3},
-    "curved": {"ms": 3, "lw": 1.3},
+    "pcm": {"ms": 6, "mfc": "none", "lw": 1.0},
+    "pcm_projected": {"ms": 3.5, "lw": 1.3},
+    "ccm": {"ms": 3, "lw": 1.3},
 }
-NAMES = {"curved": "curved (CCM)", "flat": "flat (PCM), scaled by S", "projected": "planar, scaled by F_N"}
+NAMES = {"ccm": "curved (CCM)", "pcm": "flat (PCM), scaled by S", "pcm_projected": "planar, scaled by F_N"}
 
 
 def force_study(data: Data) -> tuple[Any, str]:
@@ -30,8 +30,8 @@ def force_study(data: Data) -> tuple[Any, str]:
         for model in LOOKS:
             look = {**pictures.MODEL_STYLE[model], **LOOKS[model]}
             top.plot(forces, values[model], **look, label=NAMES[model])
-            if model != "curved":
-                below.plot(forces, 100 * (1 - values["curved"] / values[model]), **look)
+            if model != "ccm":
+                below.plot(forces, 100 * (1 - values["ccm"] / values[model]), **look)
         top.set_title(f"({'abcd'[k]}) {title}")
         below.axhline(0, color=pictures.SOFT, lw=0.7)
         below.set(xlabel="normal force [N]", xlim=(0, None))
@@ -64,8 +64,8 @@ def quantities(data: Data) -> dict[str, tuple[str, dict[str, np.ndarray]]]:
 def _said(data: Data, lines: dict[str, tuple[str, dict[str, np.ndarray]]]) -> str:
     words = []
     for name, (_, values) in lines.items():
-        one, other = values["curved"][[0, -1]]
-        gap = 100 * (1 - values["curved"] / values["flat"])[[0, -1]]
+        one, other = values["ccm"][[0, -1]]
+        gap = 100 * (1 - values["ccm"] / values["pcm"])[[0, -1]]
         words.append(
             f"{name} {number(one, 4)} to {number(other, 4)}, below flat by {number(gap[0], 2)} to {number(gap[1], 2)} %"
         )

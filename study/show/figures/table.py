@@ -34,7 +34,7 @@ FIGURES = (
     Figure("5a", ("fig5-candidate",), fig5.candidates),
     Figure("5b", ("fig5-candidate", "fig4-curvature"), fig5.wrench_spaces),
     Figure("6ab", ("fig5-candidate",), fig6.fitted_surfaces),
-    Figure("6c", ("bottle",), fig6.misfit_along, gaps=True),
+    Figure("6c", ("bottle",), fig6.fit_error_along, gaps=True),
     Figure("7", ("fig7-force-study",), fig7.force_study),
     Figure("8", ("bottle", "cup"), fig8.maps, gaps=True),
 )

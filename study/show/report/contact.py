@@ -99,7 +99,7 @@ def body(surface: StoredSurface) -> np.ndarray | None:
 def limit_surfaces(data: Data, index: tuple[int, ...]) -> Block | None:
     """Shadows of the weaker finger's limit surfaces, CCM beside PCM, and both in space; None where none is stored."""
     finger = weaker(data, index)
-    found = {model: stored_surface(data, index, finger, model) for model in ("curved", data.planar)}
+    found = {model: stored_surface(data, index, finger, model) for model in ("ccm", data.planar)}
     known = {model: s for model, s in found.items() if s is not None and s.ellipsoid.rank == 3}
     if not known:
         return None
@@ -116,7 +116,7 @@ def limit_surfaces(data: Data, index: tuple[int, ...]) -> Block | None:
     made.update_scenes(plots.scene("", names, aspectmode="cube"))
     made.update_layout(legend={"y": 0.56, "yanchor": "middle"}, margin={"t": 20, "b": 10})
     exact = "Dots: exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
-    fitted, ellipsoid = data.at("misfit", index), data.at("misfit_ellipsoid", index)
+    fitted, ellipsoid = data.at("fit_error", index), data.at("fit_error_ellipsoid", index)
     off = f"Fit error (CCM): {number(100 * fitted, 2)} % fitted, {number(100 * ellipsoid, 2)} % from three motions."
     caption = (
         f"{data.place(index, force=True)}: the loads that one contact carries without slipping. Above its shadows: full"
@@ -152,7 +152,7 @@ def _in_space(made: Any, surface: StoredSurface, model: str) -> None:
     if place is not None:
         x, y, z = np.moveaxis(place.astype(np.float32), -1, 0)
         made.add_surface(x=x, y=y, z=z, colorscale=[[0, colour], [1, colour]], showscale=False, row=2, col=1,
-                         opacity=0.75 if model == "curved" else 0.25, name=plots.MODELS[model][0])  # fmt: skip
+                         opacity=0.75 if model == "ccm" else 0.25, name=plots.MODELS[model][0])  # fmt: skip
     exact = surface.samples(SAMPLES)
-    if exact is not None and model == "curved":
+    if exact is not None and model == "ccm":
         made.add_trace(plots.points(exact * surface.unit * FACTORS, plots.INK, 1.5), row=2, col=1)

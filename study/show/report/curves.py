@@ -24,14 +24,14 @@ PANELS = (
     ("tau_z_max", "max tau_z [N mm]", 1e3),
     ("f_x_max", "max f_x / F, along the pad [-]", "F"),
     ("f_y_max", "max f_y / F, across the pad [-]", "F"),
-    ("travel", "travel of the pads [mm]", 1e3),
+    ("closing", "closing displacement of the pads [mm]", 1e3),
 )
 COMPONENTS = {
     "f_x": ("along, f_x", "#12436d", "circle"),
     "f_y": ("across, f_y", "#c05a00", "square"),
     "tau_z": ("torque, tau_z", "#2a8c82", "triangle-up"),
 }
-AGAINST = {"flat": "against PCM, scaled by S", "projected": "against PCM, scaled by F_N"}
+AGAINST = {"pcm": "against PCM, scaled by S", "pcm_projected": "against PCM, scaled by F_N"}
 MOST_LINES, FEWEST = 40, 4
 
 
@@ -68,10 +68,10 @@ def _models(data: Data, position: int, index: tuple[int, ...], mu: float | None)
     for k, (name, _, factor) in enumerate(PANELS):
         row, column = k // 3 + 1, k % 3 + 1
         scale = 1 / forces if factor == "F" else factor
-        by_model = {m: found[cut] * scale for m in (MODELS if name != "travel" else ("curved",))
+        by_model = {m: found[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
                     if (found := data.map(name, m)) is not None}  # fmt: skip
         error = data.map(f"{name}_error")
-        bars = None if error is None or "curved" not in by_model else by_model["curved"] * error[cut]
+        bars = None if error is None or "ccm" not in by_model else by_model["ccm"] * error[cut]
         plots.lines(made, x, by_model, row, column, bars)
         if factor == "F" and mu is not None:
             made.add_hline(mu, line={"color": plots.SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
@@ -95,7 +95,7 @@ def abscissa(data: Data, position: int) -> tuple[Any, dict[str, Any]]:
 
 def fit_error(data: Data, position: int, index: tuple[int, ...]) -> Block | None:
     """Fit error of both limit surfaces along one axis; None where it is not stored."""
-    found = {"fitted surface": data.map("misfit"), "ellipsoid from three motions": data.map("misfit_ellipsoid")}
+    found = {"fitted surface": data.map("fit_error"), "ellipsoid from three motions": data.map("fit_error_ellipsoid")}
     lines = {name: 100 * values[along(position, index)] for name, values in found.items() if values is not None}
     if not any(np.isfinite(line).sum() > 1 for line in lines.values()):
         return None
@@ -135,7 +135,7 @@ def shape_axis(data: Data, scene: Any) -> int | None:
 def overestimates(data: Data, position: int, index: tuple[int, ...]) -> dict[tuple[str, str], Any]:
     """Overestimate of each planar model and component along an axis [-], and its error or None."""
     found, cut = {}, along(position, index)
-    for model, suffix in (("flat", ""), ("projected", "_projected")):
+    for model, suffix in (("pcm", ""), ("pcm_projected", "_pcm_projected")):
         for key in COMPONENTS:
             values, error = (data.map(f"{key}_overestimate{suffix}{end}") for end in ("", "_error"))
             if values is not None and np.isfinite(values[cut]).any():
@@ -198,32 +198,34 @@ def _differences(data: Data, name: str, x: np.ndarray, lines: dict[Any, Any], in
 
 
 def wall_curves(data: Data, index: tuple[int, ...], allowed: float | None) -> Block | None:
-    """Normal force over travel and over the dent of the stations; ``allowed`` is the dent that the scene allows [m]."""
-    travel, dent = data.map("travel"), data.map("dent")
-    if dent is None or travel is None or len(data.forces) < 2:
+    """Normal force over closing and over indentation of the stations; ``allowed``: what the scene allows [m]."""
+    closing, indentation = data.map("closing"), data.map("indentation")
+    if indentation is None or closing is None or len(data.forces) < 2:
         return None
     cut = (*index[:-3], slice(None), index[-2], slice(None))
     snapped = (data.flags & Flag.SNAPPED > 0)[cut]
-    made = plots.figure(1, 2, ("travel of the pads [mm]", "dent [mm]"), shared_yaxes=True)
+    made = plots.figure(1, 2, ("closing displacement of the pads [mm]", "indentation [mm]"), shared_yaxes=True)
     others = [i for i in range(data.shape[-3]) if i != index[-3]]
     for i in (*others[:: -(-len(others) // MOST_LINES) or 1], index[-3]):
         own = i == index[-3]
         place = data.place((*index[:-3], i, *index[-2:]))
         look = {"color": "#12436d" if own else "#aeb6bc", "width": 2.5 if own else 1}
         symbols = ["circle", *np.where(snapped[i], "diamond-open", "circle")]
-        for column, found in enumerate((travel, dent), start=1):
+        for column, found in enumerate((closing, indentation), start=1):
             made.add_scatter(x=[0, *1e3 * found[cut][i]], y=[0, *data.forces], mode="lines+markers", line=look,
                              marker={"symbol": symbols, "size": 6}, name=label(place), showlegend=False,
                              connectgaps=False, row=1, col=column)  # fmt: skip
     if allowed is not None:
         made.add_vline(1e3 * allowed, line={"color": "#c05a00", "dash": "dash"}, row=1, col=2)
     made.update_yaxes(title_text="normal force [N]", col=1)
-    rule = f" Dashed: the allowed dent, {1e3 * allowed:g} mm." if allowed is not None else ""
+    rule = f" Dashed: the allowed indentation, {1e3 * allowed:g} mm." if allowed is not None else ""
     caption = (
         f"Dark: {data.place(index)}; grey: other candidates. A wall that softens bends its line to the right; open"
         f" diamonds: the wall has snapped in on the way there.{rule}"
     )
-    alt = f"Normal force over travel and dent; {number(1e3 * dent[index])} mm at {data.place(index, force=True)}."
+    alt = (
+        f"Force over closing and indentation; {number(1e3 * indentation[index])} mm at {data.place(index, force=True)}."
+    )
     return plot(made, caption, alt, 340)
 
 
@@ -250,6 +252,6 @@ def wall_section(data: Data, scene: Any, index: tuple[int, ...]) -> Block | None
     made.update_yaxes(title_text="along the approach [mm]", col=1)
     made.update_yaxes(scaleanchor="x", row=1, col=1).update_yaxes(scaleanchor="x2", row=1, col=2)
     made.update_xaxes(title_text="along the axis [mm]", col=1).update_xaxes(title_text="beside it [mm]", col=2)
-    dent = number(1e3 * data.at("dent", index))
-    caption = f"{data.place(index, force=True)}: dent {dent} mm. True to scale, nothing is exaggerated."
-    return plot(made, caption, f"Sections through the deformed wall; dent {dent} mm.", 420)
+    indentation = number(1e3 * data.at("indentation", index))
+    caption = f"{data.place(index, force=True)}: indentation {indentation} mm. True to scale, nothing is exaggerated."
+    return plot(made, caption, f"Sections through the deformed wall; indentation {indentation} mm.", 420)

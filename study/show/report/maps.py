@@ -12,13 +12,13 @@ from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.page import Block, label, plot
-from softjaw.study.show.report.tables import remark
+from softjaw.study.show.report.tables import note
 from softjaw.study.show.tables.ranking import largest
 
 MOST_PANELS, MOST_LABELS, MOST_REMARKS = 6, 16, 8000
 FIRST = ("quality", "e_n")
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
-        "travel", "curvature_loss", "misfit", "dent", "wall_stress", "support_force")  # fmt: skip
+        "closing", "curvature_loss", "fit_error", "indentation", "wall_stress", "support_force")  # fmt: skip
 LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 PART_COLOURS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS
 
@@ -84,7 +84,7 @@ def maps(data: Data, index: tuple[int, ...]) -> list[Block]:
 
 def _maps(data: Data, index: tuple[int, ...], x: int, y: int, over: int, panels: list[int]) -> Block:
     """Panels over two axes, a row for each of ``panels`` along a third one, CCM beside the planar model."""
-    models = ("curved", data.planar)
+    models = ("ccm", data.planar)
     unit, factor = shown(data.axes[over].units)
     levels = [f"{data.name(data.axes[over])} {number(data.axes[over].values[p] * factor, 4)} {unit}" for p in panels]
     titles = [f"{plots.MODELS[m][0]}, {level}" for level in levels for m in models]
@@ -94,11 +94,11 @@ def _maps(data: Data, index: tuple[int, ...], x: int, y: int, over: int, panels:
     made = plots.figure(len(panels), 2, titles, shared_xaxes=True, shared_yaxes=True, horizontal_spacing=0.05,
                         vertical_spacing=min(gap, 0.9 / max(len(panels) - 1, 1)))  # fmt: skip
     (xv, xs), (yv, ys) = ticks(data, x), ticks(data, y)
-    remarks = _remarks(data)
+    notes = _notes(data)
     cuts = [(m, (*index[:over], p, *index[over + 1 :])) for p in panels for m in models]
     for k, (_, here) in enumerate(cuts):
         row, column = k // 2 + 1, k % 2 + 1
-        notes = None if remarks is None else plane(remarks, x, y, here)
+        notes = None if notes is None else plane(notes, x, y, here)
         made.add_heatmap(x=xv, y=yv, customdata=notes, coloraxis="coloraxis", hoverongaps=True, row=row, col=column)
         _marks(made, data, plane(data.status, x, y, here), xv, yv, row, column)
     made.update_xaxes(**{k: v for k, v in xs.items() if k != "title_text"}, showgrid=False)
@@ -118,7 +118,7 @@ def _maps(data: Data, index: tuple[int, ...], x: int, y: int, over: int, panels:
     where = elsewhere(data, index, x, y, over)
     caption = (
         f"{f'At {where}. ' if where else ''}Choose the quantity at the upper left; point at a cell for its values and"
-        " remarks. Crosses: failed. Dots: not computed yet."
+        " notes. Crosses: failed. Dots: not computed yet."
     )
     alt = f"Maps over {data.name(data.axes[x])} and {name}, CCM and {data.planar}. {extremes(data, index)}"
     return plot(made, caption, alt, total)
@@ -153,12 +153,12 @@ def _button(data: Data, name: str, cuts: Any, x: int, y: int) -> dict[str, Any]:
             "args": [{"z": rows, "hovertemplate": [hover] * len(rows)}, {"coloraxis": axis}]}  # fmt: skip
 
 
-def _remarks(data: Data) -> np.ndarray | None:
-    """State and remarks of all cases; None where there are too many for a page."""
+def _notes(data: Data) -> np.ndarray | None:
+    """State and notes of all cases; None where there are too many for a page."""
     if data.status.size > MOST_REMARKS:
         return None
     words = {DONE: "", FAILED: "failed: ", MISSING: "not computed"}
-    found = [label(words[int(data.status[i])] + remark(data, i)) for i in np.ndindex(data.shape)]
+    found = [label(words[int(data.status[i])] + note(data, i)) for i in np.ndindex(data.shape)]
     return np.array(found, object).reshape(data.shape)
 
 
@@ -238,14 +238,14 @@ def levels(data: Data, index: tuple[int, ...]) -> Block | None:
     if not data.walled or level is None or data.grasps == 1:
         return None
     x, y = main_axis(data), len(data.shape) - 2
-    top, dents = (plane(_over_forces(f), x, y, index) for f in (level, np.full(data.shape, np.nan) if indicator is None
+    top, depth = (plane(_over_forces(f), x, y, index) for f in (level, np.full(data.shape, np.nan) if indicator is None
                                                                 else indicator))  # fmt: skip
     (xv, xs), (yv, ys) = ticks(data, x), ticks(data, y)
     steps = [[(i + s) / 3, c] for i, c in enumerate(LEVEL_COLOURS) for s in (0, 1)]
     bar = {"tickvals": [0, 1, 2], "ticktext": list(EFFECTS["object"]), "thickness": 14}
     made = plots.figure()
     z = np.where(np.isfinite(top), top, None).tolist()
-    made.add_heatmap(x=xv, y=yv, z=z, zmin=-0.5, zmax=2.5, colorscale=steps, colorbar=bar, customdata=dents,
+    made.add_heatmap(x=xv, y=yv, z=z, zmin=-0.5, zmax=2.5, colorscale=steps, colorbar=bar, customdata=depth,
                      hovertemplate="%{x}, %{y}: level %{z}, indicator %{customdata:.3g}"
                      "<extra></extra>")  # fmt: skip
     made.update_xaxes(**xs).update_yaxes(**ys).update_layout(plot_bgcolor=plots.EMPTY)
@@ -266,15 +266,15 @@ def effort(data: Data, index: tuple[int, ...]) -> Block | None:
     if data.shape[x] < 2 or data.values("work/newton_iterations") is None:
         return None
     values, settings = ticks(data, x)
-    iterations, cuts = (_sums(data, f"work/{name}", x, index) for name in ("newton_iterations", "cuts"))
+    iterations, halvings = (_sums(data, f"work/{name}", x, index) for name in ("newton_iterations", "step_halvings"))
     made = plots.figure(1, 3, ("Newton iterations", "halved load steps", "seconds"))
-    made.add_bar(x=values, y=iterations, marker_color=plots.MODELS["curved"][1], row=1, col=1, showlegend=False)
-    made.add_bar(x=values, y=cuts, marker_color=plots.MODELS["curved"][1], row=1, col=2, showlegend=False)
+    made.add_bar(x=values, y=iterations, marker_color=plots.MODELS["ccm"][1], row=1, col=1, showlegend=False)
+    made.add_bar(x=values, y=halvings, marker_color=plots.MODELS["ccm"][1], row=1, col=2, showlegend=False)
     for part, colour in zip(PARTS, PART_COLOURS, strict=False):
         made.add_bar(x=values, y=_sums(data, f"work/seconds_{part}", x, index), name=part, marker_color=colour, row=1,
                      col=3)  # fmt: skip
     made.update_layout(barmode="stack", legend={"y": -0.3}).update_xaxes(**settings)
-    totals = [number(np.nansum(found), 6) for found in (iterations, cuts)]
+    totals = [number(np.nansum(found), 6) for found in (iterations, halvings)]
     said = f"{totals[0]} Newton iterations and {totals[1]} halved load steps in all"
     caption = f"Sums over all forces and angles, images of a grasp included though they are solved once: {said}."
     return plot(made, caption, f"Effort over {data.name(data.axes[x])}: {said}.", 320)

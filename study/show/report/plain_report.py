@@ -44,4 +44,3 @@ def _notes(data: Data, state: int) -> list[str]:
         places = "; ".join(data.place(index, force=True).replace("\xa0", " ") for index in where[:MOST_PLACES])
         lines.append(f"{word} {count} x {text} [{places}{'; ...' * (count > MOST_PLACES)}]")
     return lines
-

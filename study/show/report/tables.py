@@ -21,8 +21,8 @@ HEADS = dict(zip(VALUES, ("quality", "quality, fitted", "e_n [mm]", "max f_x [N]
 BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
 STATES = {DONE: "solved", FAILED: "failed", MISSING: "missing"}
-MORE = ("epsilon", "contact_area", "p_max", "travel", "dent", "wall_stress", "safety_factor")
-WALL = ("dent", "wall_stress", "wall_strain", "support_force", "safety_factor")
+MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
+WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
 FORCED = REASONS.index("forced by the scene")
 SAFE = (
     "Safe forces: normal forces per finger that hold the object's weight, where its mass is given, and that its wall"
@@ -41,7 +41,7 @@ def best_grasps(data: Data) -> list[Block]:
         return []
     walled = data.bound("force_high") is not None
     heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, PCM ({data.planar}) [mm]",
-             "checks and remarks"]  # fmt: skip
+             "checks and notes"]  # fmt: skip
     chosen: list[tuple[int, ...]] = []
     merged: set[tuple[int, ...]] = set()
     for index in order:
@@ -77,13 +77,13 @@ def _with_angles(data: Data, index: tuple[int, ...]) -> str:
 def _row(data: Data, index: tuple[int, ...]) -> list[str]:
     known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
     checks = data.flagged(index) or ["passed" if known else "not stored"]
-    remarks = ", ".join([*checks, *(flag.word for flag in flags_of(data, index))])
+    notes = ", ".join([*checks, *(flag.word for flag in flags_of(data, index))])
     planar = number(data.at("e_n", index, data.planar) * 1e3, 4)
     last = planar if data.bound("force_high") is None else safe_range(data, index)
-    return [*(value(data, name, index) for name in VALUES), last, remarks]
+    return [*(value(data, name, index) for name in VALUES), last, notes]
 
 
-def remark(data: Data, index: tuple[int, ...]) -> str:
+def note(data: Data, index: tuple[int, ...]) -> str:
     """The reason of a failed case; the checks that a solved one misses, and its flags."""
     if data.status[index] == FAILED:
         return str(data.messages[index]) or "no reason was given"
@@ -134,8 +134,8 @@ def every_case(data: Data) -> list[Block]:
         return [text(said, "note")]
     names = [name for name in (*VALUES, *MORE) if data.map(name) is not None]
     rows = [[data.place(i, force=True), STATES.get(int(data.status[i]), "missing"),
-             *(value(data, name, i) for name in names), remark(data, i)] for i in np.ndindex(data.shape)]  # fmt: skip
-    heads = ["case", "state", *(HEADS.get(name) or data.label(name) for name in names), "remarks"]
+             *(value(data, name, i) for name in names), note(data, i)] for i in np.ndindex(data.shape)]  # fmt: skip
+    heads = ["case", "state", *(HEADS.get(name) or data.label(name) for name in names), "notes"]
     caption = f"All {len(rows)} cases (CCM, weaker finger)"
     return [details(f"All {len(rows)} cases as a table",
                     [table(caption, heads, rows, texts=(0, 1), wide=(len(heads) - 1,))])]  # fmt: skip

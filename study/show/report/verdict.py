@@ -21,7 +21,7 @@ CAVEAT = (
 )
 ESTIMATED = "± is the difference to a mesh half as fine, in per cent of the value; the error is usually smaller."
 NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
-BANDED = (
+WITH_INTERVALS = (
     "± is the half-width of the interval within which about 95 of 100 cases lie, in per cent of the value; it has the"
     " parts that [uncertainty] in the scene asks for."
 )
@@ -120,10 +120,12 @@ def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
 
 def wall_sentence(data: Data, index: tuple[int, ...]) -> str:
     """How a thin wall takes one case, and between which forces it would be safe; empty without a wall."""
-    if not np.isfinite(data.at("dent", index)):
+    if not np.isfinite(data.at("indentation", index)):
         return ""
-    dent, stress = (f"{value(data, name, index, 3)} {data.units(name)[1]}" for name in ("dent", "wall_stress"))
-    said = f"The wall is dented by {dent} and its stress reaches {stress}."
+    indentation, stress = (
+        f"{value(data, name, index, 3)} {data.units(name)[1]}" for name in ("indentation", "wall_stress")
+    )
+    said = f"The wall is dented by {indentation} and its stress reaches {stress}."
     low, high = (data.bound(name) for name in ("force_low", "force_high"))
     if high is None or not np.isfinite(high[index[:-1]]):
         return said
@@ -152,9 +154,9 @@ def safe_range(data: Data, index: tuple[int, ...]) -> str:
 
 def uncertainty(data: Data, name: str, index: tuple[int, ...]) -> str:
     """How far off a value may be, where the file knows: the one place that says so in verdict, tables and maps."""
-    error, band = data.at(f"{name}_error", index), data.values(f"derived/{name}_band")
-    if band is not None:
-        error = band[tuple(index)] / abs(data.at(name, index))
+    error, interval = data.at(f"{name}_error", index), data.values(f"derived/{name}_interval")
+    if interval is not None:
+        error = interval[tuple(index)] / abs(data.at(name, index))
     if not np.isfinite(error):
         return ""
     share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)
@@ -246,8 +248,8 @@ def meaning(data: Data) -> str:
     """What the numbers behind ± are; empty where nothing is solved."""
     if data.best is None:
         return ""
-    if data.values("derived/quality_band") is not None:
-        return BANDED
+    if data.values("derived/quality_interval") is not None:
+        return WITH_INTERVALS
     return ESTIMATED if any(uncertainty(data, name, data.best) for name in VALUES) else NOT_ESTIMATED
 
 

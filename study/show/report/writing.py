@@ -107,7 +107,7 @@ def the_object(data: Data, best: tuple[int, ...]) -> list[Block]:
 def wall(data: Data, scene: Any) -> list[Block]:
     """Limits, safe forces, shape and force curves of a thin wall; empty without one."""
     best = data.best
-    if best is None or data.map("dent") is None:
+    if best is None or data.map("indentation") is None:
         return []
     shape = swept_object(scene, best) if scene else None
     allowed = getattr(shape, "allowed_dent", None)

@@ -54,10 +54,10 @@ class Sure:
 
 def sure(ds: Any, name: str, k: int) -> Sure | None:
     """``quality`` or ``e_n`` (curved) of all candidates at a force level; None where a file knows no error of it."""
-    values = ds[name].sel(model="curved").values[..., k].ravel()
+    values = ds[name].sel(model="ccm").values[..., k].ravel()
     shares = {full: full.removeprefix(f"{name}_") for full in ds.attrs["derived"]}
     own, common = np.zeros(values.shape), dict[str, FloatArray]()
-    if f"{name}_band" in shares:
+    if f"{name}_interval" in shares:
         for full, short in shares.items():
             kind, _, of = short.partition("_")
             if full == short or not of:
@@ -67,7 +67,7 @@ def sure(ds: Any, name: str, k: int) -> Sure | None:
                 common[of] = change
             else:
                 own = own + change**2
-        unsigned = tuple(of for of in MOVES if f"{name}_band_{of}" in shares)
+        unsigned = tuple(of for of in MOVES if f"{name}_interval_{of}" in shares)
         return Sure(values, np.sqrt(own), common, unsigned)
     if f"{name}_error" in ds:
         return Sure(values, np.abs(ds[f"{name}_error"].values[..., k].ravel() * values), common)

@@ -36,7 +36,7 @@ class AxisMatch:
 class Difference:
     """One quantity of both files over the common axes; NaN where a file has no result.
 
-    ``error`` is the sum of both errors: half-widths of bands, or else errors of the mesh; NaN where a file does not
+    ``error`` is the sum of both errors: half-widths of intervals, or else errors of the mesh; NaN where a file does not
     state them. ``stated`` tells of each file whether it has a map of them.
     """
 
@@ -83,7 +83,7 @@ class Comparison:
     asked: Difference
 
 
-def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "curved") -> Comparison:
+def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Comparison:
     """Compare two result files, as `study.result.read.open` gives them.
 
     Parameters
@@ -160,10 +160,10 @@ def _difference(pair: tuple[xr.Dataset, xr.Dataset], axes: tuple[AxisMatch, ...]
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
     """Error of a map in its unit; None where the file has none, as for models but the curved."""
-    if map_row(name).by_model and model != "curved":
+    if map_row(name).by_model and model != "ccm":
         return None
-    if f"{name}_band" in ds:
-        return values_of(ds, f"{name}_band")
+    if f"{name}_interval" in ds:
+        return values_of(ds, f"{name}_interval")
     if f"{name}_error" not in ds:
         return None
     share = values_of(ds, f"{name}_error")

@@ -48,7 +48,7 @@ MEANING = {
 }
 
 
-def cases(ds: xr.Dataset, model: str = "curved") -> Iterator[dict[str, Any]]:
+def cases(ds: xr.Dataset, model: str = "ccm") -> Iterator[dict[str, Any]]:
     """Every case: place, state, message, flags, maps in one friction model, and both fingers.
 
     Arrays are numpy arrays, NaN where a case has no result.
@@ -74,7 +74,7 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
     own = ds.sel(model=model)
     R, o = ds.finger_pose_rotation.values, ds.finger_pose_origin.values
     S, rho = ds.finger_S.values, ds.limit_surface_rho.values
-    muS = ds.finger_f_x_max.sel(model="flat").values  # the planar model's friction is mu S in every direction
+    muS = ds.finger_f_x_max.sel(model="pcm").values  # the planar model's friction is mu S in every direction
     found = {
         "pose_origin": o,
         "pose_rotation": R,
@@ -90,7 +90,7 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
     return {name: found[name] for name, _, _ in FINGER}
 
 
-def as_json(ds: xr.Dataset, model: str = "curved") -> str:
+def as_json(ds: xr.Dataset, model: str = "ccm") -> str:
     """One object: file, units, meanings, and a list of cases; SI units, null where there is nothing."""
     units = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
     units |= {name: unit for name, unit, _ in FINGER}
@@ -102,7 +102,7 @@ def as_json(ds: xr.Dataset, model: str = "curved") -> str:
     return json.dumps({**about, "cases": rows}, indent=1)
 
 
-def as_csv(ds: xr.Dataset, model: str = "curved") -> str:
+def as_csv(ds: xr.Dataset, model: str = "ccm") -> str:
     """One line for each case, SI units in the header, empty where there is nothing."""
     maps = {name: unit for name, unit in maps_in(ds).items() if name != "flags"}
     head = [_head(axis.name, axis.units) for axis in axes_of(ds)]

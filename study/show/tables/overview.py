@@ -35,7 +35,7 @@ def scene_text(scene: Any, file: str) -> str:
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
         "target": _target(scene),
-        "bands": _bands(scene),
+        "intervals": _intervals(scene),
         "effects": ", ".join(levels),
         "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
@@ -62,8 +62,8 @@ def _target(scene: Any) -> str:
     return expected(scene)
 
 
-def _bands(scene: Any) -> str:
-    """What the bands are made of, and what they take; empty where none are asked for."""
+def _intervals(scene: Any) -> str:
+    """What the uncertainty intervals are made of, and what they take; empty where none are asked for."""
     own = scene.uncertainty
     if not own.parts:
         return ""
@@ -99,8 +99,8 @@ def wall_text(shape: Any) -> str:
 
 
 RULE = (  # as study.case.wall chooses
-    "by the dent that a linear wall would get at the largest force: rigid below 2 % of the pads' travel, linear shell"
-    " up to 0.6 of the wall's thickness, nonlinear shell beyond"
+    "by the indentation that a linear wall would get at the largest force: rigid below 2 % of the pads' closing,"
+    " linear shell up to 0.6 of the wall's thickness, nonlinear shell beyond"
 )
 
 
@@ -109,7 +109,7 @@ def compliance_text(scene: Any) -> str:
     level = scene.effects.object
     if level == "auto":
         return f"chosen for each candidate: {RULE}"
-    told = "no dent and no stress will be known" if level == "rigid" else "as the scene says"
+    told = "no indentation and no stress will be known" if level == "rigid" else "as the scene says"
     return f"{level.replace('_', ' ')} for every candidate, {told}"
 
 

@@ -23,7 +23,7 @@ def judged(ds: Any) -> IntArray:
     """
     flags = ds["flags"].values.copy()
     if "force_low" in ds:
-        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="curved").values < 1 - TIE)
+        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < 1 - TIE)
     if "force_high" in ds:
         flags |= Flag.TOO_STRONG * (ds["normal_force"].values > ds["force_high"].values[..., None] * (1 + 1e-9))
     return flags

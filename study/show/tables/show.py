@@ -25,8 +25,8 @@ from softjaw.study.show.tables.show_text import as_text as as_text
 class Table:
     """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
 
-    An error stands behind the quantity it belongs to, relative unless the column has a unit; a band is in the unit of
-    the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
+    An error stands behind the quantity it belongs to, relative unless the column has a unit; an interval is in the unit
+    of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
     """
 
     title: str
@@ -105,7 +105,7 @@ def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
     """Name, unit and values of the main maps, each with what is known of its error behind it."""
     for q in (q for q in TABLE if q.group == "maps" and q.rank and q.name in ds):
         yield q.name, q.unit, values_of(ds, q.name)
-        for error in (f"{q.name}_band", f"{q.name}_error"):
+        for error in (f"{q.name}_interval", f"{q.name}_error"):
             if error in ds:
                 yield error, ds[error].units, values_of(ds, error)
                 break

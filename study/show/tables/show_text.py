@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 Columns = tuple[tuple[str, str], ...]  # names and units
 WINDOW_MEANS = "normal forces that hold the object, if its mass is given, and that its wall bears, as far as was solved"
 ERROR, ERROR_MEANS = "+-", "error of the column before it, from the coarser of two meshes"
-BAND_MEANS = "half-width of the band of the column before it; about 95 of 100 lie within. [uncertainty] says of what"
+INTERVAL_MEANS = (
+    "half-width of the interval of the column before it; about 95 of 100 lie within. [uncertainty] says of what"
+)
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 FLAGS_WIDTH, LABEL_WIDTH = 18, 28
 
@@ -55,8 +57,8 @@ def symbol(name: str) -> str:
 def least(names: Sequence[str]) -> list[str]:
     """Columns that a narrow terminal does without, the first ones first; those of the two first maps stay.
 
-    >>> least(["quality", "quality_error", "misfit", "e_n", "e_n_error", "e_n_flat", "f_x_max", "f_x_max_error"])
-    ['misfit', 'f_x_max_error', 'e_n_flat', 'f_x_max', 'quality_error']
+    >>> least(["quality", "quality_error", "fit error", "e_n", "e_n_error", "e_n_pcm", "f_x_max", "f_x_max_error"])
+    ['fit error', 'f_x_max_error', 'e_n_pcm', 'f_x_max', 'quality_error']
     """
     main = [name for name in reversed(MAIN[2:]) if name in names]
     errors = [f"{name}_error" for name in main if f"{name}_error" in names]
@@ -69,7 +71,10 @@ def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
     names = [name for name, _ in table.columns]
     told = [f"{flag.word}: {flag.sentence}" for flag in flags_in(flags)]
     told += [f"window: {WINDOW_MEANS}"] * ("window" in names)
-    kinds = {"_band": BAND_MEANS, "_error": f"{ERROR_MEANS}{', in %' * any(n.endswith('_band') for n in names)}"}
+    kinds = {
+        "_interval": INTERVAL_MEANS,
+        "_error": f"{ERROR_MEANS}{', in %' * any(n.endswith('_interval') for n in names)}",
+    }
     told += [f"{ERROR}: {text}" for end, text in kinds.items() if any(n.endswith(end) for n in names)] or [NO_ERRORS]
     told += [f"not shown in {width} letters a line: {absent}; --csv and --json have all"] * bool(absent)
     return [wrapped(text, width, more="  ") for text in told]
@@ -77,7 +82,7 @@ def _legend(table: Table, flags: int, absent: str, width: int) -> list[str]:
 
 def _head(name: str, units: str) -> tuple[str, str]:
     """Both lines above a column."""
-    if name.endswith(("_error", "_band")):
+    if name.endswith(("_error", "_interval")):
         return two_lines(ERROR, shown_unit(units) or "%" * name.endswith("_error"))
     return two_lines(symbol(name), shown_unit(units))
 
@@ -108,8 +113,8 @@ def _lines(table: Table) -> tuple[list[list[str]], int]:
 def _stacked(flags: str) -> list[str]:
     """Flags in as many narrow lines as they take, each flag in one piece.
 
-    >>> _stacked("hole, askew, too weak")
-    ['hole, askew,', 'too weak']
+    >>> _stacked("hole, not antipodal, too weak")
+    ['hole, not antipodal,', 'too weak']
     """
     whole = textwrap.wrap(flags.replace(" ", "\xa0").replace(",\xa0", ", "), FLAGS_WIDTH, break_long_words=False)
     return [line.replace("\xa0", " ") for line in whole] or [""]
@@ -177,12 +182,12 @@ def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
         return "-"
     if name.endswith("_error"):
         return f"{shown(value, units) * (1 if units else 100):.2g}"
-    if name.endswith("_band"):
+    if name.endswith("_interval"):
         return f"{shown(value, units):.2g}"
     value = shown(value, units)
     if coordinate:
         return f"{value:.5g}"
-    return f"{value:.2g}" if name == "misfit" else digits(value)
+    return f"{value:.2g}" if name == "fit_error" else digits(value)
 
 
 def alike(row: tuple[Any, ...], other: tuple[Any, ...], columns: Columns) -> bool:

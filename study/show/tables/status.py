@@ -99,7 +99,7 @@ def reasons(result: Any, width: int = PAPER) -> list[str]:
     for state, title in ((FAILED, "failed"), (DONE, "note")):
         where: dict[str, list[int]] = {}
         for row in np.flatnonzero((status == state) & (messages != "")):
-            # a solved case may have several remarks, a failed one has one reason
+            # a solved case may have several notes, a failed one has one reason
             for text in messages[row].split("; ") if state == DONE else [messages[row]]:
                 where.setdefault(text, []).append(int(row))
         texts = sorted(where, key=lambda text: -len(where[text]))

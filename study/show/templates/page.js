@@ -41,7 +41,7 @@ function object3d(div, all) {
     if (c < 0) return "no candidate";
     const q = quantity(), v = q && q.values[at.force][c], key = `${at.force} ${c}`;
     return `${all.names[c]}<br>` + (v == null ? ["not computed", "", "failed"][all.states[at.force][c]]
-      : `${q.label}: ${+v.toPrecision(4)}`) + (all.remarks[key] ? `<br>${all.remarks[key]}` : "");
+      : `${q.label}: ${+v.toPrecision(4)}`) + (all.notes[key] ? `<br>${all.notes[key]}` : "");
   }
 
   function segments(s) {  // pairs of points as one broken line

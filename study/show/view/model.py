@@ -120,7 +120,7 @@ class View:
             return [*lines, f"failed: {data.messages[index] or 'no reason was given'}"]
         if data.status[index] != DONE:
             return [*lines, "not computed yet"]
-        names = dict.fromkeys((quantity, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "dent"))
+        names = dict.fromkeys((quantity, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation"))
         for name in names:
             if (found := data.map(name)) is not None:
                 label, unit, factor = data.units(name)

@@ -19,14 +19,14 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.page import Block, Section, label, page, plot, text
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
-from softjaw.study.show.report.tables import remark
+from softjaw.study.show.report.tables import note
 from softjaw.study.show.stored_surface import stored_surface
 from softjaw.study.show.view.model import CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 from softjaw.study.show.view.pads import LIFT, Pad, pads
 
 MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those of the worst grasps are left out
 SHOWN = ("quality", "quality_fitted", "e_n", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "F_N", "S",
-         "contact_area", "p_max", "travel", "curvature_loss", "dent", "wall_stress")  # fmt: skip
+         "contact_area", "p_max", "closing", "curvature_loss", "indentation", "wall_stress")  # fmt: skip
 LONGEST = 6e-3  # arrow [m]
 SAID = {"x": "a slip along x of the contact", "y": "a slip along y of the contact", "turn": "a turn about its normal"}
 
@@ -95,7 +95,7 @@ def payload(
         "names": [label(data.place(view.index(c, 0))) for c in range(view.candidates)],
         "states": [view.state(k).tolist() for k in forces],
         "words": {f"{i[-1]} {view.candidate(i)}": view.words(i, quantity) for i in every},
-        "remarks": {f"{i[-1]} {view.candidate(i)}": label(said) for i in every if (said := remark(data, i))},
+        "notes": {f"{i[-1]} {view.candidate(i)}": label(said) for i in every if (said := note(data, i))},
         "quantities": _quantities(view, quantity),
         "points": _packed(1e3 * surface.points, "<f4"),
         "triangles": _packed(surface.triangles, "<i4"),
@@ -129,7 +129,7 @@ def case(view: View, index: tuple[int, ...], motion: str, whole: bool) -> dict[s
     if (moved := view.displacement(index)) is not None:
         found |= {"wall": _packed(1e3 * moved[0], "<f4"), "angle": moved[1]}
     if whole:
-        known = stored_surface(view.data, index, weaker(view.data, index), "curved")
+        known = stored_surface(view.data, index, weaker(view.data, index), "ccm")
         points = None if known is None or known.ellipsoid.rank < 3 else body(known)
         if points is not None:
             found |= {"limit": _packed(points, "<f4"), "rows": points.shape[0]}
@@ -184,7 +184,7 @@ def _traces(whole: bool) -> list[Any]:
         go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": FORCE, "width": 4}),
         go.Scatter3d(mode="markers", hoverinfo="skip", marker={"color": FORCE, "size": 2.5}),
     ]
-    blue = plots.MODELS["curved"][1]
+    blue = plots.MODELS["ccm"][1]
     limit = {"showscale": False, "colorscale": [[0, blue], [1, blue]], "opacity": 0.85, "scene": "scene2"}
     return [*made, go.Surface(**limit)] if whole else made
 

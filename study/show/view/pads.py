@@ -107,7 +107,7 @@ class Pad:
 
 def pads(data: Data, gripper: Any, index: tuple[int, ...]) -> list[Pad]:
     """Both pads at a case; empty where it is not solved or the scene cannot be read."""
-    names = ("pose_rotation", "pose_origin", "travel", "frame_axes", "frame_origin")
+    names = ("pose_rotation", "pose_origin", "closing", "frame_axes", "frame_origin")
     stored = [data.values(f"fingers/{name}") for name in names]
     if data.status[index] != DONE or gripper is None or any(s is None for s in stored):
         return []
@@ -116,7 +116,7 @@ def pads(data: Data, gripper: Any, index: tuple[int, ...]) -> list[Pad]:
     patch = data.result.patch(data.result.row(*index)) if data.result.layout.patches else {}
     if any(not np.isfinite(values).all() for values in patch.values()):
         patch = {}
-    overlap = data.values("checks/overlap")
+    overlap = data.values("checks/penetration_depth")
     deepest = np.zeros(2) if overlap is None else np.nan_to_num(overlap[index])
     of_finger = [[s[index][finger] for s in stored if s is not None] for finger in (0, 1)]
     found = [_pad(gripper, {n: v[finger] for n, v in patch.items()}, *of_finger[finger]) for finger in (0, 1)]
@@ -130,14 +130,14 @@ def faces_of(gripper: Any, count: int) -> tuple[int, int] | None:
     return (i, j) if i * j == count else None
 
 
-def _pad(gripper: Any, patch: dict[str, np.ndarray], R: Any, o: Any, travel: Any, axes: Any, origin: Any) -> Pad:
+def _pad(gripper: Any, patch: dict[str, np.ndarray], R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
     length, width, thickness = gripper.pad_size
     x, y = 0.5 * length * np.array([-1, 1, 1, -1]), 0.5 * width * np.array([-1, -1, 1, 1])
 
     def placed(points: np.ndarray) -> np.ndarray:
         return points @ R.T + o
 
-    back = placed(np.column_stack([x, y, np.full(4, travel - thickness)]))
+    back = placed(np.column_stack([x, y, np.full(4, closing - thickness)]))
     grid = faces_of(gripper, len(patch["pressure"])) if patch else None
     common = {"back": back, "frame": axes @ R.T, "origin": placed(origin), "rotation": R, "position": o}
     if grid is None:  # only the block before it is pressed

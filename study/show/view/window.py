@@ -131,7 +131,7 @@ def _limit(plotter: Any, view: View, index: tuple[int, ...], _: str, __: str) ->
     for name in ("limits", "limit lines", "limit labels"):
         plotter.remove_actor(name, render=False)
     finger = weaker(view.data, index)
-    known = stored_surface(view.data, index, finger, "curved")
+    known = stored_surface(view.data, index, finger, "ccm")
     points = None if known is None or known.ellipsoid.rank < 3 else body(known)
     if points is None:
         return _say(plotter, "no limit surface stored for this case", "limit words")

@@ -12,13 +12,13 @@ from softjaw.lsfit.samples import checked_motions
 from softjaw.lsfit.sums import ENDLESS, mean_errors
 from softjaw.lsfit.surface import LimitSurface
 
-__all__ = ["LimitSurface", "Misfit", "misfit"]
+__all__ = ["FitErrors", "LimitSurface", "fit_error"]
 
 FloatArray = NDArray[np.float64]
 ACROSS = 1e-9  # part of a unit motion from which its angle to a flat body's normals is not a right one
 
 
-class Misfit(NamedTuple):
+class FitErrors(NamedTuple):
     """Mean errors of a model over samples.
 
     ``E1 = mean |P - 1|`` grows with the degree of the polynomial: models of different degree compare by ``Erad = mean
@@ -31,7 +31,7 @@ class Misfit(NamedTuple):
     Edir: float
 
 
-def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
+def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     """Errors of ``model`` on wrenches ``W (m, d)`` with unit motions ``T (m, d)``.
 
     Samples without a wrench say nothing about a surface and are left out. A flat model has the radius 0 (``Erad`` 1,
@@ -49,10 +49,10 @@ def misfit(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> Misfit:
     P, G = model.value(W), model.gradient(W)
     if model.rank == model.dimension:
         E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
-        return Misfit(E1, Erad, math.degrees(angle))
+        return FitErrors(E1, Erad, math.degrees(angle))
     with np.errstate(divide="ignore"):
         radius = np.where(P > ENDLESS, P, 0.0) ** (-1 / model.degree)
-    return Misfit(
+    return FitErrors(
         float(np.abs(P - 1).mean()),
         float(np.abs(radius - 1).mean()),
         float(np.degrees(_angles(G, motions, model.span)).mean()),
