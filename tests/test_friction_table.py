@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists, screw_twist
+from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
@@ -42,6 +42,7 @@ from tests.generators import (
     lcg_patch,
     lcg_sphere,
     mesh_patch,
+    screw_twist,
 )
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]

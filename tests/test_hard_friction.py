@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_twists, fibonacci_twists
-from softjaw.friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import hull_volume
@@ -35,6 +35,7 @@ from tests.generators import (
     heightfield,
     lcg_patch,
     mesh_patch,
+    moved,
     points_patch,
     rect_grid,
 )

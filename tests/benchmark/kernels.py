@@ -11,9 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import contact_frame
-from softjaw.friction.kernel import friction_sums_reference
 from softjaw.friction.motion import cor_grid, fibonacci_twists
-from softjaw.friction.quadrature import gauss_patch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
@@ -35,7 +33,7 @@ from tests.generators import (
     cyl_mesh,
     cylinder_grid,
     disc_polar,
-    grid_mesh,
+    friction_sums_reference,
     lcg_noise,
     lcg_patch,
     lcg_sphere,
@@ -73,23 +71,6 @@ def friction() -> None:
     skew = build({"gen": "rect_grid", "args": {"a": 2.0, "b": 1.0, "nx": 60, "ny": 40}, "pressure": field})
     error = pure_torque(skew, 1.0) / pure_torque(skew, 1.0, tolerance=1e-14) - 1
     line("torque without net force", span(fastest(lambda: pure_torque(skew, 0.8), 0.3)), "at most 5 ms", f"{error:.0e}")
-    integration()
-
-
-def integration() -> None:
-    """Torque of a rectangle by one and by four points per element."""
-    q = grid_mesh(48, 50, 1, 0.5)
-    exact = 2 * _mean_distance(2.0, 1.0)
-    one, four = partial(mesh_patch, q), partial(gauss_patch, q, np.ones(len(q)))
-    for name, make in (("one point per element", one), ("2 x 2 points per element", four)):
-        error = abs(friction_limits(make(), 1.0).tau_z / exact - 1)
-        cost = span(fastest(lambda make=make: friction_limits(make(), 1.0), 0.3))
-        line(f"patch and maxima of a rectangle, {name}", cost, "", f"torque to {error:.1e}")
-
-
-def _mean_distance(a: float, b: float) -> float:
-    A, B = a / 2, b / 2
-    return math.hypot(A, B) / 3 + A**2 / (6 * B) * math.asinh(B / A) + B**2 / (6 * A) * math.asinh(A / B)
 
 
 def limit_surfaces() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from softjaw.friction.patch import NoContactError, moved
+from softjaw.friction.patch import NoContactError
 from softjaw.friction.wrench import friction_limits
 from tests.generators import (
     bump,
@@ -16,6 +16,7 @@ from tests.generators import (
     grid_mesh,
     lcg,
     mesh_patch,
+    moved,
     points_patch,
     rect_grid,
 )
