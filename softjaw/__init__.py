@@ -14,7 +14,7 @@ _HOMES = {
     "friction_limits": "friction.wrench",
     "friction_wrench": "friction.wrench",
     "axis_aligned_ellipsoid": "lsfit.ellipsoid",
-    "convex_quartic": "lsfit.quartic",
+    "convex_quartic": "lsfit.quartic_fit",
     "score": "scoring.score",
     "Scene": "study.scene",
     "load_scene": "study.scene",

@@ -19,7 +19,7 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
+from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag
 from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes

@@ -16,9 +16,9 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
-from softjaw.lsfit.samples import normalised_samples
-from softjaw.lsfit.six import convex_span_quartic, six_samples
+from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples, six_samples
+from softjaw.lsfit.span import convex_span_quartic
 from softjaw.lsfit.zhou import ZhouWeights, zhou_quartic
 from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
 from softjaw.scoring.epsilon import epsilon_linf

@@ -5,10 +5,11 @@ import pytest
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
-from softjaw.lsfit.body import body_volume, hull_volume, shadow_area
+from softjaw.lsfit.body import body_volume, hull_volume
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.surface import shadow_area
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 
 AXES = np.array([0.8, 0.6, 0.15])

@@ -8,9 +8,9 @@ import pytest
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.flag import FitError
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import FitError
 from softjaw.scoring.contact import EllipsoidBody, SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import limit_surface
