@@ -15,7 +15,7 @@ _HOMES = {
     "friction_wrench": "friction.wrench",
     "axis_aligned_ellipsoid": "lsfit.ellipsoid",
     "convex_quartic": "lsfit.quartic_fit",
-    "score": "scoring.score",
+    "score": "scoring.quality",
     "Scene": "study.scene",
     "load_scene": "study.scene",
     "open": "study.result.read",

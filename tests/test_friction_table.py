@@ -18,7 +18,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import body_volume
-from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
@@ -27,13 +27,13 @@ from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples
 from softjaw.lsfit.span import span_ellipsoid
 from softjaw.lsfit.surface import FitFlag, shadow_area
 from softjaw.lsfit.zhou import ZhouWeights, zhou_ellipsoid, zhou_quartic
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
+from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon
+from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import score
-from softjaw.scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.quality import score
 from tests.generators import (
     arc_lengths,
     build,
@@ -187,7 +187,7 @@ def fits_in_six_dimensions(inputs, _):
 
 
 def bodies(inputs):
-    return [EllipsoidBody(inputs[f"semi_axes{i}"]) for i in (1, 2)]
+    return [Ellipsoid(inputs[f"semi_axes{i}"]) for i in (1, 2)]
 
 
 def measures(bodies):

@@ -18,15 +18,15 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
 from softjaw.lsfit.body import hull_volume
-from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag
-from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
-from softjaw.scoring.polytope import fibonacci_vertices, polytope_volume
+from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
+from softjaw.scoring.closed_form import volume_linf
+from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import ScoreFlag, score
-from softjaw.scoring.volume import volume_linf
+from softjaw.scoring.quality import ScoreFlag, score
 from tests.generators import (
     cap_polar,
     cyl_mesh,
@@ -316,7 +316,7 @@ def contact_without_torque():
 
 def tilted_contacts():
     """The antipodal formula is off by .1 % at 2 degrees and by a quarter at 30."""
-    body = EllipsoidBody([0.8, 0.6, 0.15])
+    body = Ellipsoid([0.8, 0.6, 0.15])
     antipodal = volume_linf(body.volume, body.shadow_area, body.volume, body.shadow_area, 1.0)
     errors = []
     for degrees in (0, 2, 5, 10, 30):
@@ -339,7 +339,7 @@ def failure_of_qhull():
             raise QhullError("QH6271 topology error")
         return ConvexHull(points, qhull_options=qhull_options, **options)
 
-    with mock.patch("softjaw.scoring.polytope.ConvexHull", moody):
+    with mock.patch("softjaw.scoring.bodies.ConvexHull", moody):
         np.testing.assert_allclose(polytope_volume(vertices), exact, rtol=1e-4)
 
 
