@@ -50,6 +50,7 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
         nearest = met[_nearest(s[met], margin)]
         met = met[np.abs(s[met] - s[nearest]) <= margin]
         return Foot(start + s[nearest] * N, met, False)
+    # all centres that are equally near count, or which one does would hang on rounding
     met = np.flatnonzero(away <= away.min() + TOLERANCE * np.sqrt(faces.area.max()))
     return Foot(start + s[met].mean() * N, met, True)
 
@@ -107,6 +108,7 @@ class ContactFace:
         if q is None or q.shape[1] != 4:
             found = "none" if q is None else f"{q.shape[1]}"
             raise ValueError(f"corners: found {found} around each face, expected 4; a contact face has quadrilaterals")
+        # the diagonals give the area vector of a warped face too, whichever way it is split
         own = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
         length = np.linalg.norm(own, axis=1)
         own = own * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
@@ -143,6 +145,7 @@ class ContactFace:
         uv = _reference(q)
         weights = _bilinear(*uv.T)
         left = np.linalg.norm(np.einsum("nk,nkc->nc", weights, q), axis=1)
+        # Newton may end at the rim of the region it is kept in: only points that are on the line count
         hit = (np.abs(uv) <= 1 + TOLERANCE).all(axis=1) & (left <= TOLERANCE * self._reach[near])
         near, weights = near[hit], weights[hit]
         missed = not len(near)

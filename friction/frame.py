@@ -88,6 +88,7 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike, whole_face: bool = Fal
     S = load.sum()
     cop = (load[:, None] * faces.centroid).sum(axis=0) / S
     N = _direction((load[:, None] * faces.normal).sum(axis=0), S)
+    # a sliver carries load, so it counts above; it has no plane, so nothing below can stand on it
     faces = faces.only(firm(faces))
     if whole_face:
         origin, N, iterations, flag = _on_the_whole(ContactFace.of(patch), cop, N)
@@ -122,6 +123,7 @@ def contact_length(patch: ContactPatch) -> float:
     if faces.corners is not None:
         points = faces.corners[..., :2].reshape(-1, 2)
         return float(np.ptp(points, axis=0).max())
+    # the area alone does not say which way a face is longer
     half = 0.5 * np.sqrt(faces.area)[:, None]
     xy = faces.centroid[:, :2]
     return float(((xy + half).max(axis=0) - (xy - half).min(axis=0)).max())
@@ -150,6 +152,7 @@ def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[Floa
         # the normal is a function of the faces that are met: one set twice is a cycle, without a tolerance
         key = tuple(met.tolist())
         if key in visited or iterations == MAX_ITERATIONS:
+            # without a cycle in sight after all passes, every face that was met counts
             start = visited.index(key) if key in visited else 0
             union = sorted(set().union(*visited[start:]))
             N = _direction(faces.normal[union].mean(axis=0))

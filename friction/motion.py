@@ -54,6 +54,7 @@ def cor_grid(n: int, rho: float) -> FloatArray:
 
 def fibonacci_twists(K: int, rho: float) -> FloatArray:
     """``K`` twists with ``(v_x, v_y, rho omega)`` spread evenly over the unit hemisphere ``omega > 0``, ``(K, 3)``."""
+    # opposite motions give opposite wrenches: one half of the sphere is enough
     i = np.arange(K)
     z = (i + 0.5) / K
     phi = i * np.pi * (3 - np.sqrt(5))

@@ -67,8 +67,10 @@ class ContactPatch:
             "pressure": _not_negative("pressure", self.pressure, n),
         }
         if self.corners is not None:
+            # faces may have any number of corners, but all the same: those with fewer repeat their last
             k = np.shape(self.corners)[1] if np.ndim(self.corners) == 3 else 4
             checked["corners"] = _finite("corners", self.corners, (n, max(k, 3), 3))
+        # read-only, because patches are shared between friction models, meshes and files
         for name, array in checked.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)

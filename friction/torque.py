@@ -57,6 +57,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: Model = "ccm", tolerance:
 def _radius(patch: ContactPatch) -> float:
     """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
     r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
+    # farther out every face costs at least its upright share of the distance, more than at the origin
     weight = patch.load @ upright
     if weight <= CANCEL * patch.load.sum():
         raise NoContactError("all faces stand parallel to the contact normal: bring the patch into its contact frame")

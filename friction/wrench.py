@@ -141,6 +141,7 @@ def model_faces(
     """
     if model not in MODELS:
         raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
+    # exactly: a face without load is what the data say, not what a calculation left
     keep = patch.load > 0
     arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
     if model == "ccm":

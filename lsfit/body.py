@@ -23,6 +23,7 @@ def hull_volume(W: ArrayLike) -> float:
     _, values, V = np.linalg.svd(points, full_matrices=False)
     if len(points) < 3 or values[2] <= NOTHING * values[0]:
         return 0.0
+    # the volume scales with the lengths, so it loses nothing by making them equal
     even = points @ V.T / values  # a hull of very unequal lengths loses facets
     return float(ConvexHull(np.vstack([even, -even])).volume * values.prod())
 
@@ -194,6 +195,7 @@ class ExactSurface(LimitSurface):
     def _largest(self, w: ArrayLike) -> tuple[FloatArray, NDArray[np.int64]]:
         W = rows(w, 3)
         P, at = np.empty(len(W)), np.empty(len(W), dtype=np.int64)
+        # a product with all facets at once would take gigabytes for thousands of wrenches
         for part in range(0, len(W), 200):
             product = W[part : part + 200] @ self._facets.T
             product = np.abs(product) if self.rank == 1 else product

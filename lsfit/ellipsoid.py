@@ -138,6 +138,7 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     W = checked_wrenches(W, 3)
     B, _, flag = principal_frame(W)
     reach = np.abs(W).max(axis=0)
+    # each component by its own reach: the squares of unequal ones would lose the small ones' digits
     used = reach > FLAT * reach.max()
     X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
     right = 1 - floor * X.sum(axis=1)
@@ -187,6 +188,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)
     floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
+    # the linear equations give the best form of all; only one that is open or too long needs the programme
     lowest = np.linalg.eigvalsh(A)[0]
     if lowest >= floor:
         return A, flag if lowest > floor + AT_BOUND else flag | FitFlag.BOUNDED
@@ -200,6 +202,7 @@ def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[F
     Directions below `HELD` are rounding and stay at the start. Between that and `WEAK` they are followed, but a part in
     ``1e-16 / WEAK`` of the solution is rounding there, which the flag says too.
     """
+    # unit diagonal: the share of an eigenvalue then says what the data determine, not how long an axis is
     size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
     values, V = np.linalg.eigh(N * np.outer(size, size))
     held = values > HELD * values[-1]
@@ -242,6 +245,7 @@ class TiltedEllipsoid(LimitSurface):
         A = np.array(self.A, float)
         if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
             raise ValueError(f"A has shape {A.shape}: expected finite numbers in a square matrix")
+        # rounding leaves 1e-16; more than this is another matrix than the caller meant
         if abs(A - A.T).max() > 1e-9 * abs(A).max():
             raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
         F = np.array(self.F, float) if np.size(self.F) else _ball_map(A)

@@ -49,6 +49,7 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     W, motions = checked_motions(W, T)
     assert motions is not None
     P, G = model.value(W), model.gradient(W)
+    # the usual case is one compiled loop; a flat model has no angle of its own to most motions
     if model.rank == model.dimension:
         E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
         return FitErrors(E1, Erad, math.degrees(angle))

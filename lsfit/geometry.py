@@ -31,6 +31,7 @@ def directions(dimension: int, count: int) -> FloatArray:
         phi = i * np.pi * (3 - math.sqrt(5))
         u = np.column_stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
     else:
+        # no spiral fills spheres of more dimensions; the seed makes every run the same
         u = np.random.default_rng(dimension).normal(size=(count, dimension))
     u = u / np.linalg.norm(u, axis=1, keepdims=True)
     u.flags.writeable = False
@@ -102,6 +103,7 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
     """Map ``L (d, d)`` from a body that is nearly round onto a closed one, ``P <= 1``, by its surface's moments."""
     u = directions(dimension, 40 * dimension**2)
     L = np.eye(dimension)
+    # one pass does for bodies that are nearly round, long ones take several; 0.3 is round enough for the rules
     for _ in range(40):
         r = value(u @ L.T) ** (-1 / degree)
         Y = u * r[:, None]
@@ -136,6 +138,7 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
         floors = _floors(c, _plane_monomials(n))
         area = np.pi / n * float((1.0 / np.sqrt(floors[:, 2])).sum())
+        # equal steps converge exponentially for a smooth outline, so two that agree are both right
         if abs(area - last) <= 1e-13 * area:
             break
         last = area

@@ -38,6 +38,7 @@ def lies_above(v: FloatArray, dimension: int, level: float) -> bool:
     if _bound(v, dimension) > level:
         return True
     E = exponents(dimension, 4)
+    # a long thin body has a small value along one axis by its shape alone: made as long as wide it is judged fairly
     along = v[E.max(axis=1) == 4]
     if not along.min() > level:
         return False
@@ -70,6 +71,7 @@ def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
         reached = monomials(new, E) @ v
         lower = reached < value
         u, value = np.where(lower[:, None], new, u), np.where(lower, reached, value)
+        # a step that rises is cut hard, one that falls may grow: as trust regions do
         trust = np.where(lower, np.minimum(2 * trust, 0.3), 0.2 * trust)
     best = int(np.argmin(value))
     return float(value[best]), u[best]
@@ -227,6 +229,7 @@ def closed(coefficients: FloatArray, dimension: int) -> tuple[Closed, float, Flo
     for group in _groups(coefficients, E):
         own = coefficients[(E[:, ~group] == 0).all(axis=1)]
         n = int(group.sum())
+        # the margin follows the group's own size, so a short axis beside long ones is not lost in their rounding
         margin = CLOSED * float(np.abs(half_sphere_monomials(n, 200) @ own).max())
         if margin > 0 and lies_above(own, n, margin):
             continue

@@ -101,6 +101,7 @@ class Quartic(LimitSurface):
         OpenBodyError, UndecidedError
             If the level set is not closed, or not known to be.
         """
+        # a fit knows the frame in which its coefficients are exact; it judges better than the components do
         if self.ball_map is not None:
             refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
             return self.ball_map
@@ -156,6 +157,7 @@ class Quartic(LimitSurface):
         length = np.linalg.norm(T, axis=1)
         moving = length > 0
         T = T[moving] / length[moving, None]
+        # of a body with dents the valley next to a start need not hold the farthest point: several are searched
         owner, start = self._starts(T)
         found = np.empty_like(start)
         failed = support_points(self._round.tensor, T[owner], start, found)
@@ -175,6 +177,7 @@ class Quartic(LimitSurface):
         """
         d, Y = self.dimension, self._surface_points
         owner, place, sign = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+        # bounds the memory of the product with all samples
         for part in range(0, len(T), 10_000):
             along = T[part : part + 10_000] @ Y.T
             height = np.abs(along)

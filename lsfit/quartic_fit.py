@@ -205,6 +205,7 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     """Quartic with coefficients ``v`` of the round frame, in the wrench's components."""
     d, r = samples.B.shape
     E = exponents(r, 4)
+    # coefficients in the components do not exist for a flat body, and lose their digits in a tilted frame
     if r < d:
         return Image(Quartic(v, E), samples.B, flag)
     reach = np.linalg.norm(samples.B, axis=1)

@@ -88,6 +88,7 @@ def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
     The additive recurrence by powers of the generalised golden ratio fills the unit cube evenly; the normal quantile
     of each number makes it evenly spread over directions.
     """
+    # fixed-point iteration for the root of x^(d + 1) = x + 1
     root = 2.0
     for _ in range(60):
         root = (1 + root) ** (1 / (dimension + 1))
@@ -146,6 +147,7 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
 
 def _pressed(W: FloatArray) -> NDArray[np.bool_]:
     """Which wrenches are not zero, ``(m,)``."""
+    # squares of lengths, hence the square of the share
     size = np.einsum("md,md->m", W, W)
     return size > NOTHING**2 * size.max()
 

@@ -138,6 +138,7 @@ def convex_least_squares(
     H[:k, :k], g[:k] = N, b
     x = _within(H, g, floor, dimension)
     lack = floor / 2 - smallest(gram_matrix(x[:k], x[k:], dimension))
+    # a mixture of two sos-convex forms is one, and that of the ball lifts every eigenvalue
     if lack > 0:
         most = smallest(gram_matrix(ball[:k], ball[k:], dimension))
         share = lack / (most - floor / 2 + lack)
@@ -281,6 +282,7 @@ def least_quadratic(
             return best
         try:
             dx, dX, dZ = _direction(H, A, AT, X, Z, slope)
+            # steps stop short of the boundary, where the inverse in the next direction would lose its digits
             # One length for both: the quadratic couples the residual of the dual equation to the step of x.
             length = min(1.0, 0.95 * min(_reach(X, dX), _reach(Z, dZ)))
         except np.linalg.LinAlgError:
@@ -313,6 +315,7 @@ def _direction(
     _, dX, dZ = newton(-Z)
     length = min(1.0, _reach(X, dX), _reach(Z, dZ))
     ahead = ((X + length * dX) * (Z + length * dZ)).sum() / n
+    # Mehrotra: the better the plain step, the less the iterate has to be centred
     centring = max(1e-6, (ahead / mu) ** 3) * mu
     return newton(centring * inverse - Z - _symmetric(inverse @ dX @ dZ))
 

@@ -83,6 +83,7 @@ def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolera
     if not largest.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
     B, flag = _map(wrenches, largest, scaling, tolerance)
+    # a motion that meets no friction has a wrench of rounding, whose direction means nothing
     used = largest > tolerance * largest.max()
     moving = (np.abs(wrenches[:, used]) > tolerance * largest[used]).any(axis=1)
     Y, slip = wrenches[moving] @ np.linalg.pinv(B).T, motions[moving] @ B
@@ -99,6 +100,7 @@ def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float)
     flag = FitFlag.RANK_DEFICIENT if r < W.shape[1] else FitFlag.CLEAN
     flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
     B = np.zeros((W.shape[1], r))
+    # a diagonal map keeps the surface a quartic of the components, which files and look-ups can hold
     if r == len(used) and scaling != "whitened":
         B[used] = np.diag(scale if scaling == "maxima" else np.ones(r))
         return B, flag

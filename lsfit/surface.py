@@ -175,6 +175,7 @@ class Image(LimitSurface):
         B = np.array(self.B, float)
         if B.ndim != 2 or B.shape[1] != self.inner.dimension or not np.isfinite(B).all():
             raise ValueError(f"B has shape {B.shape}: expected finite numbers (d, {self.inner.dimension})")
+        # columns of one size first: a thin body is thin, not flat
         if np.linalg.matrix_rank(B / np.abs(B).max(axis=0), 1e-13) < B.shape[1]:
             raise ValueError("the columns of B depend on each other: give a map onto the body's own span")
         B.flags.writeable = False

@@ -155,6 +155,7 @@ def _solve(
         ],
         format="csr",
     )
+    # rows come component by component; a cone of second order needs those of one sample side by side
     order = np.arange(rows.shape[0])
     cones_of_slip = slice(3 * m, (4 + d) * m)
     order[cones_of_slip] = order[cones_of_slip].reshape(d + 1, m).T.ravel()

@@ -102,6 +102,7 @@ def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
 def is_ellipsoid(body: Body) -> bool:
     """Whether the squared support is a quadratic form, as of an ellipsoid about 0."""
     _, scale, Q = quadratic_form(body)
+    # six supports always fit some form: others have to confirm it
     t = fibonacci_vertices(np.ones(3), 60)
     h2 = body.support(t / scale) ** 2
     return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= ROUND * h2.max())
@@ -123,6 +124,7 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     Otherwise it has the proportions of the body's semi-axes. Its size follows from the support on a few thousand
     directions, less what a support function can fall between them, 2 to 4 % of its largest value.
     """
+    # a root from the scaled form keeps the digits of short axes, which a symmetric root would mix up
     if is_ellipsoid(body):
         _, scale, Q = quadratic_form(body)
         size, V = np.linalg.eigh(Q)
@@ -131,6 +133,7 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     axes = (ends[:3] + ends[3:]) / 2
     if (axes <= 0).any():
         return np.zeros((3, 3))
+    # between samples a support of the even body falls by no more than the distance times its largest value
     h = body.support(fibonacci_vertices(np.ones(3), DIRECTIONS) / axes)
     return np.diag(axes * max(h.min() - SPACING * h.max() / (1 - SPACING), 0))
 

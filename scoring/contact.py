@@ -38,6 +38,7 @@ class SoftContact:
         axes = np.array(self.axes, dtype=float)
         if axes.shape != (3, 3) or not np.isfinite(axes).all():
             raise ValueError(f"axes has shape {axes.shape}: expected three rows x, y, N of finite numbers")
+        # a left-handed frame would turn the torque about the normal round
         if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0:
             raise ValueError(
                 f"axes is {axes.tolist()}: rows x, y, N must be perpendicular unit vectors with x cross y = N; "

@@ -248,7 +248,7 @@ class _Programme:
             ),
         ]
         A = -np.concatenate(groups)
-        self.A = (A + A.swapaxes(1, 2)) / 2
+        self.A: FloatArray = (A + A.swapaxes(1, 2)) / 2
         self.A0 = np.outer(s.sum(axis=0), s.sum(axis=0))
         ends = np.cumsum([len(g) for g in groups])
         self.single = np.arange(1, ends[2])

@@ -151,6 +151,7 @@ class EllipsoidFibre:
         if crossing != 0:
             g = _cross(self.c, split) / crossing
             xi = g / math.sqrt(1 + (beta * g) ** 2)
+            # a piece across the line would count on one side of it as a whole
             if abs(xi) < 1:
                 psi = np.sort(np.append(psi, math.asin(xi)))
         xi, rest = np.sin(psi), np.cos(psi) ** 2
@@ -222,6 +223,7 @@ class MeshFibre:
         """Area of the hull of the body's shadow and 0, measured where the shadow is about as wide as long."""
         M, phi = self.span.M, 2 * math.pi * np.arange(SHADOW) / SHADOW
         W, s, _ = np.linalg.svd(M[:, 1:] * self.body.support(np.eye(3)))
+        # a shadow that is thin or far from 0 is stretched: equal steps of angle must see its round parts
         s = np.maximum(s, [TINY, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], TINY)])
         u = np.column_stack([np.cos(phi), np.sin(phi)]) @ (W / s).T @ M
         return float(s.prod()) * fan_area(u[:, 0] + self.body.support(u[:, 1:]))

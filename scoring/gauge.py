@@ -88,6 +88,7 @@ def facing(
         L[n + np.arange(k), 0, r + np.arange(k)] = 1
     u0 = w / (w * w).sum(axis=1, keepdims=True)
     h = contact_support(c, D, u0)
+    # room for the start inside all cones, also where the supports themselves are nearly 0
     size = np.abs(h).max(axis=1, keepdims=True) + np.linalg.norm(D, axis=(1, 2)).max() * 1e-3
     if centre is not None:
         L[-1, 0, :r], L[-1, 0, -1] = centre, 1
@@ -124,6 +125,7 @@ def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str
 def _across(w: FloatArray) -> FloatArray:
     """Orthonormal columns across each wrench, ``(m, r, r - 1)``, by a reflection that turns it to the first axis."""
     a = w / np.linalg.norm(w, axis=1, keepdims=True)
+    # the sign that adds: the difference would cancel where w is near the first axis
     a[:, 0] += np.copysign(1, a[:, 0])
     reflection = np.eye(w.shape[1]) - 2 * a[:, :, None] * a[:, None, :] / (a * a).sum(axis=1)[:, None, None]
     return reflection[:, :, 1:]

@@ -114,6 +114,7 @@ def graspit_score(
     except QhullError:
         hull, joggled = ConvexHull(points, qhull_options="QJ"), True
     nearest = -float(hull.equations[:, -1].max())
+    # on a facet through 0 rounding gives either sign
     inner = nearest > 1e-9 * size[0] / np.sqrt(len(points))
     return LinearisedScore(float(hull.volume), nearest if inner else 0.0, len(hull.simplices), joggled)
 

@@ -178,6 +178,7 @@ def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Sp
     carried = np.linalg.svd(np.hstack(loads), compute_uv=False)
     if len(carried) < 6 or carried[5] <= 1e-13 * carried[0]:
         return None
+    # null vectors of [C_1, -C_2] are the wrenches that both spans hold; columns of one size make the rank fair
     values, vectors = np.linalg.svd(np.hstack([scaled[0], -scaled[1]]))[1:]
     if values[5] <= 1e-13 * values[0]:
         return None

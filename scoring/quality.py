@@ -189,6 +189,7 @@ def grasp_score(
     if len(contacts) < 2:
         raise ValueError(f"contacts has {len(contacts)} entry: a grasp needs at least two")
     lengths = object_length, contact_length, centre_of_mass
+    # the closed form would take any length
     contacts[0].wrench_map(*lengths)  # refuses lengths that are none
     bodies = [contact.body for contact in contacts]
     if len(contacts) > 2:
@@ -211,6 +212,7 @@ def grasp_score(
 def faces(contacts: Sequence[SoftContact], tolerance: float) -> bool:
     """Whether two contacts press against each other along their common line, up to an angle [rad]."""
     line = contacts[1].position - contacts[0].position
+    # compared by components, not by the arc cosine, which has no digits near 0
     d = float(np.linalg.norm(line))
     N1, N2 = contacts[0].axes[2], contacts[1].axes[2]
     return d > 0 and max(np.abs(N1 * d - line).max(), np.abs(N2 * d + line).max()) <= tolerance * d

@@ -109,6 +109,7 @@ def _polytope(C: FloatArray, bodies: Sequence[Body], kind: str, corners: int) ->
             return p, float(V.sum()), facets
         normals = hull.equations[:, :-1]
         reach = -hull.equations[:, -1] - normals @ p
+        # new corners go where the space extends farthest beyond the facets: there the estimate varies most
         beyond = V * ((joint_support(C, bodies, normals, kind) - normals @ p) / reach - 1)
         best = np.argsort(-beyond)[: min(len(points) // 3, corners - len(points))]
         points = np.vstack([points, _extreme(C, bodies, normals[best], kind)])
@@ -155,6 +156,7 @@ def _rounded(C: FloatArray, bodies: Sequence[Body], kind: str) -> tuple[FloatArr
     if len(s) < 6 or s[5] <= FLAT * s[0]:
         return C, 0.0
     det = 1.0
+    # twice by the covariance of extreme wrenches: the first frame is round for the loads, not for the space
     for L in (size[:, None] * axes * s, None, None):
         if L is None:
             L = np.linalg.cholesky(np.cov(_extreme(C, bodies, _directions(512), kind).T))

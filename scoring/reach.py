@@ -103,6 +103,7 @@ class _CuttingPlanes:
         """Reach of the polytopes and its direction."""
         cost = np.concatenate([np.zeros(self.r), np.ones(self.k)])
         s = (None, None) if self.kind == "fixed" else (0, None)
+        # the bounds keep the programme finite where the polytopes so far do not hold the wrench at all
         found = linprog(
             cost,
             A_ub=self.rows,

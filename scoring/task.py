@@ -132,6 +132,7 @@ def hold_task(
     length = max(spread, grip) or 1.0
     C: FloatArray = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
     w: FloatArray = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
+    # both are exact up to the gap of a programme: a bisection over factors would leave more
     lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
     factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
@@ -190,6 +191,7 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
     if small_w and np.linalg.norm(off_b) <= nothing:
         C, w = U.T @ C, U.T @ w
+        # with fixed normal forces the held multiples are an interval that need not begin at 0
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
         return lowest, forth._replace(u=U @ forth.u)
