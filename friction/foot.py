@@ -106,17 +106,17 @@ class ContactFace:
         """
         q = patch.corners
         if q is None or q.shape[1] != 4:
-            found = "none" if q is None else f"{q.shape[1]}"
-            raise ValueError(f"corners: found {found} around each face, expected 4; a contact face has quadrilaterals")
+            count = "none" if q is None else f"{q.shape[1]}"
+            raise ValueError(f"corners: found {count} around each face, expected 4; a contact face has quadrilaterals")
         # the diagonals give the area vector of a warped face too, whichever way it is split
-        own = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
-        length = np.linalg.norm(own, axis=1)
-        own = own * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
-        sense = patch.load @ (own * patch.normal).sum(axis=1) / patch.load.sum()
+        plane_normal = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
+        length = np.linalg.norm(plane_normal, axis=1)
+        plane_normal = plane_normal * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
+        sense = patch.load @ (plane_normal * patch.normal).sum(axis=1) / patch.load.sum()
         if abs(sense) <= CANCEL:
             raise ValueError("corners: found faces that are wound both ways about their normals, expected one sense")
-        own *= np.sign(sense)
-        share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * own
+        plane_normal *= np.sign(sense)
+        share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
         corner = _numbered(q.reshape(-1, 3), SAME * np.median(np.ptp(q, axis=1).max(axis=1)))
         weight = np.repeat(share, 4, axis=0)
         total = np.column_stack([np.bincount(corner, weight[:, k]) for k in range(3)])

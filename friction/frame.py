@@ -222,8 +222,8 @@ def firm(faces: ContactPatch) -> NDArray[np.bool_]:
     """Which faces are no slivers ``(n,)``: all without corners, and all where every one is a sliver."""
     if faces.corners is None:
         return np.ones(len(faces.area), dtype=bool)
-    found = ~slivers(faces.corners)
-    return found | ~found.any()
+    whole = ~slivers(faces.corners)
+    return whole | ~whole.any()
 
 
 def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:

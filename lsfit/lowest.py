@@ -111,9 +111,9 @@ def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
         H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
         values, vectors = np.linalg.eigh(H)
         u, z = vectors[:, :, 0], u
-    found = values[:, 0]
-    lowest = float(found.min())
-    near = found <= lowest + NEAR * (float(field.max()) - lowest)
+    softest = values[:, 0]
+    lowest = float(softest.min())
+    near = softest <= lowest + NEAR * (float(field.max()) - lowest)
     tensor = Q.reshape(d, d, d, d)
     return min([lowest, *(_polished(tensor, *pair) for pair in zip(z[near], u[near], strict=True))])
 
@@ -227,13 +227,13 @@ def closed(coefficients: FloatArray, dimension: int) -> tuple[Closed, float, Flo
     E = exponents(dimension, 4)
     answer = Closed.YES, 0.0, np.zeros(dimension)
     for group in _groups(coefficients, E):
-        own = coefficients[(E[:, ~group] == 0).all(axis=1)]
+        form = coefficients[(E[:, ~group] == 0).all(axis=1)]
         n = int(group.sum())
-        # the margin follows the group's own size, so a short axis beside long ones is not lost in their rounding
-        margin = CLOSED * float(np.abs(half_sphere_monomials(n, 200) @ own).max())
-        if margin > 0 and lies_above(own, n, margin):
+        # the margin follows the size of the group's own form: a short axis is not lost in the rounding of long ones
+        margin = CLOSED * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
+        if margin > 0 and lies_above(form, n, margin):
             continue
-        value, u = smallest_value(own, n)
+        value, u = smallest_value(form, n)
         direction = np.zeros(dimension)
         direction[group] = u
         if value < -margin or margin == 0:

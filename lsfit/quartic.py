@@ -106,9 +106,9 @@ class Quartic(LimitSurface):
             refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
             return self.ball_map
         units = np.ones(self.dimension) if self.units is None else self.units
-        own = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.exponents)
-        refuse_open(own.coefficients, self.dimension, np.diag(units))
-        return units[:, None] * round_frame(own.value, self.dimension, 4)
+        even = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.exponents)
+        refuse_open(even.coefficients, self.dimension, np.diag(units))
+        return units[:, None] * round_frame(even.value, self.dimension, 4)
 
     @property
     def ellipsoid(self) -> TiltedEllipsoid:
@@ -159,15 +159,15 @@ class Quartic(LimitSurface):
         T = T[moving] / length[moving, None]
         # of a body with dents the valley next to a start need not hold the farthest point: several are searched
         owner, start = self._starts(T)
-        found = np.empty_like(start)
-        failed = support_points(self._round.tensor, T[owner], start, found)
+        points = np.empty_like(start)
+        failed = support_points(self._round.tensor, T[owner], start, points)
         if failed:
             raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
         if len(owner) > len(T):
-            order = np.lexsort(((found * T[owner]).sum(axis=1), owner))
-            found = found[order[np.append(np.diff(owner) > 0, True)]]
+            order = np.lexsort(((points * T[owner]).sum(axis=1), owner))
+            points = points[order[np.append(np.diff(owner) > 0, True)]]
         out = np.zeros((len(moving), self.dimension))
-        out[moving] = found @ self.frame.T
+        out[moving] = points @ self.frame.T
         return out
 
     def _starts(self, T: FloatArray) -> tuple[IntArray, FloatArray]:

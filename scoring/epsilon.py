@@ -137,8 +137,8 @@ def _between(c: FloatArray, D: FloatArray, kind: str, tolerance: float) -> tuple
         proofs.remove(first)
         for side in (first.split, -first.split):
             proofs.append(certified_radius(c, D, kind, np.vstack([first.planes, side])))
-            found = _weakest(c, D, proofs[-1].directions[:6], kind, first.radius)
-            upper, u = min((upper, u), found, key=lambda pair: pair[0])
+            weakest = _weakest(c, D, proofs[-1].directions[:6], kind, first.radius)
+            upper, u = min((upper, u), weakest, key=lambda pair: pair[0])
     return min(proof.radius for proof in proofs), upper, u
 
 
@@ -161,12 +161,12 @@ def _weakest_of_bodies(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kin
     """Least support of contacts with any bodies found from the start ``u (6,)``, and its unit wrench."""
     best, at = np.inf, u
     for _ in range(_ROUNDS):
-        found = reach(C, bodies, u, kind, tolerance=1e-5)
-        length = float(np.linalg.norm(found.u))
-        u = found.u / length
-        if not found.upper / length < best * (1 - 1e-6):
+        facet = reach(C, bodies, u, kind, tolerance=1e-5)
+        length = float(np.linalg.norm(facet.u))
+        u = facet.u / length
+        if not facet.upper / length < best * (1 - 1e-6):
             break
-        best, at = found.upper / length, u
+        best, at = facet.upper / length, u
     return best, at
 
 

@@ -1,8 +1,9 @@
 """How far the wrenches of contacts with any limit surfaces reach along a wrench.
 
-Ellipsoids go to `scoring.gauge`. The reach of polytopes is a linear programme. Other bodies are met by cutting planes:
-points of a body, found where its support is asked for, span a polytope inside it. Its value is a lower
-bound, the bodies' own support for its direction an upper one, and that direction asks for the next points.
+Ellipsoids go to `scoring.gauge`. Other bodies are met by cutting planes: points of a body, vertices of a polytope,
+found where its support is asked for, span a polytope inside it, and the reach of those polytopes is a linear programme.
+Its value is a lower bound, the bodies' own support for its direction an upper one, and that direction asks for the next
+points.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from softjaw.scoring.bodies import (
     is_ellipsoid,
     joint_support,
     touching_points,
-    vertices_of,
 )
 from softjaw.scoring.gauge import gauge
 
@@ -58,8 +58,8 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
     """
     if all(is_ellipsoid(body) for body in bodies):
         D = np.array([ellipsoid_inside(body) @ Ci[:, 1:].T for body, Ci in zip(bodies, C, strict=True)])
-        found = gauge(C[:, :, 0], D, w[None], kind)
-        return Reach(float(found.lower[0]), float(found.upper[0]), found.u[0])
+        bounds = gauge(C[:, :, 0], D, w[None], kind)
+        return Reach(float(bounds.lower[0]), float(bounds.upper[0]), bounds.u[0])
     programme = _CuttingPlanes(C, bodies, w, kind)
     best = Reach(-np.inf if kind == "fixed" else 0.0, np.inf, w / (w @ w))
     programme.cut(best.u)
@@ -86,25 +86,20 @@ class _CuttingPlanes:
         self.far = _FAR / np.linalg.norm(w)
         self.rows = np.zeros((0, self.r + self.k))
         for i, body in enumerate(bodies):
-            vertices = vertices_of(body)
-            if vertices is None:
-                axes = body.support(np.eye(3))
-                directions = fibonacci_vertices(np.ones(3), 40) / np.where(axes > 0, axes, 1.0)
-                vertices = touching_points(body, directions)
-            self._add(i, vertices)
+            axes = body.support(np.eye(3))
+            self._add(i, touching_points(body, fibonacci_vertices(np.ones(3), 40) / np.where(axes > 0, axes, 1.0)))
 
     def cut(self, u: FloatArray) -> None:
-        """Add the point of each body that matters for the direction; polytopes are known from the beginning."""
+        """Add the point of each body that matters for the direction."""
         for i, (C, body) in enumerate(zip(self.C, self.bodies, strict=True)):
-            if vertices_of(body) is None:
-                self._add(i, touching_points(body, C[:, 1:].T @ u))
+            self._add(i, touching_points(body, C[:, 1:].T @ u))
 
     def solve(self) -> tuple[float, FloatArray]:
         """Reach of the polytopes and its direction."""
         cost = np.concatenate([np.zeros(self.r), np.ones(self.k)])
         s = (None, None) if self.kind == "fixed" else (0, None)
         # the bounds keep the programme finite where the polytopes so far do not hold the wrench at all
-        found = linprog(
+        optimum = linprog(
             cost,
             A_ub=self.rows,
             b_ub=np.zeros(len(self.rows)),
@@ -113,9 +108,9 @@ class _CuttingPlanes:
             bounds=[(-self.far, self.far)] * self.r + [s] * self.k,
             method="highs-ds",
         )
-        u = found.x[: self.r] / (found.x[: self.r] @ self.w)
+        u = optimum.x[: self.r] / (optimum.x[: self.r] @ self.w)
         inner = np.abs(u).max() < 0.99 * self.far  # otherwise the bounds of u took part, and the value proves nothing
-        return (float(found.fun) if inner else -np.inf), u
+        return (float(optimum.fun) if inner else -np.inf), u
 
     def support(self, u: FloatArray) -> float:
         """Support of the contacts' wrenches for the direction."""

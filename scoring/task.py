@@ -133,15 +133,15 @@ def hold_task(
     C: FloatArray = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
     w: FloatArray = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
     # both are exact up to the gap of a programme: a bisection over factors would leave more
-    lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
+    lowest, bounds = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
-    factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
-    u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
-    gap = max(found.upper - factor, 0.0)
+    factor = bounds.lower if bounds.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
+    u = np.concatenate([bounds.u[:3] - np.cross(bounds.u[3:] / length, middle), bounds.u[3:] / length])
+    gap = max(bounds.upper - factor, 0.0)
     holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
     inside = factor > 1 + _LIMIT and lowest < 1 - _LIMIT
     outside = factor + gap < 1 - _LIMIT or lowest > 1 + _LIMIT
-    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, found.u))
+    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, bounds.u))
 
 
 def least_grip_force(
@@ -178,8 +178,8 @@ def _range_up_to(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     off = w - U @ (U.T @ w)
     if np.linalg.norm(off) > _NOTHING * np.linalg.norm(w):
         return 0.0, Reach(0.0, 0.0, off / (off @ w))
-    found = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
-    return 0.0, found._replace(u=U @ found.u)
+    bounds = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
+    return 0.0, bounds._replace(u=U @ bounds.u)
 
 
 def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
