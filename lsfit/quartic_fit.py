@@ -136,16 +136,19 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     N, b = normal_equations(samples, beta, gamma)
     v, flag = nearest_solution(N, b, ball_coefficients(r))
     loose, free, by = bool(flag), ball_freedom(r), "least squares"
-    if smallest(gram_matrix(v, free, r)) < MARGIN:
+    gram = gram_matrix(v, free, r)
+    if smallest(gram) < MARGIN:
         bound, free = convex_least_squares(N, b, r, loose)
         # Where convexity does not bind, the programme ends in the middle of the matrices that prove its result, and
         # the same free numbers prove the quartic of the linear equations, which has more digits.
-        if smallest(gram_matrix(v, free, r)) < MARGIN:
-            v, by = bound, "semidefinite programme"
+        gram = gram_matrix(v, free, r)
+        if smallest(gram) < MARGIN:
+            v, by, gram = bound, "semidefinite programme", gram_matrix(bound, free, r)
     if not lies_above(v, r, FAR**-4):
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
         v, free = convex_least_squares(N, b, r, loose, 12 * FAR**-4)
-    surface, gram = placed(v, samples, samples.flag | flag), gram_matrix(v, free, r)
+        gram = gram_matrix(v, free, r)
+    surface = placed(v, samples, samples.flag | flag)
     low = smallest(gram)
     if low < MARGIN / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
