@@ -5,21 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from softjaw.study.messages import UNPRINTABLE
-from softjaw.study.scene.checks import findings, value_warnings
-from softjaw.study.scene.objects import SHAPES, Mesh, Object, Section
-from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, model_findings, shown
+from softjaw.study.messages import printable
+from softjaw.study.scene.grasps import Candidates
+from softjaw.study.scene.objects import SHAPES, Mesh, Object
+from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, shown
+from softjaw.study.scene.section import Section, model_findings
 from softjaw.study.scene.sections import (
     Accuracy,
-    Candidates,
     Effects,
     Friction,
     Gripper,
@@ -30,29 +29,48 @@ from softjaw.study.scene.sections import (
     Score,
     Task,
     Uncertainty,
+    petsc_findings,
 )
 from softjaw.study.scene.text import toml_text
 
 Option = str | int | float | bool
-WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print
+WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
+JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
+    # what several sections must satisfy together: the rule, and its sections, the one at fault first
+    (Effects.object_findings, ("effects", "object")),
+    (Effects.surface_findings, ("effects", "limit_surface")),
+    (Gripper.symmetry_findings, ("gripper", "effects")),
+    (Gripper.support_findings, ("gripper", "effects", "accuracy")),
+    (Candidates.findings_on, ("candidates", "object")),
+    (Candidates.pose_findings, ("candidates", "object", "gripper")),
+    (lambda s, c: c.unknown_names("wrench_samples", s.wrench_samples), ("limit_surface", "candidates")),
+    (lambda u, c: c.unknown_names("probes", u.probes), ("uncertainty", "candidates")),
+    (Uncertainty.input_findings, ("uncertainty", "object", "friction", "sweep")),
+    (petsc_findings, ("petsc",)),
+)
+
+
+def _optional(model: type[Section]) -> Any:
+    """A section that may be left out."""
+    return Field(default_factory=model)
 
 
 class Scene(Section):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
     object: Object
-    gripper: Gripper = Field(default_factory=Gripper)
-    friction: Friction = Field(default_factory=Friction)
+    gripper: Gripper = _optional(Gripper)
+    friction: Friction = _optional(Friction)
     candidates: Candidates
     load: Load
-    limit_surface: LimitSurface = Field(default_factory=LimitSurface)
-    score: Score = Field(default_factory=Score)
-    task: Task = Field(default_factory=Task)
-    effects: Effects = Field(default_factory=Effects)
-    accuracy: Accuracy = Field(default_factory=Accuracy)
-    uncertainty: Uncertainty = Field(default_factory=Uncertainty)
-    output: Output = Field(default_factory=Output)
-    run: Run = Field(default_factory=Run)
+    limit_surface: LimitSurface = _optional(LimitSurface)
+    score: Score = _optional(Score)
+    task: Task = _optional(Task)
+    effects: Effects = _optional(Effects)
+    accuracy: Accuracy = _optional(Accuracy)
+    uncertainty: Uncertainty = _optional(Uncertainty)
+    output: Output = _optional(Output)
+    run: Run = _optional(Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
     sweep: dict[str, tuple[Option, ...]] = Field(
         default_factory=dict,
@@ -71,7 +89,26 @@ class Scene(Section):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about values that are allowed but seldom meant."""
-        return tuple(value_warnings(self.gripper, self.friction, self.load, self.accuracy))
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
+        mu, g, force = self.friction.mu, self.gripper, self.load.normal_force[-1]
+        if mu > 2:
+            yield f"friction.mu = {mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"
+        strain = force / (g.pad_length * g.pad_width) / g.shear_modulus
+        if strain > 2:
+            area = f"{g.pad_length_mm * g.pad_width_mm:g} mm^2"
+            yield (
+                f"load.normal_force_n = {force:g} N on {area} is a mean pressure of {strain:.2g} times the pad's shear"
+                " modulus: cases may not converge"
+            )
+        if g.poisson_ratio > 0.45 and g.element == "hex8":
+            yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
+        if self.accuracy.meshes == 2 and any(n % 4 for n in g.elements):
+            yield (
+                f"accuracy.meshes = 2 halves the mesh, and gripper.elements = {list(g.elements)} cannot be halved "
+                "evenly: multiples of 4 can"
+            )
 
     @property
     def sampled(self) -> tuple[int, ...]:
@@ -121,7 +158,7 @@ class Scene(Section):
         else:
             where = self.candidates
             data["candidates"] = [where.station_values_mm, where.angles_deg, where.roll_deg]
-        data["petsc"] = {k: v for k, v in self.petsc.items() if not WATCHING.match(k)}
+        data["petsc"] = {k: v for k, v in self.petsc.items() if not any(word in k for word in WATCHING)}
         data["sweep"] = list(self.sweep.items())  # the order of the axes counts
         return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
@@ -184,13 +221,22 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
     return sections, found + findings(sections) + list(_unprintable(data))
 
 
+def findings(sections: Mapping[str, Any]) -> list[Finding]:
+    """Everything wrong with sections that are valid one by one; a joint rule needs all of its sections."""
+    found = [f.below(name) for name, part in sections.items() if isinstance(part, Section) for f in part.findings()]
+    for rule, names in JOINT:
+        if all(name in sections for name in names):
+            found += [f.below(names[0]) for f in rule(*(sections[name] for name in names))]
+    return found
+
+
 def _unprintable(value: Any, path: KeyPath = ()) -> Iterator[Finding]:
-    """Texts and keys that a terminal would obey, or that would break lines wherever they are shown."""
-    if isinstance(value, str) and (UNPRINTABLE.search(value) or "\n" in value or "\t" in value):
+    """Texts and keys with characters that control a terminal, or that break lines."""
+    if isinstance(value, str) and (printable(value) != value or not {"\n", "\t"}.isdisjoint(value)):
         yield Finding(path, shown(value), "text without control characters", "remove them")
     elif isinstance(value, Mapping):
         for key, inner in value.items():
-            if UNPRINTABLE.search(key) or "\n" in key:
+            if printable(key) != key or "\n" in key:
                 yield Finding(path, f"the key {shown(key)}", "a key without control characters", "remove them")
             else:
                 yield from _unprintable(inner, (*path, key))
