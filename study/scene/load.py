@@ -34,7 +34,6 @@ from softjaw.study.scene.problems import (
     closest,
     key_text,
     shown,
-    unknown_key,
 )
 from softjaw.study.scene.section import Section
 from softjaw.study.scene.sections import LEVELS
@@ -249,11 +248,7 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
     if model is None or name not in model.model_fields:
         every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or Section}.items() for k in m.model_fields]
         near = closest(key, every)
-        if model is not None and not near:
-            f = unknown_key((section, name), None, list(model.model_fields), keys_by_place())
-            yield Finding(path, f.found, f.expected, f.remedy)
-        else:
-            yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
+        yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
     elif key in NOT_SWEPT or section in NO_RESULT or _is_list(model, name):
         remedy = NOT_SWEPT.get(key, "remove it" if section in NO_RESULT else "sweep a key that takes one value")
         yield Finding(path, "a key that cannot be swept", scalar, remedy)

@@ -211,7 +211,7 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
         elif name in ("petsc", "sweep"):
             sections[name] = dict(table)
         elif (model := section_model(name, table)) is None:
-            found.append(_unknown_shape(table))
+            found.append(_unknown_shape(table.get("shape")))
         else:
             try:
                 sections[name] = model.model_validate(table)
@@ -254,14 +254,10 @@ def _unknown_section(name: str, value: Any) -> Finding:
     return Finding((name,), kind, expected, f"it belongs to {homes[0]}" if homes else "remove it")
 
 
-def _unknown_shape(table: Mapping[str, Any]) -> Finding:
-    shape, path, expected = table.get("shape"), ("object", "shape"), f"one of {', '.join(map(shown, SHAPES))}"
-    if shape is not None:
-        near = closest(shape, list(SHAPES)) if isinstance(shape, str) else None
-        return Finding(path, shown(shape), expected, f'did you mean "{near}"?' if near else "choose one of these")
-    fits = {name: sum(key in model.model_fields for key in table) for name, model in SHAPES.items()}
-    likely = max(fits, key=lambda name: fits[name])
-    return Finding(path, "nothing", expected, f'add `shape = "{likely}"` to [object]')
+def _unknown_shape(shape: Any) -> Finding:
+    near = closest(shape, list(SHAPES)) if isinstance(shape, str) else None
+    found, remedy = "nothing" if shape is None else shown(shape), f'did you mean "{near}"?' if near else "choose one"
+    return Finding(("object", "shape"), found, f"one of {', '.join(map(shown, SHAPES))}", remedy)
 
 
 @lru_cache(maxsize=16)

@@ -23,6 +23,9 @@ WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_s
 
 Span = tuple[float, float]
 Length = Annotated[float, Field(gt=0)]
+Modulus = Annotated[float, Field(gt=0, le=1000)]
+Strength = Annotated[float, Field(gt=0, le=1e5)]
+Ratio = Annotated[float, Field(ge=0, le=0.49)]
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 
 
@@ -39,12 +42,12 @@ class Shape(Section):
     @property
     def axis_symmetry(self) -> int:
         """Order of the rotational symmetry about z: 0 is every angle, 1 none."""
-        return self._symmetry()
+        return self._geometry()[0]
 
     @property
     def spans_mm(self) -> dict[str, Span]:
         """Extent along each axis, where it is known without a mesh file [mm]."""
-        return self._spans_mm()
+        return self._geometry()[1]
 
     @property
     def extent(self) -> float | None:
@@ -52,11 +55,9 @@ class Shape(Section):
         spans = self.spans_mm.values()
         return in_si("extent_mm", max(high - low for low, high in spans)) if len(spans) == 3 else None
 
-    def _symmetry(self) -> int:
-        return 1
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return {}
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        """`axis_symmetry` and `spans_mm`."""
+        return 1, {}
 
     def findings(self) -> Iterator[Finding]:
         """Extents outside 1 mm to 2 m are slips of the unit."""
@@ -82,25 +83,15 @@ class Walled(Shape):
     )
     base_wall_mm: Length | None = Field(None, description="thickness of a flat bottom; that of the wall if left out")
     wall_material: Literal["PET", "PP", "HDPE", "custom"] = Field("PET", description="material of the wall")
-    young_modulus_gpa: Annotated[float, Field(gt=0, le=1000)] | None = Field(
-        None, description="Young's modulus of the wall, instead of the material's"
-    )
-    wall_poisson_ratio: Annotated[float, Field(ge=0, le=0.49)] | None = Field(
-        None, description="Poisson's ratio of the wall, instead of the material's"
-    )
-    yield_strength_mpa: Annotated[float, Field(gt=0, le=1e5)] | None = Field(
-        None, description="stress that the wall may bear, instead of the material's"
-    )
-    allowed_dent_mm: Length | None = Field(
-        None, description="largest allowed indentation of the wall, for the safe force range"
-    )
+    young_modulus_gpa: Modulus | None = Field(None, description="Young's modulus of the wall instead of the material's")
+    wall_poisson_ratio: Ratio | None = Field(None, description="Poisson's ratio of the wall instead of the material's")
+    yield_strength_mpa: Strength | None = Field(None, description="yield strength instead of the material's")
+    allowed_dent_mm: Length | None = Field(None, description="largest allowed indentation, for the safe force range")
     open_top: bool = Field(True, description="whether the last section is open, as a cup's and a bottle's without cap")
     support: Literal["standing", "clamped", "free"] = Field(
         "standing", description="standing on its bottom, clamped there, or held by the fingers alone"
     )
-    springs_n_per_mm: float = Field(
-        1.0, gt=0, le=1e4, description="stiffness of all weak springs together, which replace the hold by friction"
-    )
+    springs_n_per_mm: float = Field(1.0, gt=0, le=1e4, description="total stiffness of springs in place of friction")
     base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
     yield_strength, allowed_dent = si("yield_strength_mpa"), si("allowed_dent_mm")
     springs = si("springs_n_per_mm")
@@ -154,11 +145,8 @@ class Sphere(Shape):
     radius_mm: Length = Field(description="radius")
     radius = si("radius_mm")
 
-    def _symmetry(self) -> int:
-        return 0
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        return 0, dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
 
 
 class EllipticCylinder(Shape):
@@ -171,12 +159,10 @@ class EllipticCylinder(Shape):
     length_mm: Length = Field(description="length along z, edges rounded by 2 mm included")
     semi_axis_a, semi_axis_b, length = si("semi_axis_a_mm"), si("semi_axis_b_mm"), si("length_mm")
 
-    def _symmetry(self) -> int:
-        return 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
-
-    def _spans_mm(self) -> dict[str, Span]:
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         a, b, half = self.semi_axis_a_mm, self.semi_axis_b_mm, self.length_mm / 2
-        return {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
+        symmetry = 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
+        return symmetry, {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
 
 
 class Box(Shape):
@@ -188,11 +174,9 @@ class Box(Shape):
     edge_radius_mm: float = Field(gt=0, description="radius of the edges and corners")
     size, edge_radius = si("size_mm"), si("edge_radius_mm")
 
-    def _symmetry(self) -> int:
-        return 4 if self.size_mm[0] == self.size_mm[1] else 2
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        symmetry = 4 if self.size_mm[0] == self.size_mm[1] else 2
+        return symmetry, {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
 
     def findings(self) -> Iterator[Finding]:
         """Edges cannot be rounder than the box is thick."""
@@ -211,11 +195,8 @@ class Plate(Shape):
     thickness_mm: Length = Field(description="distance of the two planes, which the fingers press along x")
     thickness = si("thickness_mm")
 
-    def _symmetry(self) -> int:
-        return 2
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        return 2, {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
 
 
 class Revolution(Walled):
@@ -232,13 +213,10 @@ class Revolution(Walled):
     )
     profile = si("profile_mm")
 
-    def _symmetry(self) -> int:
-        return 0
-
-    def _spans_mm(self) -> dict[str, Span]:
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         radius = max(r for _, r in self.profile_mm)
         heights = [z for z, _ in self.profile_mm]
-        return {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
+        return 0, {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
 
     def findings(self) -> Iterator[Finding]:
         """An outline leads from one end to the other: z never falls, and only the ends may lie on the axis."""
@@ -275,17 +253,13 @@ class Sections(Walled):
         strict=False, min_length=4, max_length=500, description="cross-sections from bottom to top"
     )
 
-    def _symmetry(self) -> int:
-        if any(any(s.shift_mm) for s in self.sections):
-            return 1
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         alike = all((s.b_mm or s.a_mm) == s.a_mm and s.exponent == 2.0 for s in self.sections)
-        return 0 if alike else 2
-
-    def _spans_mm(self) -> dict[str, Span]:
+        symmetry = 1 if any(any(s.shift_mm) for s in self.sections) else 0 if alike else 2
         x = [s.shift_mm[0] + side * s.a_mm for s in self.sections for side in (-1, 1)]
         y = [s.shift_mm[1] + side * (s.b_mm or s.a_mm) for s in self.sections for side in (-1, 1)]
         z = [s.z_mm for s in self.sections]
-        return {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
+        return symmetry, {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
 
     def findings(self) -> Iterator[Finding]:
         """Sections are stacked upwards; only the first and the last may end on the axis."""

@@ -16,8 +16,11 @@ from softjaw.study.scene.section import Direction, Section, Vector, once_and_ris
 from softjaw.study.units import si
 
 Count = Annotated[int, Field(ge=2, le=400)]
-Force = Annotated[float, Field(gt=0, le=1000)]
+Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
 Extent = Annotated[float, Field(ge=0, le=500)]
+Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
+Force = Annotated[float, Field(gt=0, le=1000)]
+Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
@@ -39,34 +42,20 @@ class Gripper(Section):
     pad_length_mm: float = Field(50.0, ge=1, le=500, description="long side of the pad")
     pad_width_mm: float = Field(22.0, ge=1, le=500, description="short side of the pad")
     pad_thickness_mm: float = Field(15.0, ge=0.5, le=200, description="thickness of the pad")
-    material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field(
-        "blatz_ko", description="material law of the pad"
-    )
+    material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field("blatz_ko", description="material law")
     shear_modulus_kpa: float = Field(40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad")
-    poisson_ratio: float = Field(
-        0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam has 0.25"
-    )
-    alpha: tuple[float, ...] = Field(
-        (), strict=False, max_length=6, description="exponents of hyperfoam's terms", examples=[[-2]]
-    )
-    shear_moduli_kpa: tuple[float, ...] = Field(
-        (), strict=False, max_length=6, description="moduli of hyperfoam's terms", examples=[[40]]
-    )
-    elements: Annotated[tuple[Count, Count, Count], Field(strict=False)] = Field(
-        (20, 10, 6), description="elements of the whole pad along its length, width and thickness"
-    )
+    poisson_ratio: float = Field(0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam: 0.25")
+    alpha: Terms = Field((), description="exponents of hyperfoam's terms", examples=[[-2]])
+    shear_moduli_kpa: Terms = Field((), description="moduli of hyperfoam's terms", examples=[[40]])
+    elements: Counts = Field((20, 10, 6), description="elements of the whole pad along its length, width and thickness")
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
     grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
     grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
-    sheet_modulus_gpa: float = Field(
-        200.0, ge=1e-3, le=2000, description="Young's modulus of the backing plate; steel has 200"
-    )
+    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
     sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
-    sheet_support_mm: Annotated[tuple[Extent, Extent], Field(strict=False)] = Field(
-        (20.0, 10.0), description="length and width of the backing plate's middle that the finger holds"
-    )
+    sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
@@ -192,8 +181,7 @@ class Score(Section):
     """How torques are made comparable with forces in the grasp quality."""
 
     torque_scale: Literal["contact", "object"] = Field(
-        "contact",
-        description="soft torques over the contact length (the paper's choice), or all over the object length",
+        "contact", description="length that scales soft torques: of the contact, as in the paper, or of the object"
     )
     object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
         "auto", description="length that scales torque arms; auto is the object's largest extent"
@@ -202,12 +190,9 @@ class Score(Section):
         "auto", description="length that scales soft torques; auto is the pad's length"
     )
     epsilon: Literal["facing", "everywhere"] = Field(
-        "facing",
-        description="where epsilon is computed: for contacts that face each other, or in any pose (some 0.1 s each)",
+        "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.1 s each)"
     )
-    graspit: bool = Field(
-        False, description="also map the quality that GraspIt!'s 20 vertices per contact give, which is too small"
-    )
+    graspit: bool = Field(False, description="also map the quality with GraspIt!'s 20 vertices per contact")
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 
@@ -215,8 +200,7 @@ class LimitSurface(Section):
     """The surface that bounds the friction wrenches of a contact, fitted to the wrenches of many motions."""
 
     model: Literal["three_motions", "axis_aligned", "full", "quartic"] = Field(
-        "quartic",
-        description="ellipsoid from three motions, fitted ellipsoid with axes along the frame or any, convex quartic",
+        "quartic", description="ellipsoid from three motions, fitted ellipsoid (along the axes or any), convex quartic"
     )
     objective: Literal["least_squares", "zhou"] = Field(
         "least_squares", description="what the fit of a full ellipsoid or a quartic minimises; zhou is slower"
@@ -249,9 +233,7 @@ class Effects(Section):
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
         "auto", description="the object's compliance; the shells need object.wall_mm"
     )
-    sheet: Literal["auto", "rigid", "elastic"] = Field(
-        "auto", description="the backing plate of the pad: rigid, or elastic"
-    )
+    sheet: Literal["auto", "rigid", "elastic"] = Field("auto", description="the pad's backing plate")
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
     friction: Literal["auto", "ccm"] = Field("auto", description="friction model behind the score")

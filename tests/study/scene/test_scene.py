@@ -138,7 +138,7 @@ WRONG_VALUES = [
     ("radius_mm = 30", "radius_mm = 200000", 3, "object.radius_mm", "400000 mm", "1 mm to 2 m"),
     ("radius_mm = 30", "radius_mm = 1e9", 3, "object.radius_mm", "2e+09 mm", "1 mm to 2 m"),
     ('"sphere"', '"spher"', 2, "object.shape", '"spher"', '"revolution", "sections"', 'did you mean "sphere"?'),
-    ('shape = "sphere"', "", 1, "object.shape", '"sphere"', '`shape = "sphere"`'),
+    ('shape = "sphere"', "", 1, "object.shape", "nothing", '"sphere"'),
     ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station beside the object: 30.5", "from -30 to 30 mm"),
     ("[0]", "[0, 0]", 6, "candidates.stations_mm", "0 more than once"),
     ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000", "`stations_mm = [25, 50, 75]`"),
