@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, Sphere
 from softjaw.study.scene.problems import Finding, closest, shown
-from softjaw.study.scene.section import Direction, Interval, Section, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Interval, Section, Text, Vector, once_and_rising
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted, si
 
@@ -31,7 +31,7 @@ class GraspPose(Section):
     long_side: Direction = Field(
         description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
     )
-    label: str = Field("", max_length=100, description="name of the grasp")
+    label: Text = Field("", max_length=100, description="name of the grasp")
     point = si("point_mm")
 
     def findings(self) -> Iterator[Finding]:
@@ -41,7 +41,7 @@ class GraspPose(Section):
             found, remedy = f"{shown(list(self.long_side))}, along the approach", "the long side lies in the pad's face"
             yield Finding(("long_side",), found, "a direction across the approach", remedy)
         if max(map(abs, self.point_mm)) > LARGEST_MM:
-            expected = f"a point within {LARGEST_MM:g} mm of the object's origin"
+            expected = f"a point within {LARGEST_MM:g} mm of the origin"
             yield Finding(("point_mm",), shown(list(self.point_mm)), expected, "check the unit, which is mm")
 
     def clearance_mm(self, spans: dict[str, Span], gripper: Gripper) -> float:
@@ -103,6 +103,10 @@ class Candidates(Section):
         """Number of candidates."""
         return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
 
+    def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
+        """Numbers of the candidates that are given by number or label, each once, in the order given."""
+        return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
+
     def findings(self) -> Iterator[Finding]:
         """Exactly one way of giving the candidates."""
         spread = self.stations is not None or self.station_range_mm is not None
@@ -117,8 +121,7 @@ class Candidates(Section):
             yield Finding((found,), f"{found} alone", f"{missing} beside it", f"add {missing}, {EXAMPLE}")
         for key in ("angles_deg", "roll_deg") if self.poses else ():
             if getattr(self, key) != Candidates.model_fields[key].default:
-                remedy = "remove it; approach and long_side say how each pose is turned"
-                yield Finding((key,), f"{key} beside explicit poses", "it with stations only", remedy)
+                yield Finding((key,), f"{key} beside explicit poses", "it with stations only", "remove it")
         for i, pose in enumerate(self.poses):
             yield from (f.below("poses", i) for f in pose.findings())
 

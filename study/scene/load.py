@@ -11,8 +11,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-
 from softjaw.study.messages import shortened
 from softjaw.study.scene.model import (
     NAMES,
@@ -55,7 +53,7 @@ NOT_SWEPT = {
     "limit_surface.wrench_samples": "it changes the size of the results",
 }
 Place = tuple[str, int | None]  # a file and a line of it, or an override
-NO_RESULT = ("output", "run")  # sections that change no result
+NO_RESULT = ("output", "run", "uncertainty")  # sections that change no result of a case
 OVERRIDE = "section.key=value, as in gripper.pad_width_mm=20"
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 
@@ -116,7 +114,7 @@ def _located(wrong: Sequence[Finding], text: str, file: str, given: Mapping[KeyP
     for found in wrong:
         above = [found.path[:n] for n in range(len(found.path), 0, -1)]
         where, number = next((places[p] for places in (given, lines) for p in above if p in places), (file, None))
-        yield Problem(where, number, key_text(found.path), found.found, found.expected, found.remedy)
+        yield found.at(where, number)
 
 
 def _fill_in(data: dict[str, Any], path: Path) -> None:
@@ -249,9 +247,8 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
         every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or Section}.items() for k in m.model_fields]
         near = closest(key, every)
         yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
-    elif key in NOT_SWEPT or section in NO_RESULT or _is_list(model, name):
-        remedy = NOT_SWEPT.get(key, "remove it" if section in NO_RESULT else "sweep a key that takes one value")
-        yield Finding(path, "a key that cannot be swept", scalar, remedy)
+    elif key in NOT_SWEPT or section in NO_RESULT:
+        yield Finding(path, "a key that cannot be swept", scalar, NOT_SWEPT.get(key, "remove it"))
     elif key == "gripper.element" and _table(data, "output").get("patches", "all") == "all":
         expected = "the same number of faces in every case"
         yield Finding(path, "kinds of elements beside stored patches", expected, 'write output.patches = "none"')
@@ -266,8 +263,3 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
 def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     table = data.get(name)
     return table if isinstance(table, Mapping) else {}
-
-
-def _is_list(model: type[BaseModel], name: str) -> bool:
-    schema = model.model_json_schema()["properties"][name]
-    return any(s.get("type") == "array" for s in (schema, *schema.get("anyOf", ())))

@@ -5,17 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from softjaw.study.messages import printable
 from softjaw.study.scene.grasps import Candidates
 from softjaw.study.scene.objects import SHAPES, Mesh, Object
-from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, shown
+from softjaw.study.scene.problems import Finding, SceneError, closest, shown
 from softjaw.study.scene.section import Section, model_findings
 from softjaw.study.scene.sections import (
     Accuracy,
@@ -83,7 +82,7 @@ class Scene(Section):
         """Hold what the sections must satisfy together, for scenes made in Python too."""
         wrong = findings({name: getattr(self, name) for name in Scene.model_fields})
         if wrong:
-            raise ValueError("; ".join(f"{key_text(f.path)}: found {f.found}, expected {f.expected}" for f in wrong))
+            raise _scene_error(wrong)
         return self
 
     @property
@@ -113,10 +112,10 @@ class Scene(Section):
     @property
     def sampled(self) -> tuple[int, ...]:
         """Numbers of the candidates whose sampled wrenches are stored, rising."""
-        wanted, labels = self.limit_surface.wrench_samples, self.candidates.labels
-        if isinstance(wanted, str):
-            return tuple(range(len(labels))) if wanted == "all" else ()
-        return tuple(sorted({labels.index(w) if isinstance(w, str) else w for w in wanted}))
+        names = self.limit_surface.wrench_samples
+        if isinstance(names, str):
+            return tuple(range(self.candidates.count)) if names == "all" else ()
+        return tuple(sorted(self.candidates.numbers(names)))
 
     @property
     def axis_symmetry(self) -> int:
@@ -166,7 +165,7 @@ class Scene(Section):
         """The scene with values of dotted keys put in and without a sweep; `SceneError` where that is no scene."""
         sections, wrong = checked_sections(put(self.effective(), values))
         if wrong:
-            raise SceneError([Problem("scene", None, key_text(f.path), f.found, f.expected, f.remedy) for f in wrong])
+            raise _scene_error(wrong)
         return Scene(**sections)
 
 
@@ -198,6 +197,10 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     return {**data, **tables, "sweep": {}}
 
 
+def _scene_error(wrong: Iterable[Finding]) -> SceneError:
+    return SceneError([f.at("scene", None) for f in wrong])
+
+
 def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Finding]]:
     """The valid sections of a scene, and everything wrong with it but for its sweep and its files."""
     sections: dict[str, Any] = {}
@@ -218,7 +221,7 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
             except ValidationError as error:
                 others = {place: keys for place, keys in keys_by_place().items() if keys != list(model.model_fields)}
                 found.extend(model_findings(error, model, name, table, others))
-    return sections, found + findings(sections) + list(_unprintable(data))
+    return sections, found + findings(sections)
 
 
 def findings(sections: Mapping[str, Any]) -> list[Finding]:
@@ -228,21 +231,6 @@ def findings(sections: Mapping[str, Any]) -> list[Finding]:
         if all(name in sections for name in names):
             found += [f.below(names[0]) for f in rule(*(sections[name] for name in names))]
     return found
-
-
-def _unprintable(value: Any, path: KeyPath = ()) -> Iterator[Finding]:
-    """Texts and keys with characters that control a terminal, or that break lines."""
-    if isinstance(value, str) and (printable(value) != value or not {"\n", "\t"}.isdisjoint(value)):
-        yield Finding(path, shown(value), "text without control characters", "remove them")
-    elif isinstance(value, Mapping):
-        for key, inner in value.items():
-            if printable(key) != key or "\n" in key:
-                yield Finding(path, f"the key {shown(key)}", "a key without control characters", "remove them")
-            else:
-                yield from _unprintable(inner, (*path, key))
-    elif isinstance(value, list | tuple):
-        for index, inner in enumerate(value):
-            yield from _unprintable(inner, (*path, index))
 
 
 def _unknown_section(name: str, value: Any) -> Finding:

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
 from softjaw.study.scene.problems import Finding, shown
-from softjaw.study.scene.section import Interval, Point, Section, numbers_text
+from softjaw.study.scene.section import Interval, Point, Section, Text, numbers_text
 from softjaw.study.units import UNITS, converted, in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
@@ -35,7 +35,7 @@ class Shape(Section):
     SIZE_KEYS: ClassVar[tuple[str, ...]] = ()  # key of the extents, or one key for each of x, y and z
     if TYPE_CHECKING:
         shape: str  # a literal of each subclass
-    name: str = Field("", max_length=100, description="name for titles and tables")
+    name: Text = Field("", max_length=100, description="name for titles and tables")
     mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
     mass = si("mass_g")
 
@@ -106,29 +106,27 @@ class Walled(Shape):
         """Exactly one thickness, thin beside the object, and a complete material."""
         yield from super().findings()
         if self.wall_mm is not None and self.wall_profile_mm is not None:
-            found, remedy = "wall_mm and wall_profile_mm", "keep the one that is meant"
-            yield Finding(("wall_profile_mm",), found, "one of them", remedy)
+            yield Finding(("wall_profile_mm",), "wall_mm beside it", "one of them", "keep the one that is meant")
         if self.wall is not None:
             yield from self._wall_findings()
             return
         for key in WALL_KEYS:
             if getattr(self, key, None) is not None:
-                remedy = "add wall_mm, for example `wall_mm = 0.4`, or remove the key"
+                remedy = "add for example `wall_mm = 0.4`, or remove the key"
                 yield Finding((key,), f"{key} without a wall", "wall_mm beside it", remedy)
 
     def _wall_findings(self) -> Iterator[Finding]:
         pairs = self.wall_profile_mm or ()
         for i, (low, high) in enumerate(pairwise(pairs), 1):
             if high[0] <= low[0]:
-                found, remedy = f"z = {high[0]:g} after {low[0]:g} mm", "sort the pairs [z, thickness] along the axis"
-                yield Finding(("wall_profile_mm", i), found, "z to rise from pair to pair", remedy)
+                found = f"z = {high[0]:g} after {low[0]:g} mm"
+                yield Finding(("wall_profile_mm", i), found, "rising z", "sort the pairs [z, thickness] by z")
         most = THICKEST * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
         for thickness in [t for _, t in pairs] or [self.wall_mm or 0.0]:
             if not 0 < thickness <= most:
                 key = "wall_profile_mm" if pairs else "wall_mm"
                 expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
-                remedy = "leave the wall out: such an object is as good as rigid" if thickness > 0 else "write it in mm"
-                yield Finding((key,), f"{thickness:g} mm", expected, remedy)
+                yield Finding((key,), f"{thickness:g} mm", expected, "leave a thicker wall out: it is as good as rigid")
                 break
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:
@@ -225,8 +223,7 @@ class Revolution(Walled):
             before = self.profile_mm[i - 1]
             if i and (z < before[0] or (z, r) == before):
                 found = f"{numbers_text((z, r))} after {numbers_text(before)}"
-                remedy = "sort the points [z, radius] along the axis"
-                yield Finding(("profile_mm", i), found, "z to rise from point to point", remedy)
+                yield Finding(("profile_mm", i), found, "rising z", "sort the points [z, radius] by z")
             at_end = i in (0, len(self.profile_mm) - 1)
             if r < 0 or (r == 0 and not at_end):
                 expected = "a radius >= 0" if at_end else "a radius > 0 between the ends"
@@ -266,19 +263,19 @@ class Sections(Walled):
         yield from super().findings()
         for i, (low, high) in enumerate(pairwise(self.sections), 1):
             if high.z_mm <= low.z_mm:
-                found, remedy = f"z = {high.z_mm:g} after {low.z_mm:g} mm", "sort the sections from bottom to top"
-                yield Finding(("sections", i, "z_mm"), found, "z to rise from section to section", remedy)
+                found = f"z = {high.z_mm:g} after {low.z_mm:g} mm"
+                yield Finding(("sections", i, "z_mm"), found, "rising z", "sort the sections from bottom to top")
         for i, section in enumerate(self.sections[1:-1], 1):
             if section.a_mm == 0:
-                expected, remedy = "a semi-axis above 0 between the ends", "write the semi-axis along x, in mm"
-                yield Finding(("sections", i, "a_mm"), "0 mm", expected, remedy)
+                expected = "a semi-axis above 0 between the ends"
+                yield Finding(("sections", i, "a_mm"), "0 mm", expected, "write the semi-axis along x, in mm")
 
 
 class Mesh(Walled):
     """A closed triangle mesh from a file."""
 
     shape: Literal["mesh"]
-    mesh: str = Field(
+    mesh: Text = Field(
         min_length=1, max_length=4000, description="file of the mesh (.stl, .obj, .ply, .off), beside the scene file"
     )
     unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")

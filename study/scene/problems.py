@@ -16,19 +16,6 @@ KeyPath = tuple[str | int, ...]
 MOST_LISTED = 50  # problems in one message
 
 
-class Finding(NamedTuple):
-    """One thing wrong with a scene, by the path of its key; ``expected`` and ``remedy`` are parts of a sentence."""
-
-    path: KeyPath
-    found: str
-    expected: str
-    remedy: str
-
-    def below(self, *path: str | int) -> Finding:
-        """The same finding, its path continued upwards."""
-        return self._replace(path=(*path, *self.path))
-
-
 @dataclass(frozen=True)
 class Problem:
     """One thing wrong with a scene, with its place; ``line`` is None where no line can be named."""
@@ -44,6 +31,23 @@ class Problem:
         where = self.file if self.line is None else f"{self.file}:{self.line}"
         key = f" {self.key}:" if self.key else ""
         return f"{where}:{key} found {self.found}, expected {self.expected}; {self.remedy}"
+
+
+class Finding(NamedTuple):
+    """One thing wrong with a scene, by the path of its key; ``expected`` and ``remedy`` are parts of a sentence."""
+
+    path: KeyPath
+    found: str
+    expected: str
+    remedy: str
+
+    def below(self, *path: str | int) -> Finding:
+        """The same finding, its path continued upwards."""
+        return self._replace(path=(*path, *self.path))
+
+    def at(self, file: str, line: int | None) -> Problem:
+        """The finding with its place."""
+        return Problem(file, line, key_text(self.path), self.found, self.expected, self.remedy)
 
 
 class SceneError(ValueError):
@@ -68,7 +72,7 @@ class RefusalError(ValueError):
 
 def key_text(path: KeyPath) -> str:
     """A path as it is written in messages: ``candidates.poses[1].approach``."""
-    parts = [f"[{part}]" if isinstance(part, int) else f'."{part}"' if "." in part else f".{part}" for part in path]
+    parts = [f"[{p}]" if isinstance(p, int) else f".{p if p.isidentifier() else shown(p)}" for p in path]
     return "".join(parts).removeprefix(".")
 
 

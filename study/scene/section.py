@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from softjaw.study.messages import printable
 from softjaw.study.scene.problems import (
     Finding,
     KeyPath,
@@ -61,6 +62,13 @@ def once_and_rising(values: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted(values))
 
 
+def _one_line(text: str) -> str:
+    if printable(text) != text or not {"\n", "\t"}.isdisjoint(text):
+        raise RefusalError(shown(text), "text without control characters", "remove them")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_one_line)]
 Point = Annotated[tuple[float, float], Field(strict=False)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Direction = Annotated[Vector, AfterValidator(_direction)]

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.problems import Finding, shown
-from softjaw.study.scene.section import Direction, Section, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Section, Text, Vector, once_and_rising
 from softjaw.study.units import si
 
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -87,8 +87,7 @@ class Gripper(Section):
         n = self.elements
         for i in (0, 1):
             if n[i] % 2 and self.grading[i] != 1:
-                found = f"{self.grading[i]:g} with {n[i]} elements"
-                expected = "an even number of elements where they are graded"
+                found, expected = f"{self.grading[i]:g} with {n[i]} elements", "an even number of graded elements"
                 yield Finding((f"grading_{'xy'[i]}",), found, expected, "write 1.0, or even elements")
         if math.prod(n) > MOST_ELEMENTS:
             found, expected = f"{list(n)}, which is {math.prod(n):,} elements", f"at most {MOST_ELEMENTS:,} elements"
@@ -96,12 +95,9 @@ class Gripper(Section):
         edges = self._edges_mm()
         if max(map(max, edges)) > LARGEST_ASPECT * min(map(min, edges)):
             sizes = " x ".join(f"{low:.3g}" if low == high else f"{low:.3g}..{high:.3g}" for low, high in edges)
-            size = (self.pad_length_mm, self.pad_width_mm, self.pad_thickness_mm)
-            h = (math.prod(size) / math.prod(n)) ** (1 / 3)
-            better = [max(2, 2 * round(s / h / 2)) for s in size]
-            expected = f"edges that differ by a factor of {LARGEST_ASPECT:g} at most"
             found = f"{list(n)}, which makes elements of {sizes} mm"
-            yield Finding(("elements",), found, expected, f"try {better} without grading")
+            expected = f"edges that differ by a factor of {LARGEST_ASPECT:g} at most"
+            yield Finding(("elements",), found, expected, "change elements or grading; [20, 10, 6] suits most pads")
 
     def _edges_mm(self) -> list[tuple[float, float]]:
         """Smallest and largest element edge along x, y and z [mm]."""
@@ -115,9 +111,8 @@ class Gripper(Section):
 
     def _material_findings(self) -> Iterator[Finding]:
         if self.material == "blatz_ko" and self.poisson_ratio != 0.25:
-            remedy = 'remove the key, or choose material = "hyperfoam"'
-            expected = "0.25, which Blatz-Ko foam always has"
-            yield Finding(("poisson_ratio",), f"{self.poisson_ratio:g}", expected, remedy)
+            found, remedy = f"{self.poisson_ratio:g}", 'remove the key, or choose material = "hyperfoam"'
+            yield Finding(("poisson_ratio",), found, "0.25, which Blatz-Ko foam always has", remedy)
         for key in ("alpha", "shear_moduli_kpa"):
             if getattr(self, key):
                 found, remedy = f"{key} with material {shown(self.material)}", 'remove it, or choose "hyperfoam"'
@@ -126,16 +121,13 @@ class Gripper(Section):
     def _hyperfoam_findings(self) -> Iterator[Finding]:
         if len(self.alpha) != len(self.shear_moduli_kpa):
             found = f"{len(self.alpha)} exponents and {len(self.shear_moduli_kpa)} moduli"
-            remedy = "give alpha and shear_moduli_kpa the same length"
-            yield Finding(("alpha",), found, "one exponent per modulus", remedy)
+            yield Finding(("alpha",), found, "as many exponents as moduli", "make both lists of the same length")
         if 0 in self.alpha:
-            found, remedy = shown(list(self.alpha)), "use a small exponent such as 0.01"
-            yield Finding(("alpha",), found, "exponents other than 0", remedy)
+            yield Finding(("alpha",), "an exponent of 0", "others than 0", "use a small exponent such as 0.01")
         total = sum(self.shear_moduli_kpa)
         if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=1e-9):
-            expected = f"shear_modulus_kpa, the sum of shear_moduli_kpa, to be {total:g} kPa and > 0"
-            remedy = "leave shear_modulus_kpa out"
-            yield Finding(("shear_modulus_kpa",), f"{self.shear_modulus_kpa:g} kPa", expected, remedy)
+            found, expected = f"{self.shear_modulus_kpa:g} kPa", f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0"
+            yield Finding(("shear_modulus_kpa",), found, expected, "leave shear_modulus_kpa out")
 
     def symmetry_findings(self, effects: Effects) -> Iterator[Finding]:
         """Symmetric halves need even counts."""
@@ -252,8 +244,7 @@ class Effects(Section):
         hollow = isinstance(shape, Walled) and shape.wall is not None
         if self.object.endswith("shell") and not hollow:
             remedy = 'add wall_mm to [object], for example `wall_mm = 0.4`, or write "auto"'
-            found = f'"{self.object}" with an object that has no wall'
-            yield Finding(("object",), found, "an object with a wall", remedy)
+            yield Finding(("object",), f'"{self.object}" without a wall', "an object with a wall", remedy)
         if self.friction_pressure_coupling == "tangential" and hollow and self.object != "rigid":
             found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
             yield Finding(("friction_pressure_coupling",), found, "a rigid object", remedy)
@@ -282,7 +273,7 @@ class Accuracy(Section):
     e_n: float | None = Field(
         None, gt=1e-4, le=0.5, description="largest relative error of e_n; mesh, steps and effects are chosen by it"
     )
-    cost_file: str | None = Field(
+    cost_file: Text | None = Field(
         None, min_length=1, max_length=1000, description="result of 'softjaw cost' that they are chosen from"
     )
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
@@ -314,16 +305,11 @@ class Uncertainty(Section):
         }  # fmt: skip
         return tuple(name for name, wanted in asked.items() if wanted)
 
-    def numbers(self, labels: tuple[str, ...]) -> tuple[int, ...]:
-        """Numbers of the candidates that are named, in the order given; empty where only their count is given."""
-        named = () if isinstance(self.probes, int) else self.probes
-        return tuple(dict.fromkeys(name if isinstance(name, int) else labels.index(name) for name in named))
-
     def input_findings(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[Finding]:
         """A friction coefficient that may be negative, a missing wall, and a sweep, which has no intervals."""
         if self.mu and self.mu >= friction.mu:
             expected = f"less than friction.mu, which is {friction.mu:g}"
-            yield Finding(("mu",), f"{self.mu:g}", expected, "the half-width is in the unit of mu, not in per cent")
+            yield Finding(("mu",), f"{self.mu:g}", expected, "write the half-width of mu itself, not per cent")
         if self.wall_thickness_percent and getattr(shape, "wall", None) is None:
             found, expected = f"{self.wall_thickness_percent:g}", "0 for an object without a wall"
             yield Finding(("wall_thickness_percent",), found, expected, "give object.wall_mm, or leave it out")
@@ -335,7 +321,7 @@ class Uncertainty(Section):
 class Output(Section):
     """Where results go and what they hold."""
 
-    file: str = Field(
+    file: Text = Field(
         "results/scene.hdf", min_length=1, max_length=1000, description="result file, below the working directory"
     )
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")

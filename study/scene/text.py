@@ -28,18 +28,14 @@ def read_text(path: Path) -> str:
         return SceneError([Problem(str(path), None, "", found, expected, remedy)])
 
     toml = "a scene, which is a text file in TOML"
-    if path.is_dir():
-        inside = sorted(p.name for p in path.glob("*.toml"))
-        raise refuse("a directory", toml, f"name one of {', '.join(inside)}" if inside else "name a file in it")
-    if not path.exists():
-        scenes = [p.name for p in path.parent.glob("*.toml") if p.name != "pyproject.toml"]
-        near = closest(path.name, scenes)
-        raise refuse("no such file", toml, f"did you mean `{path.with_name(near)}`?" if near else "check the path")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)
     except OSError as error:
-        raise refuse(f"a file that cannot be read ({error.strerror})", toml, "check its permissions") from None
+        scenes = [p.name for p in path.parent.glob("*.toml") if p != path and p.name != "pyproject.toml"]
+        near = closest(path.name, scenes)
+        remedy = f"did you mean `{path.with_name(near)}`?" if near else "check the path and its permissions"
+        raise refuse(f"a file that cannot be read ({error.strerror})", toml, remedy) from None
     if b"\0" in content:
         hint = "use `softjaw show` for results" if content.startswith(b"\x89HDF") else "name the scene's .toml file"
         raise refuse("binary data", toml, hint)

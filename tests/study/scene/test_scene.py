@@ -69,7 +69,7 @@ WRONG_LINES = [
     ("[gripper]\nelements = [20, 10, 6.5]", 12, "gripper.elements[2]", "6.5"),
     ("[gripper]\nelements = [21, 10, 6]", 12, "gripper.elements", "[21, 10, 6]", "[22, 10, 6]"),
     ("[gripper]\nelements = [400, 400, 400]", 12, "gripper.elements", "64,000,000", "1,000,000", "[20, 10, 6]"),
-    ("[gripper]\nelements = [200, 2, 2]", 12, "gripper.elements", "0.25 x 11 x 7.5 mm", "factor of 20", "try ["),
+    ("[gripper]\nelements = [200, 2, 2]", 12, "gripper.elements", "0.25 x 11 x 7.5 mm", "factor of 20", "[20, 10, 6]"),
     ("[gripper]\npoisson_ratio = 0.3", 12, "gripper.poisson_ratio", "0.3", "0.25"),
     ("[gripper]\nmaterial = 'linear'\npoisson_ratio = 0.5", 13, "gripper.poisson_ratio", "0.5", "<= 0.4999"),
     ("[gripper]\nalpha = [-2]", 12, "gripper.alpha", "blatz_ko"),
@@ -106,7 +106,7 @@ WRONG_LINES = [
     ("[petsc]\ncontact_pc_python_type = 'a.b'", 12, "petsc.contact_pc_python_type", "Python"),
     ("[petsc]\ncontact_snes_max_it = [1]", 12, "petsc.contact_snes_max_it", "[1]"),
     ("[output_file]\na = 1", 11, "output_file", "[output]", "did you mean [output]?"),
-    ("[sweep]\n'gripper.elements' = [1]", 12, 'sweep."gripper.elements"', "cannot be swept"),
+    ("[sweep]\n'gripper.elements' = [1]", 12, 'sweep."gripper.elements"[0]', "a list of 3"),
     ("[sweep]\n'accuracy.meshes' = [1, 2]", 12, 'sweep."accuracy.meshes"', "cannot be swept"),
     ("[sweep]\n'run.memory_gb' = [1, 2]", 12, 'sweep."run.memory_gb"', "cannot be swept"),
     ("[run]\ntime_limit_s = 0", 12, "run.time_limit_s", "0", ">= 0.1", "time_limit_s = 600"),
@@ -309,7 +309,7 @@ def test_hyperfoam_fills_in_its_terms_and_its_modulus():
     )
     assert two.gripper.shear_modulus_kpa == 30
     p = problem(BALL, "gripper.material=hyperfoam", "gripper.shear_moduli_kpa=[10]", "gripper.shear_modulus_kpa=40")
-    assert "to be 10 kPa" in p.expected
+    assert (p.key, p.found) == ("gripper.shear_modulus_kpa", "40 kPa")
 
 
 @pytest.mark.parametrize(
@@ -350,7 +350,8 @@ def test_too_many_cases_are_refused():
 @pytest.mark.parametrize(
     ("content", "found", "remedy"),
     [
-        (None, "no such file", "did you mean"),
+        (None, "No such file", "did you mean"),
+        (b"/", "Is a directory", "did you mean"),
         (b"\x89HDF\r\n\x1a\n\0\0", "binary data", "softjaw show"),
         (b"a\0b", "binary data", ".toml"),
         (b"# \xe4\n", "not UTF-8 in line 1", "UTF-8"),
@@ -361,7 +362,9 @@ def test_too_many_cases_are_refused():
 def test_a_file_that_is_no_scene_is_refused_with_the_reason(tmp_path, content, found, remedy):
     (tmp_path / "bottle.toml").write_text(BALL)
     path = tmp_path / "botle.toml"
-    if content is not None:
+    if content == b"/":
+        path.mkdir()
+    elif content is not None:
         path.write_bytes(content)
     with pytest.raises(SceneError) as caught:
         load_scene(path)
@@ -369,12 +372,6 @@ def test_a_file_that_is_no_scene_is_refused_with_the_reason(tmp_path, content, f
     assert p.file == str(path)
     assert found in p.found
     assert remedy in p.remedy
-
-
-def test_a_directory_is_refused_with_the_scenes_in_it(tmp_path):
-    (tmp_path / "bottle.toml").write_text(BALL)
-    with pytest.raises(SceneError, match=r"found a directory, .*name one of bottle\.toml"):
-        load_scene(tmp_path)
 
 
 def test_a_mesh_is_looked_for_beside_the_scene_and_counts_by_its_bytes(tmp_path):
