@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, Sphere
+from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
 from softjaw.study.scene.problems import Finding, closest, shown
-from softjaw.study.scene.section import Direction, Interval, Section, Text, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Interval, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted, si
 
@@ -21,7 +21,7 @@ NARROW = 0.01  # stations within this share of the object are all but one; in me
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
-class GraspPose(Section):
+class GraspPose(SceneSection):
     """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
 
     point_mm: Vector = Field(
@@ -57,7 +57,7 @@ class GraspPose(Section):
         return max(passing)
 
 
-class Candidates(Section):
+class Candidates(SceneSection):
     """Where to grasp: stations along the object's axis x angles about it, or explicit poses."""
 
     stations: int | None = Field(
@@ -182,7 +182,7 @@ class Candidates(Section):
             )
         slack = 1e-6 * (high - low)
         over = [s for s in places if s - half < low - slack or s + half > high + slack]
-        if over and not isinstance(shape, Plate | Sphere):
+        if over and not isinstance(shape, Plate | SphereShape):
             yield (
                 f"candidates: at {len(over)} of {len(places)} stations ({_listed(over)} mm) the pad, {2 * half:g} mm"
                 f" along the object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: it meets the"

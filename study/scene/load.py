@@ -33,7 +33,7 @@ from softjaw.study.scene.problems import (
     key_text,
     shown,
 )
-from softjaw.study.scene.section import Section
+from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import LEVELS
 from softjaw.study.scene.text import flat, key_lines, parse_toml, read_text
 
@@ -244,7 +244,7 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
     model = section_model(section, _table(data, "object"))
     scalar = "a key with a single value, as in gripper.pad_width_mm"
     if model is None or name not in model.model_fields:
-        every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or Section}.items() for k in m.model_fields]
+        every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or SceneSection}.items() for k in m.model_fields]
         near = closest(key, every)
         yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
     elif key in NOT_SWEPT or section in NO_RESULT:

@@ -15,18 +15,18 @@ from pydantic import Field, ValidationError, model_validator
 from softjaw.study.scene.grasps import Candidates
 from softjaw.study.scene.objects import SHAPES, Mesh, Object
 from softjaw.study.scene.problems import Finding, SceneError, closest, shown
-from softjaw.study.scene.section import Section, model_findings
+from softjaw.study.scene.section import SceneSection, model_findings
 from softjaw.study.scene.sections import (
     Accuracy,
     Effects,
     Friction,
     Gripper,
-    LimitSurface,
+    LimitSurfaceKeys,
     Load,
     Output,
     Run,
-    Score,
-    Task,
+    ScoreKeys,
+    TaskKeys,
     Uncertainty,
     petsc_findings,
 )
@@ -49,12 +49,12 @@ JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
 )
 
 
-def _optional(model: type[Section]) -> Any:
+def _optional(model: type[SceneSection]) -> Any:
     """A section that may be left out."""
     return Field(default_factory=model)
 
 
-class Scene(Section):
+class Scene(SceneSection):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
     object: Object
@@ -62,9 +62,9 @@ class Scene(Section):
     friction: Friction = _optional(Friction)
     candidates: Candidates
     load: Load
-    limit_surface: LimitSurface = _optional(LimitSurface)
-    score: Score = _optional(Score)
-    task: Task = _optional(Task)
+    limit_surface: LimitSurfaceKeys = _optional(LimitSurfaceKeys)
+    score: ScoreKeys = _optional(ScoreKeys)
+    task: TaskKeys = _optional(TaskKeys)
     effects: Effects = _optional(Effects)
     accuracy: Accuracy = _optional(Accuracy)
     uncertainty: Uncertainty = _optional(Uncertainty)
@@ -170,14 +170,14 @@ class Scene(Section):
 
 
 NAMES = tuple(Scene.model_fields)
-SECTIONS: dict[str, type[Section]] = {
+SECTIONS: dict[str, type[SceneSection]] = {
     name: field.annotation
     for name, field in Scene.model_fields.items()
-    if isinstance(field.annotation, type) and issubclass(field.annotation, Section)
+    if isinstance(field.annotation, type) and issubclass(field.annotation, SceneSection)
 }
 
 
-def section_model(name: str, table: Mapping[str, Any]) -> type[Section] | None:
+def section_model(name: str, table: Mapping[str, Any]) -> type[SceneSection] | None:
     """The model of a section; that of ``[object]`` depends on its shape."""
     return SHAPES.get(str(table.get("shape"))) if name == "object" else SECTIONS.get(name)
 
@@ -226,7 +226,9 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
 
 def findings(sections: Mapping[str, Any]) -> list[Finding]:
     """Everything wrong with sections that are valid one by one; a joint rule needs all of its sections."""
-    found = [f.below(name) for name, part in sections.items() if isinstance(part, Section) for f in part.findings()]
+    found = [
+        f.below(name) for name, part in sections.items() if isinstance(part, SceneSection) for f in part.findings()
+    ]
     for rule, names in JOINT:
         if all(name in sections for name in names):
             found += [f.below(names[0]) for f in rule(*(sections[name] for name in names))]

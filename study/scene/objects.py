@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
 from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
 from softjaw.study.scene.problems import Finding, shown
-from softjaw.study.scene.section import Interval, Point, Section, Text, numbers_text
+from softjaw.study.scene.section import Interval, Point, SceneSection, Text, numbers_text
 from softjaw.study.units import UNITS, converted, in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
@@ -29,7 +29,7 @@ Ratio = Annotated[float, Field(ge=0, le=0.49)]
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 
 
-class Shape(Section):
+class Shape(SceneSection):
     """What all shapes share. The object's axis is z."""
 
     SIZE_KEYS: ClassVar[tuple[str, ...]] = ()  # key of the extents, or one key for each of x, y and z
@@ -135,7 +135,7 @@ class Walled(Shape):
             yield Finding(("wall_material",), found, "both of them", remedy)
 
 
-class Sphere(Shape):
+class SphereShape(Shape):
     """A ball about the origin."""
 
     SIZE_KEYS = ("radius_mm",)
@@ -147,7 +147,7 @@ class Sphere(Shape):
         return 0, dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
 
 
-class EllipticCylinder(Shape):
+class EllipticCylinderShape(Shape):
     """A cylinder along z about the origin, with the semi-axes a along x and b along y."""
 
     SIZE_KEYS = ("semi_axis_a_mm", "semi_axis_b_mm", "length_mm")
@@ -163,7 +163,7 @@ class EllipticCylinder(Shape):
         return symmetry, {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
 
 
-class Box(Shape):
+class BoxShape(Shape):
     """A box about the origin with rounded edges."""
 
     SIZE_KEYS = ("size_mm",)
@@ -197,7 +197,7 @@ class Plate(Shape):
         return 2, {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
 
 
-class Revolution(Walled):
+class RevolutionShape(Walled):
     """A body of revolution about z: a bottle, a cup."""
 
     SIZE_KEYS = ("profile_mm",)
@@ -230,7 +230,7 @@ class Revolution(Walled):
                 yield Finding(("profile_mm", i), f"radius {r:g} mm", expected, "write each point as [z, radius], in mm")
 
 
-class SectionTable(Section):
+class SectionTable(SceneSection):
     """One cross-section of a body of stacked sections."""
 
     z_mm: float = Field(description="height")
@@ -309,15 +309,9 @@ class Mesh(Walled):
 
 
 Object = Annotated[
-    Revolution | Sections | EllipticCylinder | Sphere | Box | Plate | Mesh,
+    RevolutionShape | Sections | EllipticCylinderShape | SphereShape | BoxShape | Plate | Mesh,
     Field(discriminator="shape", description="what is grasped"),
 ]
 SHAPES: dict[str, type[Shape]] = {
-    "revolution": Revolution,
-    "sections": Sections,
-    "elliptic_cylinder": EllipticCylinder,
-    "sphere": Sphere,
-    "box": Box,
-    "plane": Plate,
-    "mesh": Mesh,
+    get_args(model.model_fields["shape"].annotation)[0]: model for model in get_args(get_args(Object)[0])
 }

@@ -26,7 +26,7 @@ from softjaw.study.units import UNITS, converted, split_unit
 BOUNDS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
 
 
-class Section(BaseModel):
+class SceneSection(BaseModel):
     """What all sections share: nothing unknown, nothing converted from text, nothing changed later."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, protected_namespaces=())
@@ -76,7 +76,7 @@ Interval = Annotated[Point, AfterValidator(_lower_first)]
 
 
 def model_findings(
-    error: ValidationError, model: type[Section], section: str, table: Any, elsewhere: Mapping[str, Sequence[str]]
+    error: ValidationError, model: type[SceneSection], section: str, table: Any, elsewhere: Mapping[str, Sequence[str]]
 ) -> Iterator[Finding]:
     """What pydantic found wrong in one section, one finding per place in the file."""
     schema, seen = model.model_json_schema(), set()

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.problems import Finding, shown
-from softjaw.study.scene.section import Direction, Section, Text, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.units import si
 
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -36,7 +36,7 @@ VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
 OTHERS = "others go into the environment variable PETSC_OPTIONS"
 
 
-class Gripper(Section):
+class Gripper(SceneSection):
     """The two equal pads. No dimension of the original gripper is published; the defaults are plausible ones."""
 
     pad_length_mm: float = Field(50.0, ge=1, le=500, description="long side of the pad")
@@ -152,7 +152,7 @@ class Gripper(Section):
             yield Finding(("sheet_support_mm",), found, expected, remedy)
 
 
-class Friction(Section):
+class Friction(SceneSection):
     """Friction between pad and object. Every model is computed; ``model`` is the planar one shown first."""
 
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
@@ -160,7 +160,7 @@ class Friction(Section):
     cor_grid: int = Field(0, ge=0, le=1000, description="n of an n x n grid of centres of rotation; 0 is off")
 
 
-class Load(Section):
+class Load(SceneSection):
     """What the fingers press with."""
 
     normal_force_n: Annotated[
@@ -169,7 +169,7 @@ class Load(Section):
     normal_force = si("normal_force_n")
 
 
-class Score(Section):
+class ScoreKeys(SceneSection):
     """How torques are made comparable with forces in the grasp quality."""
 
     torque_scale: Literal["contact", "object"] = Field(
@@ -188,7 +188,7 @@ class Score(Section):
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 
-class LimitSurface(Section):
+class LimitSurfaceKeys(SceneSection):
     """The surface that bounds the friction wrenches of a contact, fitted to the wrenches of many motions."""
 
     model: Literal["three_motions", "axis_aligned", "full", "quartic"] = Field(
@@ -209,7 +209,7 @@ class LimitSurface(Section):
             yield Finding(("objective",), found, expected, 'write `objective = "least_squares"`')
 
 
-class Task(Section):
+class TaskKeys(SceneSection):
     """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
 
     weight_direction: Direction = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
@@ -219,7 +219,7 @@ class Task(Section):
     centre_of_mass = si("centre_of_mass_mm")
 
 
-class Effects(Section):
+class Effects(SceneSection):
     """What is simulated; ``auto`` takes the cheapest level that the scene allows."""
 
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
@@ -249,7 +249,7 @@ class Effects(Section):
             found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
             yield Finding(("friction_pressure_coupling",), found, "a rigid object", remedy)
 
-    def surface_findings(self, surface: LimitSurface) -> Iterator[Finding]:
+    def surface_findings(self, surface: LimitSurfaceKeys) -> Iterator[Finding]:
         """A forced level is that of the model."""
         models = LEVELS.get(self.limit_surface, ())
         if models and surface.model not in models:
@@ -258,7 +258,7 @@ class Effects(Section):
             yield Finding(("limit_surface",), shown(self.limit_surface), expected, remedy)
 
 
-class Accuracy(Section):
+class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
@@ -279,7 +279,7 @@ class Accuracy(Section):
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
 
-class Uncertainty(Section):
+class Uncertainty(SceneSection):
     """Uncertainty of inputs (0: none), as half-widths of their 95 % intervals.
 
     Errors that no formula gives are found by solving a few candidates, the probes, again with the input changed.
@@ -318,7 +318,7 @@ class Uncertainty(Section):
             yield Finding((), found, "a scene without a sweep", remedy)
 
 
-class Output(Section):
+class Output(SceneSection):
     """Where results go and what they hold."""
 
     file: Text = Field(
@@ -337,7 +337,7 @@ class Output(Section):
             yield Finding(("file",), shown(self.file), "a path below the working directory", remedy)
 
 
-class Run(Section):
+class Run(SceneSection):
     """Limits for single cases. Results do not depend on them: they may differ from run to run."""
 
     time_limit_s: float = Field(

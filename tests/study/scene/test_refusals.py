@@ -12,7 +12,7 @@ from softjaw.study.cli import main
 from softjaw.study.messages import StudyError
 from softjaw.study.preparation import petsc_overrides, prepare
 from softjaw.study.scene import SceneError, load_scene, parse_scene
-from softjaw.study.scene.objects import Sphere
+from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
@@ -57,7 +57,7 @@ def test_every_object_of_a_sweep_is_judged():
 
 def test_a_shape_that_nothing_builds_is_refused():
     with pytest.raises(ValueError, match="'cone'"):
-        build_object(Sphere.model_construct(shape="cone", radius_mm=30.0))
+        build_object(SphereShape.model_construct(shape="cone", radius_mm=30.0))
 
 
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
