@@ -50,7 +50,7 @@ def limits_text(run: Any) -> str:
     """What a single case may take before it fails."""
     limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
     memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
-    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that; the other cases continue"
+    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that; the run continues"
 
 
 def _target(scene: Any) -> str:
