@@ -23,16 +23,7 @@ from softjaw.study.scene.model import (
     section_model,
 )
 from softjaw.study.scene.objects import Mesh
-from softjaw.study.scene.problems import (
-    Finding,
-    KeyPath,
-    Problem,
-    RefusalError,
-    SceneError,
-    closest,
-    key_text,
-    shown,
-)
+from softjaw.study.scene.problems import Finding, KeyPath, Problem, RefusalError, SceneError, closest, key_text, shown
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import LEVELS
 from softjaw.study.scene.text import flat, key_lines, parse_toml, read_text

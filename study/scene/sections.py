@@ -26,7 +26,7 @@ WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 Share = Annotated[float, Field(ge=0, le=50)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
-ROUNDING = 1e-9  # of a length: fem.pad.backing_plate finds nodes this close to the support's rim on it, too
+ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
 LEVELS = {  # level of the effect: models of [limit_surface]
     "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),
 }  # fmt: skip
