@@ -28,7 +28,7 @@ from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
 from softjaw.study.case.solving import Solver, solver
 from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
-from softjaw.study.scene.sections import LimitSurface
+from softjaw.study.scene.sections import LimitSurfaceKeys
 
 TARGET = 0.02  # relative error of e_n that a skip may have
 FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there
@@ -129,7 +129,7 @@ def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
     yield "friction", name, 1.0 - F_N / S, off(e_n(contacts, "pcm"), e_n(contacts))
     c = contacts[0]
     for level in SURFACES:
-        found = fit_surface(c, "ccm", LimitSurface(model=level))
+        found = fit_surface(c, "ccm", LimitSurfaceKeys(model=level))
         yield "limit surface", f"{name}, {level}", found.own.Erad, off(volume(c, found), 1.0)
 
 

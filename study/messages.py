@@ -18,7 +18,7 @@ MEANING = {
     STOPPED: "stopped, run the same command again",
 }
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
-# What a terminal obeys or what hides text: control characters, line separators, changes of direction, halves of letters
+# What controls a terminal or hides text: control characters, line separators, changes of direction, surrogates
 UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")
 
 
@@ -34,7 +34,7 @@ class StudyError(Exception):
 
 
 def printable(text: str) -> str:
-    r"""A text of unknown origin with nothing in it that a terminal would obey.
+    r"""A text of unknown origin with nothing in it that controls a terminal.
 
     >>> print(printable("a\x1b[2Jb"))
     a\u001b[2Jb
@@ -43,7 +43,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, width: int = 80) -> str:
-    """A printable text of at most ``width`` letters."""
+    """A printable text of at most ``width`` characters."""
     text = printable(text)
     return text if len(text) <= width else text[: width - 4] + " ..."
 
@@ -62,5 +62,5 @@ def complain(error: StudyError) -> int:
 
 
 def say(text: str) -> None:
-    """Print what may hold texts of files from elsewhere."""
+    """Print a text that may hold parts of files from elsewhere."""
     print(printable(text))

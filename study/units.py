@@ -1,6 +1,6 @@
-"""Units: what a scene may be written in, and what people are shown; everything between is SI.
+"""Units: those in which a scene may be written, and those of tables and reports; everything between is SI.
 
-Nobody else multiplies by 1000: keys of a scene end in their unit (``pad_length_mm``), quantities name their SI unit.
+No other module multiplies by 1000: scene keys end in their unit (``pad_length_mm``), quantities name their SI unit.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ UNITS = {  # by the suffix of a scene's key
     "gpa": Unit("Pa", 1e9, 1, "GPa"),
     "deg": Unit("rad", math.pi, 180, "deg"),
     "rad": Unit("rad", 1, 1, "rad"),
+    "n_per_mm": Unit("N/m", 1000, 1, "N/mm"),
 }
-SHOWN = {  # SI unit -> unit that people read; other units are shown as they are
+SHOWN = {  # SI unit -> unit in tables and reports; other units are shown as they are
     "m": UNITS["mm"],
     "rad": UNITS["deg"],
     "Pa": UNITS["kpa"],
@@ -51,11 +52,22 @@ SHOWN = {  # SI unit -> unit that people read; other units are shown as they are
 def split_unit(key: str) -> tuple[str, str]:
     """Name and unit suffix of a scene's key; the suffix is empty where there is none.
 
-    >>> split_unit("pad_length_mm"), split_unit("model_size")
-    (('pad_length', 'mm'), ('model_size', ''))
+    >>> split_unit("pad_length_mm"), split_unit("springs_n_per_mm"), split_unit("model_size")
+    (('pad_length', 'mm'), ('springs', 'n_per_mm'), ('model_size', ''))
     """
-    stem, _, suffix = key.rpartition("_")
-    return (stem, suffix) if stem and suffix in UNITS else (key, "")
+    ends = [unit for unit in UNITS if key.endswith(f"_{unit}")]
+    unit = max(ends, key=len, default="")
+    stem = key[: -len(unit) - 1] if unit else key
+    return (stem, unit) if stem else (key, "")
+
+
+def converted(value: float, unit: str, other: str) -> float:
+    """A value given in one unit of the table, in another one of the same kind.
+
+    >>> converted(0.05, "m", "mm"), converted(2.0, "mpa", "kpa")
+    (50.0, 2000.0)
+    """
+    return value * UNITS[unit].size / UNITS[other].size
 
 
 def in_si(key: str, value: Any) -> Any:
@@ -78,7 +90,7 @@ def si(key: str) -> Any:
 
 
 def shown_unit(si_unit: str) -> str:
-    """The unit in which people read a quantity.
+    """The unit in which a quantity is shown.
 
     >>> shown_unit("m"), shown_unit("N"), shown_unit("")
     ('mm', 'N', '')
@@ -87,7 +99,7 @@ def shown_unit(si_unit: str) -> str:
 
 
 def shown(value: Any, si_unit: str) -> Any:
-    """A value, or an array of values, in the unit that people read.
+    """A value, or an array of values, in the unit in which it is shown.
 
     >>> shown(0.0125, "m"), shown(2.0, "N")
     (12.5, 2.0)
@@ -97,7 +109,7 @@ def shown(value: Any, si_unit: str) -> Any:
 
 
 def shown_text(value: float, si_unit: str, digits: int = 4) -> str:
-    """A value with its unit, as people read it.
+    """A value with its unit, as it is shown.
 
     >>> shown_text(0.0125, "m"), shown_text(5.0, "N"), shown_text(0.5, "")
     ('12.5 mm', '5 N', '0.5')

@@ -8,7 +8,6 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.scene.grasp_checks import station_warnings
 
 if TYPE_CHECKING:
     from softjaw.fem.materials import Material
@@ -52,8 +51,9 @@ def build_object(shape: Shape) -> GapObject:
             return objects.Sphere(shape.radius)
         case "box":
             return objects.Box(np.array(shape.size), shape.edge_radius)
-        case _:
+        case "plane":
             return objects.Plane(shape.thickness)
+    raise ValueError(f"no object is built from the shape '{shape.shape}'")
 
 
 @lru_cache(maxsize=8)
@@ -166,7 +166,7 @@ def axis_span(shape: Shape) -> tuple[float, float] | None:
 def warnings(scene: Scene) -> tuple[str, ...]:
     """Sentences about values that are allowed but seldom meant; builds the object if it is a mesh."""
     shapes = shapes_of(scene)
-    edges = (station_warnings(shape, axis_span(shape), scene.candidates, scene.gripper) for shape in shapes)
+    edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [_distance(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
     return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import GraspPose
+from softjaw.study.scene.grasps import GraspPose
 
 FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch

@@ -30,7 +30,7 @@ from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, 
 from softjaw.study.flags import raised
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import LimitSurface as Choice
+from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4

@@ -32,7 +32,7 @@ from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
-from softjaw.study.scene.sections import LimitSurface as Choice
+from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see

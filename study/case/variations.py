@@ -149,7 +149,7 @@ def probe_candidates(scene: Scene, units: Sequence[Any]) -> tuple[int, ...]:
     first = {unit.index: unit.rows[0][0] // forces for unit in units}
     if isinstance(own.probes, int):
         return tuple(sorted(first[unit.index] for unit in spread(units, own.probes)))
-    named = own.numbers(scene.candidates.labels)
+    named = () if isinstance(own.probes, int) else scene.candidates.numbers(own.probes)
     serving = {rows[0] // forces: first[unit.index] for unit in units for rows in unit.rows}
     return tuple(sorted({serving[number] for number in named}))
 

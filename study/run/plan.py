@@ -15,7 +15,6 @@ from softjaw.study.case.build import has_wall, outer_surface
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.run.progress import duration
-from softjaw.study.scene.grasp_checks import half_extent_mm
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -296,7 +295,7 @@ def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
     margin = MARGIN * max(gripper.pad_size[:2])
     ends = _heights(surface)
     middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
-    along = 1e-3 * half_extent_mm(where, gripper) + margin
+    along = 1e-3 * where.half_extent_mm(gripper) + margin
     low, high = np.clip([middle - along, middle + along], *ends)
     return float(low), float(high), 0.5 * gripper.pad_size[1] + margin
 

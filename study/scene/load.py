@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
-import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-
 from softjaw.study.messages import shortened
-from softjaw.study.scene.checks import LEVELS, MOST_CASES
-from softjaw.study.scene.grasp_checks import mesh_file
 from softjaw.study.scene.model import (
     NAMES,
     SECTIONS,
@@ -25,8 +22,10 @@ from softjaw.study.scene.model import (
     put,
     section_model,
 )
-from softjaw.study.scene.objects import Mesh, Section
-from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, shown, unknown_key
+from softjaw.study.scene.objects import Mesh
+from softjaw.study.scene.problems import Finding, KeyPath, Problem, RefusalError, SceneError, closest, key_text, shown
+from softjaw.study.scene.section import SceneSection
+from softjaw.study.scene.sections import LEVELS
 from softjaw.study.scene.text import flat, key_lines, parse_toml, read_text
 
 ALTERNATIVES = (("stations_mm",), ("stations", "station_range_mm"), ("poses",))  # ways of giving candidates
@@ -44,8 +43,10 @@ NOT_SWEPT = {
     "limit_surface.samples": "it changes the size of the results",
     "limit_surface.wrench_samples": "it changes the size of the results",
 }
-NO_RESULT = ("output", "run")  # sections that change no result
-MOST_GRID_POINTS = 10_000
+Place = tuple[str, int | None]  # a file and a line of it, or an override
+NO_RESULT = ("output", "run", "uncertainty")  # sections that change no result of a case
+OVERRIDE = "section.key=value, as in gripper.pad_width_mm=20"
+MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
@@ -67,7 +68,7 @@ def parse_scene(
 
     ``check_files = False`` leaves out whether a mesh exists, for a text kept in a result file.
     """
-    path, given = Path(path), dict[KeyPath, str]()
+    path, given = Path(path), dict[KeyPath, Place]()
     data = parse_toml(text, str(path))
     if isinstance(data.get("sweep"), dict):
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
@@ -75,7 +76,7 @@ def parse_scene(
     _fill_in(data, path)
     sections, wrong = checked_sections(data)
     if isinstance(sections.get("object"), Mesh) and check_files:
-        wrong += mesh_file(sections["object"])
+        wrong += [f.below("object") for f in sections["object"].file_findings()]
     wrong += _sweep_findings(data, wrong)
     scene = None
     if not problems and not wrong:
@@ -84,33 +85,27 @@ def parse_scene(
             found, remedy = f"{scene.cases:,} cases", "split the study into several scenes"
             wrong.append(Finding(("candidates",), found, f"at most {MOST_CASES:,}", remedy))
     if wrong:
-        lines = _lines(text)
-        problems += [_located(f, str(path), lines, given) for f in wrong]
+        problems += _located(wrong, text, str(path), given)
     if scene is None or problems:
         raise SceneError(sorted(problems, key=lambda p: (p.file != str(path), p.line or 0)))
     return scene
 
 
-def _lines(text: str) -> dict[KeyPath, int]:
-    """The first line of every key, section and list member, and of every section that is only implied."""
-    lines: dict[KeyPath, int] = {}
-    for path, line in key_lines(text):
+def _located(wrong: Sequence[Finding], text: str, file: str, given: Mapping[KeyPath, Place]) -> Iterator[Problem]:
+    """The findings with their places: an override, or the line of the nearest key that the file has."""
+    lines: dict[KeyPath, Place] = {}
+    for path, line in key_lines(text).items():
+        lines[path] = (file, line)
         if path[0] == "sweep":
             names, members = [p for p in path[1:] if isinstance(p, str)], [p for p in path if isinstance(p, int)]
-            lines.setdefault(("sweep", ".".join(names), *members), line)
-        for n in range(1, len(path) + 1):
-            lines.setdefault(path[:n], line)
-    return lines
-
-
-def _located(finding: Finding, file: str, lines: Mapping[KeyPath, int], given: Mapping[KeyPath, str]) -> Problem:
-    """A finding with its place: an override, or the line of the nearest key that the file has."""
-    key, above = key_text(finding.path), [finding.path[:n] for n in range(len(finding.path), 0, -1)]
-    within = (path for path in given if path[: len(finding.path)] == finding.path and finding.path not in lines)
-    override = next((given[path] for path in (*above, *within) if path in given), None)
-    line = None if override else next((lines[path] for path in above if path in lines), None)
-    where = f"--set {shortened(override)}" if override else file
-    return Problem(where, line, key, finding.found, finding.expected, finding.remedy)
+            lines.setdefault(("sweep", ".".join(names), *members), (file, line))
+    for path, place in given.items():  # a section that only overrides give
+        for n in range(1, len(path)):
+            lines.setdefault(path[:n], place)
+    for found in wrong:
+        above = [found.path[:n] for n in range(len(found.path), 0, -1)]
+        where, number = next((places[p] for places in (given, lines) for p in above if p in places), (file, None))
+        yield found.at(where, number)
 
 
 def _fill_in(data: dict[str, Any], path: Path) -> None:
@@ -137,61 +132,53 @@ def _axis(values: Sequence[Option]) -> tuple[Option, ...]:
     return tuple(v for v in values if isinstance(v, str)) or tuple(sorted(map(float, values)))
 
 
-class OverrideError(ValueError):
-    """An override that cannot be read: what was found, what was expected, what to do."""
-
-
-def _put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, str]) -> list[Problem]:
-    """Put ``section.key=value`` texts into ``data``; ``given`` learns which key came from which text."""
+def _put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, Place]) -> list[Problem]:
+    """Put ``section.key=value`` texts into ``data``; ``given`` gets the text behind every key."""
     problems = []
     for text in overrides:
+        place = f"--set {shortened(text)}"
         try:
-            _merge(data, _override(text), text, given)
-        except OverrideError as error:
-            problems.append(Problem(f"--set {shortened(text)}", None, "", *error.args))
+            _merge(data, _override(text), (place, None), given)
+        except RefusalError as error:
+            problems.append(Problem(place, None, "", *error.args))
     return problems
 
 
 def _override(text: str) -> dict[str, Any]:
     key, equals, value = (part.strip() for part in text.partition("="))
-    expected = "section.key=value, as in gripper.pad_width_mm=20"
-    if not equals or not re.fullmatch(r'[\w-]+([.]([\w-]+|"[\w.-]+"))*', key, re.ASCII) or not text.isprintable():
-        raise OverrideError(shown(text), expected, "write the key, `=` and the value without blanks")
-    if "." not in key:
-        if key in NAMES:
-            raise OverrideError(f"the section {key} without a key", expected, f"write --set {key}.key=value")
-        homes = [place for place, keys in keys_by_place().items() if key in keys]
-        section = homes[0][1:].partition("]")[0] if homes else "section"
-        raise OverrideError(f"the key {key} without its section", expected, f"write --set {section}.{text}")
-    try:
-        return tomllib.loads(f"{key} = {value}")
-    except RecursionError:
-        raise OverrideError("a value nested too deeply", "a value as in TOML", "flatten it") from None
-    except ValueError:
-        if re.fullmatch(r"[A-Za-z_./][\w./ -]*|[36]-D", value):  # shells take the quotes away
-            return tomllib.loads(f'{key} = "{value}"')
-    remedy = "write 0.8, [1, 2], true or '\"text\"'"
-    raise OverrideError(f"the value {shown(value)}", "a value as in TOML", remedy) from None
+    if equals and key in NAMES:
+        raise RefusalError(f"the section {key} without a key", OVERRIDE, f"write --set {key}.key=value")
+    if equals and key.isidentifier():
+        home = next((place for place, keys in keys_by_place().items() if key in keys), "[section]")
+        section = home[1:].partition("]")[0]
+        raise RefusalError(f"the key {key} without its section", OVERRIDE, f"write --set {section}.{text}")
+    # shells take the quotes of a text away
+    for written in (value, json.dumps(value)) if value[:1] not in tuple("[{\"'") else (value,):
+        with suppress(ValueError, RecursionError):
+            if equals and text.isprintable():
+                return tomllib.loads(f"{key} = {written}")
+    remedy = "write the key, `=`, and a value as in TOML: 0.8, [1, 2], true or '\"text\"'"
+    raise RefusalError(shown(text), OVERRIDE, remedy)
 
 
 def _merge(
-    data: dict[str, Any], extra: Mapping[str, Any], text: str, given: dict[KeyPath, str], path: KeyPath = ()
+    data: dict[str, Any], extra: Mapping[str, Any], place: Place, given: dict[KeyPath, Place], path: KeyPath = ()
 ) -> None:
     for key, value in extra.items():
         here = (*path, key)
         if here[0] == "sweep" and len(here) == 2:
             data.update(flat({key: value}))
-            given.update({("sweep", k): text for k in flat({key: value})})
+            given.update({("sweep", k): place for k in flat({key: value})})
         elif isinstance(value, Mapping) and isinstance(data.setdefault(key, {}), dict):
-            _merge(data[key], value, text, given, here)
+            _merge(data[key], value, place, given, here)
         else:
             data[key] = value
-            given[here] = text
+            given[here] = place
             if path == ("candidates",):
                 _drop_alternatives(data, key, given)
 
 
-def _drop_alternatives(data: dict[str, Any], key: str, given: Mapping[KeyPath, str]) -> None:
+def _drop_alternatives(data: dict[str, Any], key: str, given: Mapping[KeyPath, Place]) -> None:
     """Let an override of one way of giving candidates replace the others, unless they are overrides too."""
     for way in ALTERNATIVES if any(key in way for way in ALTERNATIVES) else ():
         if key not in way and not any(("candidates", name) in given for name in way):
@@ -219,28 +206,27 @@ def _point_findings(
     data: Mapping[str, Any], axes: Mapping[str, Sequence[Any]], base: Sequence[Finding]
 ) -> Iterator[Finding]:
     """What is wrong at the points of a sweep that is not wrong without it; single values before combinations."""
-
-    def new(values: Mapping[str, Any], known: Sequence[Finding]) -> list[Finding]:
-        return [f for f in checked_sections(put(data, values))[1] if f not in known]
-
-    first = {key: values[0] for key, values in axes.items()}
-    at_first = new(first, base)
-    wrong = [(next((k for k in axes if k == key_text(f.path)), next(iter(axes))), 0, f) for f in at_first]
-    for key, values in axes.items():
-        for i, value in enumerate(values[1:], start=1):
-            wrong += [(key, i, f) for f in new({**first, key: value}, [*base, *at_first])]
-    for key, i, f in wrong:
-        value, place = shown(axes[key][i]), f"(value {i + 1} of {len(axes[key])})"
-        own = key_text(f.path) == key
-        found = f"{f.found} {place}" if own else f"{value} {place}, with which {key_text(f.path)} has {f.found}"
-        yield Finding(("sweep", key, i), found, f.expected, f.remedy)
-    failed, seen = {(key, axes[key][i]) for key, i, _ in wrong}, list(base)
-    for values in product(*axes.values()) if len(axes) > 1 else ():
-        together = dict(zip(axes, values, strict=True))
-        for f in new(together, seen) if failed.isdisjoint(together.items()) else ():
-            seen.append(f)
-            names = " and ".join(f"{key} = {shown(value)}" for key, value in together.items())
-            yield Finding(("sweep",), f"{names}, with which {key_text(f.path)} has {f.found}", f.expected, f.remedy)
+    seen, failed = set(base), set[tuple[str, int]]()
+    points = product(*(range(len(values)) for values in axes.values()))
+    for point in sorted(points, key=lambda p: sum(map(bool, p))):
+        at = dict(zip(axes, point, strict=True))
+        if not failed.isdisjoint(at.items()):
+            continue
+        moved = [key for key, i in at.items() if i]
+        for f in checked_sections(put(data, {key: axes[key][i] for key, i in at.items()}))[1]:
+            if f in seen:
+                continue
+            seen.add(f)
+            where = key_text(f.path)
+            if len(moved) > 1:
+                names = " and ".join(f"{key} = {shown(axes[key][i])}" for key, i in at.items())
+                yield f._replace(path=("sweep",), found=f"{names}, with which {where} has {f.found}")
+                continue
+            key = moved[0] if moved else where if where in axes else next(iter(axes))
+            failed.update([(key, at[key])] if moved else ())
+            place = f"(value {at[key] + 1} of {len(axes[key])})"
+            found = f"{shown(axes[key][at[key]])} {place}, with which {where} has {f.found}"
+            yield f._replace(path=("sweep", key, at[key]), found=f"{f.found} {place}" if where == key else found)
 
 
 def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[Finding]:
@@ -249,16 +235,11 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
     model = section_model(section, _table(data, "object"))
     scalar = "a key with a single value, as in gripper.pad_width_mm"
     if model is None or name not in model.model_fields:
-        every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or Section}.items() for k in m.model_fields]
+        every = [f"{s}.{k}" for s, m in {**SECTIONS, "object": model or SceneSection}.items() for k in m.model_fields]
         near = closest(key, every)
-        if model is not None and not near:
-            f = unknown_key((section, name), None, list(model.model_fields), keys_by_place())
-            yield Finding(path, f.found, f.expected, f.remedy)
-        else:
-            yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
-    elif key in NOT_SWEPT or section in NO_RESULT or _is_list(model, name):
-        remedy = NOT_SWEPT.get(key, "remove it" if section in NO_RESULT else "sweep a key that takes one value")
-        yield Finding(path, "a key that cannot be swept", scalar, remedy)
+        yield Finding(path, "an unknown key", scalar, f"did you mean `{near}`?" if near else "write section.key")
+    elif key in NOT_SWEPT or section in NO_RESULT:
+        yield Finding(path, "a key that cannot be swept", scalar, NOT_SWEPT.get(key, "remove it"))
     elif key == "gripper.element" and _table(data, "output").get("patches", "all") == "all":
         expected = "the same number of faces in every case"
         yield Finding(path, "kinds of elements beside stored patches", expected, 'write output.patches = "none"')
@@ -273,8 +254,3 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
 def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     table = data.get(name)
     return table if isinstance(table, Mapping) else {}
-
-
-def _is_list(model: type[BaseModel], name: str) -> bool:
-    schema = model.model_json_schema()["properties"][name]
-    return any(s.get("type") == "array" for s in (schema, *schema.get("anyOf", ())))

@@ -5,54 +5,71 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from softjaw.study.messages import UNPRINTABLE
-from softjaw.study.scene.checks import findings, value_warnings
-from softjaw.study.scene.objects import SHAPES, Mesh, Object, Section
-from softjaw.study.scene.problems import Finding, KeyPath, Problem, SceneError, closest, key_text, model_findings, shown
+from softjaw.study.scene.grasps import Candidates
+from softjaw.study.scene.objects import SHAPES, Mesh, Object
+from softjaw.study.scene.problems import Finding, SceneError, closest, shown
+from softjaw.study.scene.section import SceneSection, model_findings
 from softjaw.study.scene.sections import (
     Accuracy,
-    Candidates,
     Effects,
     Friction,
     Gripper,
-    LimitSurface,
+    LimitSurfaceKeys,
     Load,
     Output,
     Run,
-    Score,
-    Task,
+    ScoreKeys,
+    TaskKeys,
     Uncertainty,
+    petsc_findings,
 )
 from softjaw.study.scene.text import toml_text
 
 Option = str | int | float | bool
-WATCHING = re.compile(r"contact_.*(monitor|view|converged_reason)")  # PETSc options that only print
+WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
+JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
+    # what several sections must satisfy together: the rule, and its sections, the one at fault first
+    (Effects.object_findings, ("effects", "object")),
+    (Effects.surface_findings, ("effects", "limit_surface")),
+    (Gripper.symmetry_findings, ("gripper", "effects")),
+    (Gripper.support_findings, ("gripper", "effects", "accuracy")),
+    (Candidates.findings_on, ("candidates", "object")),
+    (Candidates.pose_findings, ("candidates", "object", "gripper")),
+    (lambda s, c: c.unknown_names("wrench_samples", s.wrench_samples), ("limit_surface", "candidates")),
+    (lambda u, c: c.unknown_names("probes", u.probes), ("uncertainty", "candidates")),
+    (Uncertainty.input_findings, ("uncertainty", "object", "friction", "sweep")),
+    (petsc_findings, ("petsc",)),
+)
 
 
-class Scene(Section):
+def _optional(model: type[SceneSection]) -> Any:
+    """A section that may be left out."""
+    return Field(default_factory=model)
+
+
+class Scene(SceneSection):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
     object: Object
-    gripper: Gripper = Field(default_factory=Gripper)
-    friction: Friction = Field(default_factory=Friction)
+    gripper: Gripper = _optional(Gripper)
+    friction: Friction = _optional(Friction)
     candidates: Candidates
     load: Load
-    limit_surface: LimitSurface = Field(default_factory=LimitSurface)
-    score: Score = Field(default_factory=Score)
-    task: Task = Field(default_factory=Task)
-    effects: Effects = Field(default_factory=Effects)
-    accuracy: Accuracy = Field(default_factory=Accuracy)
-    uncertainty: Uncertainty = Field(default_factory=Uncertainty)
-    output: Output = Field(default_factory=Output)
-    run: Run = Field(default_factory=Run)
+    limit_surface: LimitSurfaceKeys = _optional(LimitSurfaceKeys)
+    score: ScoreKeys = _optional(ScoreKeys)
+    task: TaskKeys = _optional(TaskKeys)
+    effects: Effects = _optional(Effects)
+    accuracy: Accuracy = _optional(Accuracy)
+    uncertainty: Uncertainty = _optional(Uncertainty)
+    output: Output = _optional(Output)
+    run: Run = _optional(Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
     sweep: dict[str, tuple[Option, ...]] = Field(
         default_factory=dict,
@@ -65,21 +82,40 @@ class Scene(Section):
         """Hold what the sections must satisfy together, for scenes made in Python too."""
         wrong = findings({name: getattr(self, name) for name in Scene.model_fields})
         if wrong:
-            raise ValueError("; ".join(f"{key_text(f.path)}: found {f.found}, expected {f.expected}" for f in wrong))
+            raise _scene_error(wrong)
         return self
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about values that are allowed but seldom meant."""
-        return tuple(value_warnings(self.gripper, self.friction, self.load, self.accuracy))
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
+        mu, g, force = self.friction.mu, self.gripper, self.load.normal_force[-1]
+        if mu > 2:
+            yield f"friction.mu = {mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"
+        strain = force / (g.pad_length * g.pad_width) / g.shear_modulus
+        if strain > 2:
+            area = f"{g.pad_length_mm * g.pad_width_mm:g} mm^2"
+            yield (
+                f"load.normal_force_n = {force:g} N on {area} is a mean pressure of {strain:.2g} times the pad's shear"
+                " modulus: cases may not converge"
+            )
+        if g.poisson_ratio > 0.45 and g.element == "hex8":
+            yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
+        if self.accuracy.meshes == 2 and any(n % 4 for n in g.elements):
+            yield (
+                f"accuracy.meshes = 2 halves the mesh, and gripper.elements = {list(g.elements)} cannot be halved "
+                "evenly: multiples of 4 can"
+            )
 
     @property
     def sampled(self) -> tuple[int, ...]:
         """Numbers of the candidates whose sampled wrenches are stored, rising."""
-        wanted, labels = self.limit_surface.wrench_samples, self.candidates.labels
-        if isinstance(wanted, str):
-            return tuple(range(len(labels))) if wanted == "all" else ()
-        return tuple(sorted({labels.index(w) if isinstance(w, str) else w for w in wanted}))
+        names = self.limit_surface.wrench_samples
+        if isinstance(names, str):
+            return tuple(range(self.candidates.count)) if names == "all" else ()
+        return tuple(sorted(self.candidates.numbers(names)))
 
     @property
     def axis_symmetry(self) -> int:
@@ -121,7 +157,7 @@ class Scene(Section):
         else:
             where = self.candidates
             data["candidates"] = [where.station_values_mm, where.angles_deg, where.roll_deg]
-        data["petsc"] = {k: v for k, v in self.petsc.items() if not WATCHING.match(k)}
+        data["petsc"] = {k: v for k, v in self.petsc.items() if not any(word in k for word in WATCHING)}
         data["sweep"] = list(self.sweep.items())  # the order of the axes counts
         return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
@@ -129,19 +165,19 @@ class Scene(Section):
         """The scene with values of dotted keys put in and without a sweep; `SceneError` where that is no scene."""
         sections, wrong = checked_sections(put(self.effective(), values))
         if wrong:
-            raise SceneError([Problem("scene", None, key_text(f.path), f.found, f.expected, f.remedy) for f in wrong])
+            raise _scene_error(wrong)
         return Scene(**sections)
 
 
 NAMES = tuple(Scene.model_fields)
-SECTIONS: dict[str, type[Section]] = {
+SECTIONS: dict[str, type[SceneSection]] = {
     name: field.annotation
     for name, field in Scene.model_fields.items()
-    if isinstance(field.annotation, type) and issubclass(field.annotation, Section)
+    if isinstance(field.annotation, type) and issubclass(field.annotation, SceneSection)
 }
 
 
-def section_model(name: str, table: Mapping[str, Any]) -> type[Section] | None:
+def section_model(name: str, table: Mapping[str, Any]) -> type[SceneSection] | None:
     """The model of a section; that of ``[object]`` depends on its shape."""
     return SHAPES.get(str(table.get("shape"))) if name == "object" else SECTIONS.get(name)
 
@@ -161,6 +197,10 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     return {**data, **tables, "sweep": {}}
 
 
+def _scene_error(wrong: Iterable[Finding]) -> SceneError:
+    return SceneError([f.at("scene", None) for f in wrong])
+
+
 def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Finding]]:
     """The valid sections of a scene, and everything wrong with it but for its sweep and its files."""
     sections: dict[str, Any] = {}
@@ -174,29 +214,25 @@ def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Find
         elif name in ("petsc", "sweep"):
             sections[name] = dict(table)
         elif (model := section_model(name, table)) is None:
-            found.append(_unknown_shape(table))
+            found.append(_unknown_shape(table.get("shape")))
         else:
             try:
                 sections[name] = model.model_validate(table)
             except ValidationError as error:
                 others = {place: keys for place, keys in keys_by_place().items() if keys != list(model.model_fields)}
                 found.extend(model_findings(error, model, name, table, others))
-    return sections, found + findings(sections) + list(_unprintable(data))
+    return sections, found + findings(sections)
 
 
-def _unprintable(value: Any, path: KeyPath = ()) -> Iterator[Finding]:
-    """Texts and keys that a terminal would obey, or that would break lines wherever they are shown."""
-    if isinstance(value, str) and (UNPRINTABLE.search(value) or "\n" in value or "\t" in value):
-        yield Finding(path, shown(value), "text without control characters", "remove them")
-    elif isinstance(value, Mapping):
-        for key, inner in value.items():
-            if UNPRINTABLE.search(key) or "\n" in key:
-                yield Finding(path, f"the key {shown(key)}", "a key without control characters", "remove them")
-            else:
-                yield from _unprintable(inner, (*path, key))
-    elif isinstance(value, list | tuple):
-        for index, inner in enumerate(value):
-            yield from _unprintable(inner, (*path, index))
+def findings(sections: Mapping[str, Any]) -> list[Finding]:
+    """Everything wrong with sections that are valid one by one; a joint rule needs all of its sections."""
+    found = [
+        f.below(name) for name, part in sections.items() if isinstance(part, SceneSection) for f in part.findings()
+    ]
+    for rule, names in JOINT:
+        if all(name in sections for name in names):
+            found += [f.below(names[0]) for f in rule(*(sections[name] for name in names))]
+    return found
 
 
 def _unknown_section(name: str, value: Any) -> Finding:
@@ -208,14 +244,10 @@ def _unknown_section(name: str, value: Any) -> Finding:
     return Finding((name,), kind, expected, f"it belongs to {homes[0]}" if homes else "remove it")
 
 
-def _unknown_shape(table: Mapping[str, Any]) -> Finding:
-    shape, path, expected = table.get("shape"), ("object", "shape"), f"one of {', '.join(map(shown, SHAPES))}"
-    if shape is not None:
-        near = closest(shape, list(SHAPES)) if isinstance(shape, str) else None
-        return Finding(path, shown(shape), expected, f'did you mean "{near}"?' if near else "choose one of these")
-    fits = {name: sum(key in model.model_fields for key in table) for name, model in SHAPES.items()}
-    likely = max(fits, key=lambda name: fits[name])
-    return Finding(path, "nothing", expected, f'add `shape = "{likely}"` to [object]')
+def _unknown_shape(shape: Any) -> Finding:
+    near = closest(shape, list(SHAPES)) if isinstance(shape, str) else None
+    found, remedy = "nothing" if shape is None else shown(shape), f'did you mean "{near}"?' if near else "choose one"
+    return Finding(("object", "shape"), found, f"one of {', '.join(map(shown, SHAPES))}", remedy)
 
 
 @lru_cache(maxsize=16)

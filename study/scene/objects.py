@@ -1,52 +1,77 @@
-"""The ``[object]`` section: one model per shape, keys with units, and SI values as properties."""
+"""The ``[object]`` section: one model per shape with its keys, SI values, and the rules of its values."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from softjaw.study.units import UNITS, in_si, si
+from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
+from softjaw.study.scene.problems import Finding, shown
+from softjaw.study.scene.section import Interval, Point, SceneSection, Text, numbers_text
+from softjaw.study.units import UNITS, converted, in_si, si
+
+SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
+THICKEST = 0.1  # of the smallest extent: a thicker wall is no shell
+WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",
+             "wall_heights_mm")  # fmt: skip
+
 
 Span = tuple[float, float]
 Length = Annotated[float, Field(gt=0)]
-Point = Annotated[tuple[float, float], Field(strict=False)]
+Modulus = Annotated[float, Field(gt=0, le=1000)]
+Strength = Annotated[float, Field(gt=0, le=1e5)]
+Ratio = Annotated[float, Field(ge=0, le=0.49)]
 Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 
 
-class Section(BaseModel):
-    """What all sections share: nothing unknown, nothing converted from text, nothing changed later."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, protected_namespaces=())
-
-
-class Shape(Section):
+class Shape(SceneSection):
     """What all shapes share. The object's axis is z."""
 
-    name: str = Field("", max_length=100, description="name for titles and tables")
+    SIZE_KEYS: ClassVar[tuple[str, ...]] = ()  # key of the extents, or one key for each of x, y and z
+    if TYPE_CHECKING:
+        shape: str  # a literal of each subclass
+    name: Text = Field("", max_length=100, description="name for titles and tables")
     mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
     mass = si("mass_g")
 
     @property
     def axis_symmetry(self) -> int:
         """Order of the rotational symmetry about z: 0 is every angle, 1 none."""
-        return self._symmetry()
+        return self._geometry()[0]
 
     @property
     def spans_mm(self) -> dict[str, Span]:
-        """Extent along each axis where the scene alone tells it [mm]."""
-        return self._spans_mm()
+        """Extent along each axis, where it is known without a mesh file [mm]."""
+        return self._geometry()[1]
 
     @property
     def extent(self) -> float | None:
-        """Largest extent [m]; None where the scene alone does not tell it."""
-        return max(high - low for low, high in self.spans_mm.values()) / 1000 if len(self.spans_mm) == 3 else None
+        """Largest extent [m]; None where it is not known without a mesh file."""
+        spans = self.spans_mm.values()
+        return in_si("extent_mm", max(high - low for low, high in spans)) if len(spans) == 3 else None
 
-    def _symmetry(self) -> int:
-        return 1
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        """`axis_symmetry` and `spans_mm`."""
+        return 1, {}
 
-    def _spans_mm(self) -> dict[str, Span]:
-        return {}
+    def findings(self) -> Iterator[Finding]:
+        """Extents outside 1 mm to 2 m are slips of the unit."""
+        for i, (axis, (low, high)) in enumerate(self.spans_mm.items()):
+            extent = high - low
+            if not SMALLEST_MM <= extent <= LARGEST_MM:
+                other = "m" if extent < SMALLEST_MM else "um"
+                meant = converted(extent, other, "mm")
+                slip = f"the unit is mm: if {other} was meant, the extent is {meant:g} mm"
+                remedy = slip if SMALLEST_MM <= meant <= LARGEST_MM else "check the unit, which is mm"
+                expected = f"{SMALLEST_MM:g} mm to {in_si('most_mm', LARGEST_MM):g} m"
+                key = self.SIZE_KEYS[i % len(self.SIZE_KEYS)]
+                yield Finding((key,), f"an extent of {extent:g} mm along {axis}", expected, remedy)
+                return
 
 
 class Walled(Shape):
@@ -58,27 +83,18 @@ class Walled(Shape):
     )
     base_wall_mm: Length | None = Field(None, description="thickness of a flat bottom; that of the wall if left out")
     wall_material: Literal["PET", "PP", "HDPE", "custom"] = Field("PET", description="material of the wall")
-    young_modulus_gpa: Annotated[float, Field(gt=0, le=1000)] | None = Field(
-        None, description="Young's modulus of the wall, instead of the material's"
-    )
-    wall_poisson_ratio: Annotated[float, Field(ge=0, le=0.49)] | None = Field(
-        None, description="Poisson's ratio of the wall, instead of the material's"
-    )
-    yield_strength_mpa: Annotated[float, Field(gt=0, le=1e5)] | None = Field(
-        None, description="stress that the wall may bear, instead of the material's"
-    )
-    allowed_dent_mm: Length | None = Field(
-        None, description="indentation that the wall may get, for the window of forces"
-    )
+    young_modulus_gpa: Modulus | None = Field(None, description="Young's modulus of the wall instead of the material's")
+    wall_poisson_ratio: Ratio | None = Field(None, description="Poisson's ratio of the wall instead of the material's")
+    yield_strength_mpa: Strength | None = Field(None, description="yield strength instead of the material's")
+    allowed_dent_mm: Length | None = Field(None, description="largest allowed indentation, for the safe force range")
     open_top: bool = Field(True, description="whether the last section is open, as a cup's and a bottle's without cap")
     support: Literal["standing", "clamped", "free"] = Field(
         "standing", description="standing on its bottom, clamped there, or held by the fingers alone"
     )
-    springs_n_per_mm: float = Field(
-        1.0, gt=0, le=1e4, description="weak springs that stand for what friction holds, all together"
-    )
+    springs_n_per_mm: float = Field(1.0, gt=0, le=1e4, description="total stiffness of springs in place of friction")
     base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
     yield_strength, allowed_dent = si("yield_strength_mpa"), si("allowed_dent_mm")
+    springs = si("springs_n_per_mm")
 
     @property
     def wall(self) -> float | tuple[Span, ...] | None:
@@ -86,75 +102,105 @@ class Walled(Shape):
         profile = self.wall_profile_mm
         return in_si("wall_mm", self.wall_mm) if profile is None else in_si("wall_profile_mm", profile)
 
-    @property
-    def springs(self) -> float:
-        """Stiffness of the weak springs [N/m]."""
-        return 1000.0 * self.springs_n_per_mm
+    def findings(self) -> Iterator[Finding]:
+        """Exactly one thickness, thin beside the object, and a complete material."""
+        yield from super().findings()
+        if self.wall_mm is not None and self.wall_profile_mm is not None:
+            yield Finding(("wall_profile_mm",), "wall_mm beside it", "one of them", "keep the one that is meant")
+        if self.wall is not None:
+            yield from self._wall_findings()
+            return
+        for key in WALL_KEYS:
+            if getattr(self, key, None) is not None:
+                remedy = "add for example `wall_mm = 0.4`, or remove the key"
+                yield Finding((key,), f"{key} without a wall", "wall_mm beside it", remedy)
+
+    def _wall_findings(self) -> Iterator[Finding]:
+        pairs = self.wall_profile_mm or ()
+        for i, (low, high) in enumerate(pairwise(pairs), 1):
+            if high[0] <= low[0]:
+                found = f"z = {high[0]:g} after {low[0]:g} mm"
+                yield Finding(("wall_profile_mm", i), found, "rising z", "sort the pairs [z, thickness] by z")
+        most = THICKEST * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
+        for thickness in [t for _, t in pairs] or [self.wall_mm or 0.0]:
+            if not 0 < thickness <= most:
+                key = "wall_profile_mm" if pairs else "wall_mm"
+                expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
+                yield Finding((key,), f"{thickness:g} mm", expected, "leave a thicker wall out: it is as good as rigid")
+                break
+        missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
+        if self.wall_material == "custom" and missing:
+            found = f'"custom" without {" and ".join(missing)}'
+            remedy = "add for example `young_modulus_gpa = 2.0` and `wall_poisson_ratio = 0.38`, or name a material"
+            yield Finding(("wall_material",), found, "both of them", remedy)
 
 
-class Sphere(Shape):
+class SphereShape(Shape):
     """A ball about the origin."""
 
+    SIZE_KEYS = ("radius_mm",)
     shape: Literal["sphere"]
     radius_mm: Length = Field(description="radius")
     radius = si("radius_mm")
 
-    def _symmetry(self) -> int:
-        return 0
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        return 0, dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
 
 
-class EllipticCylinder(Shape):
+class EllipticCylinderShape(Shape):
     """A cylinder along z about the origin, with the semi-axes a along x and b along y."""
 
+    SIZE_KEYS = ("semi_axis_a_mm", "semi_axis_b_mm", "length_mm")
     shape: Literal["elliptic_cylinder"]
     semi_axis_a_mm: Length = Field(description="semi-axis along x, the approach at angle 0")
     semi_axis_b_mm: Length = Field(description="semi-axis along y, across the approach at angle 0")
     length_mm: Length = Field(description="length along z, edges rounded by 2 mm included")
     semi_axis_a, semi_axis_b, length = si("semi_axis_a_mm"), si("semi_axis_b_mm"), si("length_mm")
 
-    def _symmetry(self) -> int:
-        return 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
-
-    def _spans_mm(self) -> dict[str, Span]:
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         a, b, half = self.semi_axis_a_mm, self.semi_axis_b_mm, self.length_mm / 2
-        return {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
+        symmetry = 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
+        return symmetry, {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
 
 
-class Box(Shape):
+class BoxShape(Shape):
     """A box about the origin with rounded edges."""
 
+    SIZE_KEYS = ("size_mm",)
     shape: Literal["box"]
     size_mm: Triple = Field(description="size along x, y and z", examples=[[60, 40, 120]])
     edge_radius_mm: float = Field(gt=0, description="radius of the edges and corners")
     size, edge_radius = si("size_mm"), si("edge_radius_mm")
 
-    def _symmetry(self) -> int:
-        return 4 if self.size_mm[0] == self.size_mm[1] else 2
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        symmetry = 4 if self.size_mm[0] == self.size_mm[1] else 2
+        return symmetry, {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
 
-    def _spans_mm(self) -> dict[str, Span]:
-        return {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
+    def findings(self) -> Iterator[Finding]:
+        """Edges cannot be rounder than the box is thick."""
+        yield from super().findings()
+        most = min(self.size_mm) / 2
+        if self.edge_radius_mm > most:
+            expected = f"at most half the smallest size, {most:g} mm"
+            yield Finding(("edge_radius_mm",), f"{self.edge_radius_mm:g} mm", expected, f"write {most:g} or less")
 
 
 class Plate(Shape):
     """Two planes, ``|x| <= thickness / 2``, without end along y and z."""
 
+    SIZE_KEYS = ("thickness_mm",)
     shape: Literal["plane"]
     thickness_mm: Length = Field(description="distance of the two planes, which the fingers press along x")
     thickness = si("thickness_mm")
 
-    def _symmetry(self) -> int:
-        return 2
-
-    def _spans_mm(self) -> dict[str, Span]:
-        return {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
+        return 2, {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
 
 
-class Revolution(Walled):
+class RevolutionShape(Walled):
     """A body of revolution about z: a bottle, a cup."""
 
+    SIZE_KEYS = ("profile_mm",)
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
         strict=False,
@@ -165,16 +211,26 @@ class Revolution(Walled):
     )
     profile = si("profile_mm")
 
-    def _symmetry(self) -> int:
-        return 0
-
-    def _spans_mm(self) -> dict[str, Span]:
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         radius = max(r for _, r in self.profile_mm)
         heights = [z for z, _ in self.profile_mm]
-        return {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
+        return 0, {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
+
+    def findings(self) -> Iterator[Finding]:
+        """An outline leads from one end to the other: z never falls, and only the ends may lie on the axis."""
+        yield from super().findings()
+        for i, (z, r) in enumerate(self.profile_mm):
+            before = self.profile_mm[i - 1]
+            if i and (z < before[0] or (z, r) == before):
+                found = f"{numbers_text((z, r))} after {numbers_text(before)}"
+                yield Finding(("profile_mm", i), found, "rising z", "sort the points [z, radius] by z")
+            at_end = i in (0, len(self.profile_mm) - 1)
+            if r < 0 or (r == 0 and not at_end):
+                expected = "a radius >= 0" if at_end else "a radius > 0 between the ends"
+                yield Finding(("profile_mm", i), f"radius {r:g} mm", expected, "write each point as [z, radius], in mm")
 
 
-class SectionTable(Section):
+class SectionTable(SceneSection):
     """One cross-section of a body of stacked sections."""
 
     z_mm: float = Field(description="height")
@@ -188,29 +244,38 @@ class SectionTable(Section):
 class Sections(Walled):
     """A body of sections stacked along z, each an ellipse or a rounded rectangle: a bottle that is not round."""
 
+    SIZE_KEYS = ("sections",)
     shape: Literal["sections"]
     sections: tuple[SectionTable, ...] = Field(
         strict=False, min_length=4, max_length=500, description="cross-sections from bottom to top"
     )
 
-    def _symmetry(self) -> int:
-        if any(any(s.shift_mm) for s in self.sections):
-            return 1
+    def _geometry(self) -> tuple[int, dict[str, Span]]:
         alike = all((s.b_mm or s.a_mm) == s.a_mm and s.exponent == 2.0 for s in self.sections)
-        return 0 if alike else 2
-
-    def _spans_mm(self) -> dict[str, Span]:
+        symmetry = 1 if any(any(s.shift_mm) for s in self.sections) else 0 if alike else 2
         x = [s.shift_mm[0] + side * s.a_mm for s in self.sections for side in (-1, 1)]
         y = [s.shift_mm[1] + side * (s.b_mm or s.a_mm) for s in self.sections for side in (-1, 1)]
         z = [s.z_mm for s in self.sections]
-        return {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
+        return symmetry, {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
+
+    def findings(self) -> Iterator[Finding]:
+        """Sections are stacked upwards; only the first and the last may end on the axis."""
+        yield from super().findings()
+        for i, (low, high) in enumerate(pairwise(self.sections), 1):
+            if high.z_mm <= low.z_mm:
+                found = f"z = {high.z_mm:g} after {low.z_mm:g} mm"
+                yield Finding(("sections", i, "z_mm"), found, "rising z", "sort the sections from bottom to top")
+        for i, section in enumerate(self.sections[1:-1], 1):
+            if section.a_mm == 0:
+                expected = "a semi-axis above 0 between the ends"
+                yield Finding(("sections", i, "a_mm"), "0 mm", expected, "write the semi-axis along x, in mm")
 
 
 class Mesh(Walled):
     """A closed triangle mesh from a file."""
 
     shape: Literal["mesh"]
-    mesh: str = Field(
+    mesh: Text = Field(
         min_length=1, max_length=4000, description="file of the mesh (.stl, .obj, .ply, .off), beside the scene file"
     )
     unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")
@@ -218,7 +283,7 @@ class Mesh(Walled):
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(
         "auto", description="step of the grid on which the distance to the mesh is sampled"
     )
-    wall_heights_mm: Annotated[tuple[float, float], Field(strict=False)] | None = Field(
+    wall_heights_mm: Interval | None = Field(
         None, description="part of the mesh along its axis that a thin wall is traced on, [low, high]; else all of it"
     )
     grid_step, wall_heights = si("grid_step_mm"), si("wall_heights_mm")
@@ -228,17 +293,25 @@ class Mesh(Walled):
         """Length of one unit of the file [m]."""
         return UNITS[self.unit].size
 
+    def file_findings(self) -> Iterator[Finding]:
+        """The mesh's file exists and can be one (its content is judged when it is read)."""
+        file, remedy = Path(self.mesh), "the path is relative to the scene file"
+        kind = f"a triangle mesh in a {', '.join(ENDINGS)} file"
+        if file.suffix.lower() not in ENDINGS:
+            yield Finding(("mesh",), shown(file.name), kind, "convert it to .stl")
+        elif not file.is_file():
+            yield Finding(("mesh",), f"{'a directory' if file.is_dir() else 'no such file'} at {file}", kind, remedy)
+        elif not (size := file.stat().st_size):
+            yield Finding(("mesh",), f"an empty file at {file}", kind, remedy)
+        elif size > LARGEST_FILE:
+            found, expected = f"{size >> 20} MiB in {file}", f"at most {LARGEST_FILE >> 20} MiB"
+            yield Finding(("mesh",), found, expected, "decimate the mesh, or save it as binary .stl")
+
 
 Object = Annotated[
-    Revolution | Sections | EllipticCylinder | Sphere | Box | Plate | Mesh,
+    RevolutionShape | Sections | EllipticCylinderShape | SphereShape | BoxShape | Plate | Mesh,
     Field(discriminator="shape", description="what is grasped"),
 ]
 SHAPES: dict[str, type[Shape]] = {
-    "revolution": Revolution,
-    "sections": Sections,
-    "elliptic_cylinder": EllipticCylinder,
-    "sphere": Sphere,
-    "box": Box,
-    "plane": Plate,
-    "mesh": Mesh,
+    get_args(model.model_fields["shape"].annotation)[0]: model for model in get_args(get_args(Object)[0])
 }

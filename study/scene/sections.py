@@ -1,58 +1,61 @@
-"""The sections of a scene other than ``[object]``: keys with units, defaults, ranges, and SI values as properties."""
+"""The sections of a scene other than object and candidates: keys, ranges, SI values, and the rules of their values."""
 
 from __future__ import annotations
 
+import math
+import string
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from softjaw.study.scene.objects import Section
+from softjaw.study.scene.objects import Shape, Walled
+from softjaw.study.scene.problems import Finding, shown
+from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.units import si
 
-Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Count = Annotated[int, Field(ge=2, le=400)]
-Force = Annotated[float, Field(gt=0, le=1000)]
-Angle = Annotated[float, Field(ge=-360, le=360)]
+Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
 Extent = Annotated[float, Field(ge=0, le=500)]
+Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
+Force = Annotated[float, Field(gt=0, le=1000)]
+Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
-POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 Share = Annotated[float, Field(ge=0, le=50)]
+MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
+ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
+LEVELS = {  # level of the effect: models of [limit_surface]
+    "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),
+}  # fmt: skip
+CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
+OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
+VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
+OTHERS = "others go into the environment variable PETSC_OPTIONS"
 
 
-class Gripper(Section):
-    """The two equal pads. No dimension of the original gripper is published; these defaults are plausible ones."""
+class Gripper(SceneSection):
+    """The two equal pads. No dimension of the original gripper is published; the defaults are plausible ones."""
 
     pad_length_mm: float = Field(50.0, ge=1, le=500, description="long side of the pad")
     pad_width_mm: float = Field(22.0, ge=1, le=500, description="short side of the pad")
     pad_thickness_mm: float = Field(15.0, ge=0.5, le=200, description="thickness of the pad")
-    material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field(
-        "blatz_ko", description="material law of the pad"
-    )
+    material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field("blatz_ko", description="material law")
     shear_modulus_kpa: float = Field(40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad")
-    poisson_ratio: float = Field(
-        0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam has 0.25"
-    )
-    alpha: tuple[float, ...] = Field(
-        (), strict=False, max_length=6, description="exponents of hyperfoam's terms", examples=[[-2]]
-    )
-    shear_moduli_kpa: tuple[float, ...] = Field(
-        (), strict=False, max_length=6, description="moduli of hyperfoam's terms", examples=[[40]]
-    )
-    elements: Annotated[tuple[Count, Count, Count], Field(strict=False)] = Field(
-        (20, 10, 6), description="elements of the whole pad along its length, width and thickness"
-    )
+    poisson_ratio: float = Field(0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam: 0.25")
+    alpha: Terms = Field((), description="exponents of hyperfoam's terms", examples=[[-2]])
+    shear_moduli_kpa: Terms = Field((), description="moduli of hyperfoam's terms", examples=[[40]])
+    elements: Counts = Field((20, 10, 6), description="elements of the whole pad along its length, width and thickness")
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
     grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
-    grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its front")
-    sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the sheet behind the pad")
-    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the sheet; steel has 200")
-    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the sheet")
-    sheet_support_mm: Annotated[tuple[Extent, Extent], Field(strict=False)] = Field(
-        (20.0, 10.0), description="length and width of the patch in the sheet's middle that the finger holds"
-    )
+    grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
+    sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
+    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
+    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
+    sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
@@ -75,11 +78,81 @@ class Gripper(Section):
 
     @property
     def grading(self) -> tuple[float, float, float]:
-        """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and front [-]."""
+        """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and contact face [-]."""
         return (self.grading_x, self.grading_y, self.grading_z)
 
+    def findings(self) -> Iterator[Finding]:
+        """Constants that the material cannot have, slivers, and meshes beyond any memory."""
+        yield from self._hyperfoam_findings() if self.material == "hyperfoam" else self._material_findings()
+        n = self.elements
+        for i in (0, 1):
+            if n[i] % 2 and self.grading[i] != 1:
+                found, expected = f"{self.grading[i]:g} with {n[i]} elements", "an even number of graded elements"
+                yield Finding((f"grading_{'xy'[i]}",), found, expected, "write 1.0, or even elements")
+        if math.prod(n) > MOST_ELEMENTS:
+            found, expected = f"{list(n)}, which is {math.prod(n):,} elements", f"at most {MOST_ELEMENTS:,} elements"
+            yield Finding(("elements",), found, expected, "start with [20, 10, 6]")
+        edges = self._edges_mm()
+        if max(map(max, edges)) > LARGEST_ASPECT * min(map(min, edges)):
+            sizes = " x ".join(f"{low:.3g}" if low == high else f"{low:.3g}..{high:.3g}" for low, high in edges)
+            found = f"{list(n)}, which makes elements of {sizes} mm"
+            expected = f"edges that differ by a factor of {LARGEST_ASPECT:g} at most"
+            yield Finding(("elements",), found, expected, "change elements or grading; [20, 10, 6] suits most pads")
 
-class Friction(Section):
+    def _edges_mm(self) -> list[tuple[float, float]]:
+        """Smallest and largest element edge along x, y and z [mm]."""
+        sizes = (self.pad_length_mm / 2, self.pad_width_mm / 2, self.pad_thickness_mm)
+        counts = (self.elements[0] // 2, self.elements[1] // 2, self.elements[2])
+        edges = []
+        for size, n, ratio in zip(sizes, counts, self.grading, strict=True):
+            steps = [ratio ** (i / (n - 1)) for i in range(n)] if n > 1 else [1.0]
+            edges.append((min(steps) / sum(steps) * size, max(steps) / sum(steps) * size))
+        return edges
+
+    def _material_findings(self) -> Iterator[Finding]:
+        if self.material == "blatz_ko" and self.poisson_ratio != 0.25:
+            found, remedy = f"{self.poisson_ratio:g}", 'remove the key, or choose material = "hyperfoam"'
+            yield Finding(("poisson_ratio",), found, "0.25, which Blatz-Ko foam always has", remedy)
+        for key in ("alpha", "shear_moduli_kpa"):
+            if getattr(self, key):
+                found, remedy = f"{key} with material {shown(self.material)}", 'remove it, or choose "hyperfoam"'
+                yield Finding((key,), found, "it with hyperfoam only", remedy)
+
+    def _hyperfoam_findings(self) -> Iterator[Finding]:
+        if len(self.alpha) != len(self.shear_moduli_kpa):
+            found = f"{len(self.alpha)} exponents and {len(self.shear_moduli_kpa)} moduli"
+            yield Finding(("alpha",), found, "as many exponents as moduli", "make both lists of the same length")
+        if 0 in self.alpha:
+            yield Finding(("alpha",), "an exponent of 0", "others than 0", "use a small exponent such as 0.01")
+        total = sum(self.shear_moduli_kpa)
+        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=1e-9):
+            found, expected = f"{self.shear_modulus_kpa:g} kPa", f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0"
+            yield Finding(("shear_modulus_kpa",), found, expected, "leave shear_modulus_kpa out")
+
+    def symmetry_findings(self, effects: Effects) -> Iterator[Finding]:
+        """Symmetric halves need even counts."""
+        n = list(self.elements)
+        if effects.model_size != "full" and (n[0] % 2 or n[1] % 2):
+            even = [n[0] + n[0] % 2, n[1] + n[1] % 2, n[2]]
+            expected = "even numbers along length and width, so that symmetric halves can be meshed"
+            yield Finding(("elements",), f"{n}", expected, f'write {even}, or effects.model_size = "full"')
+
+    def support_findings(self, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
+        """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
+        if effects.sheet == "rigid":
+            return
+        counts = [self.elements[:2], [-(-n // 2) for n in self.elements[:2]]][: accuracy.meshes]
+        size = self.pad_length_mm, self.pad_width_mm
+        need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
+        if any(held < (1 - ROUNDING) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
+            meshes = " and ".join(f"{list(n)}" for n in counts)
+            found = f"{list(self.sheet_support_mm)} mm with {meshes} elements along length and width"
+            expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
+            remedy = "use even numbers of elements" if len(counts) == 1 else "use multiples of 4 elements"
+            yield Finding(("sheet_support_mm",), found, expected, remedy)
+
+
+class Friction(SceneSection):
     """Friction between pad and object. Every model is computed; ``model`` is the planar one shown first."""
 
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
@@ -87,99 +160,20 @@ class Friction(Section):
     cor_grid: int = Field(0, ge=0, le=1000, description="n of an n x n grid of centres of rotation; 0 is off")
 
 
-class GraspPose(Section):
-    """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
-
-    point_mm: Vector = Field(
-        description="a point on the line along which the fingers close, [x, y, z]", examples=[[0, 0, 20]]
-    )
-    approach: Vector = Field(description="direction from finger 1 towards the object", examples=[[1, 0, 0]])
-    long_side: Vector = Field(
-        description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
-    )
-    label: str = Field("", max_length=100, description="name of the grasp")
-    point = si("point_mm")
-
-
-class Candidates(Section):
-    """Where to grasp: stations along the object's axis x angles about it, or explicit poses."""
-
-    stations: int | None = Field(
-        None, ge=2, le=10_000, description="number of stations, spread evenly over station_range_mm"
-    )
-    station_range_mm: Annotated[tuple[float, float], Field(strict=False)] | None = Field(
-        None, description="first and last station along the object's axis", examples=[[25, 175]]
-    )
-    stations_mm: Annotated[tuple[float, ...], Field(strict=False, min_length=1, max_length=10_000)] | None = Field(
-        None, description="stations along the object's axis", examples=[[25, 50, 75]]
-    )
-    angles_deg: tuple[Angle, ...] = Field(
-        (0.0, 90.0),
-        strict=False,
-        min_length=1,
-        max_length=3600,
-        description="angles about the axis",
-        examples=[[0, 90]],
-    )
-    roll_deg: Angle = Field(
-        0.0, description="turn of the gripper about the approach; 0 has the long side along the axis"
-    )
-    poses: tuple[GraspPose, ...] = Field(
-        (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
-    )
-    angles, roll = si("angles_deg"), si("roll_deg")
-
-    @field_validator("stations_mm", "angles_deg")
-    @classmethod
-    def _ascending(cls, values: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        return None if values is None else tuple(sorted(values))
-
-    @property
-    def station_values_mm(self) -> tuple[float, ...]:
-        """Stations along the object's axis, rising [mm]; empty with explicit poses."""
-        if self.stations_mm is not None or self.stations is None or self.station_range_mm is None:
-            return self.stations_mm or ()
-        (low, high), n = self.station_range_mm, self.stations
-        return tuple(low + (high - low) * i / (n - 1) for i in range(n))
-
-    @property
-    def station_values(self) -> tuple[float, ...]:
-        """Stations along the object's axis, rising [m]; empty with explicit poses."""
-        return tuple(s / 1000 for s in self.station_values_mm)
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Names of the candidates: stations, then angles at each."""
-        if self.poses:
-            return tuple(pose.label or f"pose {i}" for i, pose in enumerate(self.poses))
-        return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
-
-    @property
-    def count(self) -> int:
-        """Number of candidates."""
-        return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
-
-
-class Load(Section):
+class Load(SceneSection):
     """What the fingers press with."""
 
-    normal_force_n: tuple[Force, ...] = Field(
-        strict=False, min_length=1, max_length=1000, description="normal forces per finger", examples=[[1, 2, 5]]
-    )
+    normal_force_n: Annotated[
+        tuple[Force, ...], Field(strict=False, min_length=1, max_length=1000), AfterValidator(once_and_rising)
+    ] = Field(description="normal forces per finger", examples=[[1, 2, 5]])
     normal_force = si("normal_force_n")
 
-    @field_validator("normal_force_n")
-    @classmethod
-    def _ascending(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(sorted(values))
 
-
-class Score(Section):
+class ScoreKeys(SceneSection):
     """How torques are made comparable with forces in the grasp quality."""
 
     torque_scale: Literal["contact", "object"] = Field(
-        "contact",
-        description="soft torques over the contact length (the paper's choice), or all over the object length",
+        "contact", description="length that scales soft torques: of the contact, as in the paper, or of the object"
     )
     object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
         "auto", description="length that scales torque arms; auto is the object's largest extent"
@@ -188,50 +182,50 @@ class Score(Section):
         "auto", description="length that scales soft torques; auto is the pad's length"
     )
     epsilon: Literal["facing", "everywhere"] = Field(
-        "facing",
-        description="where epsilon is computed: for contacts that face each other, or in any pose (some 0.1 s each)",
+        "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.1 s each)"
     )
-    graspit: bool = Field(
-        False, description="also map the quality that GraspIt!'s 20 vertices per contact give, which is too small"
-    )
+    graspit: bool = Field(False, description="also map the quality with GraspIt!'s 20 vertices per contact")
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 
-class LimitSurface(Section):
+class LimitSurfaceKeys(SceneSection):
     """The surface that bounds the friction wrenches of a contact, fitted to the wrenches of many motions."""
 
     model: Literal["three_motions", "axis_aligned", "full", "quartic"] = Field(
-        "quartic",
-        description="ellipsoid from three motions, fitted ellipsoid with axes along the frame or any, convex quartic",
+        "quartic", description="ellipsoid from three motions, fitted ellipsoid (along the axes or any), convex quartic"
     )
     objective: Literal["least_squares", "zhou"] = Field(
-        "least_squares", description="what the fit of a full ellipsoid or a quartic makes small; zhou is slower"
+        "least_squares", description="what the fit of a full ellipsoid or a quartic minimises; zhou is slower"
     )
     samples: int = Field(500, ge=50, le=20_000, description="motions that the surface is fitted to")
     wrench_samples: Names | Literal["none", "all"] = Field(
         "none", description="candidates whose sampled wrenches are stored, by number or label"
     )
 
+    def findings(self) -> Iterator[Finding]:
+        """Only some models have several objectives."""
+        if self.objective == "zhou" and self.model not in CONVEX_FITS:
+            found, expected = f'"zhou" with model {shown(self.model)}', f"it with model {' or '.join(CONVEX_FITS)}"
+            yield Finding(("objective",), found, expected, 'write `objective = "least_squares"`')
 
-class Task(Section):
+
+class TaskKeys(SceneSection):
     """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
 
-    weight_direction: Vector = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
+    weight_direction: Direction = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
     centre_of_mass_mm: Vector | Literal["auto"] = Field(
         "auto", description="centre of mass [x, y, z]; auto is the middle of the box round the object"
     )
     centre_of_mass = si("centre_of_mass_mm")
 
 
-class Effects(Section):
+class Effects(SceneSection):
     """What is simulated; ``auto`` takes the cheapest level that the scene allows."""
 
     object: Literal["auto", "rigid", "linear_shell", "nonlinear_shell"] = Field(
         "auto", description="the object's compliance; the shells need object.wall_mm"
     )
-    sheet: Literal["auto", "rigid", "elastic"] = Field(
-        "auto", description="the sheet behind the pad: rigid, or a plate that bends"
-    )
+    sheet: Literal["auto", "rigid", "elastic"] = Field("auto", description="the pad's backing plate")
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
     friction: Literal["auto", "ccm"] = Field("auto", description="friction model behind the score")
@@ -245,15 +239,33 @@ class Effects(Section):
         "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"
     )
 
+    def object_findings(self, shape: Shape) -> Iterator[Finding]:
+        """A shell needs a wall; friction acts back on pads that press on rigid objects."""
+        hollow = isinstance(shape, Walled) and shape.wall is not None
+        if self.object.endswith("shell") and not hollow:
+            remedy = 'add wall_mm to [object], for example `wall_mm = 0.4`, or write "auto"'
+            yield Finding(("object",), f'"{self.object}" without a wall', "an object with a wall", remedy)
+        if self.friction_pressure_coupling == "tangential" and hollow and self.object != "rigid":
+            found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
+            yield Finding(("friction_pressure_coupling",), found, "a rigid object", remedy)
 
-class Accuracy(Section):
+    def surface_findings(self, surface: LimitSurfaceKeys) -> Iterator[Finding]:
+        """A forced level is that of the model."""
+        models = LEVELS.get(self.limit_surface, ())
+        if models and surface.model not in models:
+            expected = f"the level of limit_surface.model, which is {shown(surface.model)}"
+            remedy = f'write `model = "{models[0]}"` in [limit_surface], or "auto" here'
+            yield Finding(("limit_surface",), shown(self.limit_surface), expected, remedy)
+
+
+class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
     contact: Literal["weighted", "nodal"] = Field("weighted", description="how gaps are collocated")
     residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(
-        1 / 8, gt=0, le=1, description="shortest part of a step between two forces that is tried before another way"
+        1 / 8, gt=0, le=1, description="shortest part of a load step that is tried before displacement control"
     )
     wall_around_mm: WallSize = Field(1.5, description="size of a thin wall's elements round the object, under the pads")
     wall_along_mm: WallSize = Field(2.5, description="size of a thin wall's elements along the axis, under the pads")
@@ -261,14 +273,14 @@ class Accuracy(Section):
     e_n: float | None = Field(
         None, gt=1e-4, le=0.5, description="largest relative error of e_n; mesh, steps and effects are chosen by it"
     )
-    cost_file: str | None = Field(
+    cost_file: Text | None = Field(
         None, min_length=1, max_length=1000, description="result of 'softjaw cost' that they are chosen from"
     )
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
 
-class Uncertainty(Section):
-    """How far inputs may be off (0: not asked), as half-widths within which about 95 of 100 cases lie.
+class Uncertainty(SceneSection):
+    """Uncertainty of inputs (0: none), as half-widths of their 95 % intervals.
 
     Errors that no formula gives are found by solving a few candidates, the probes, again with the input changed.
     """
@@ -293,28 +305,62 @@ class Uncertainty(Section):
         }  # fmt: skip
         return tuple(name for name, wanted in asked.items() if wanted)
 
-    def numbers(self, labels: tuple[str, ...]) -> tuple[int, ...]:
-        """Numbers of the candidates that are named, in the order given; empty where only their count is given."""
-        named = () if isinstance(self.probes, int) else self.probes
-        return tuple(dict.fromkeys(name if isinstance(name, int) else labels.index(name) for name in named))
+    def input_findings(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[Finding]:
+        """A friction coefficient that may be negative, a missing wall, and a sweep, which has no intervals."""
+        if self.mu and self.mu >= friction.mu:
+            expected = f"less than friction.mu, which is {friction.mu:g}"
+            yield Finding(("mu",), f"{self.mu:g}", expected, "write the half-width of mu itself, not per cent")
+        if self.wall_thickness_percent and getattr(shape, "wall", None) is None:
+            found, expected = f"{self.wall_thickness_percent:g}", "0 for an object without a wall"
+            yield Finding(("wall_thickness_percent",), found, expected, "give object.wall_mm, or leave it out")
+        if self.parts and sweep:
+            found, remedy = f"it beside a sweep over {', '.join(sweep)}", "leave [sweep] out here, or [uncertainty]"
+            yield Finding((), found, "a scene without a sweep", remedy)
 
 
-class Output(Section):
+class Output(SceneSection):
     """Where results go and what they hold."""
 
-    file: str = Field(
+    file: Text = Field(
         "results/scene.hdf", min_length=1, max_length=1000, description="result file, below the working directory"
     )
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
 
+    def findings(self) -> Iterator[Finding]:
+        """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
+        path = PurePosixPath(self.file)
+        if not self.file.endswith(".hdf"):
+            remedy = f"write {shown(self.file.removesuffix(path.suffix) + '.hdf')}"
+            yield Finding(("file",), shown(self.file), "a file ending in .hdf, which all viewers open", remedy)
+        if path.is_absolute() or PureWindowsPath(self.file).drive or ".." in path.parts:
+            remedy = "give any other place on the command line with `-o`"
+            yield Finding(("file",), shown(self.file), "a path below the working directory", remedy)
 
-class Run(Section):
-    """How a run guards itself against single cases. Results do not depend on it: it may differ from run to run."""
+
+class Run(SceneSection):
+    """Limits for single cases. Results do not depend on them: they may differ from run to run."""
 
     time_limit_s: float = Field(
-        600.0, ge=0.1, le=1e6, description="time after which a case is given up as failed, and the others go on"
+        600.0, ge=0.1, le=1e6, description="time after which a case fails; the other cases continue"
     )
     memory_gb: Annotated[float, Field(ge=0.1, le=1e5)] | Literal["auto", "none"] = Field(
         "auto",
         description="memory that the cases of a rank may take; auto is the rank's share of what is free",
     )
+
+
+def petsc_findings(options: Mapping[str, Any]) -> Iterator[Finding]:
+    """Options of the contact solver only, and none that writes files or runs code."""
+    for key, value in options.items():
+        bare = key.lstrip("-").removeprefix("contact_")
+        if not key.startswith("contact_") or set(bare) - OPTION_CHARACTERS or not bare:
+            remedy = f"write `contact_{bare}` if the contact solver is meant; {OTHERS}"
+            expected = "an option of the contact solver, contact_..., as softjaw takes no others"
+            yield Finding((key,), f"the option {shown(key)}", expected, remedy)
+        elif bare.endswith("python_type"):
+            yield Finding((key,), "an option that runs Python code", "options of the solver itself", "remove it")
+        elif not isinstance(value, str | int | float):
+            yield Finding((key,), shown(value), "text, a number, or true or false", "write the option's value alone")
+        elif isinstance(value, str) and set(value) - VALUE_CHARACTERS:
+            remedy = "options that name files go into the environment variable PETSC_OPTIONS"
+            yield Finding((key,), shown(value), "a word, a number or a list of them", remedy)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
 import tomllib
@@ -10,20 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.scene.problems import KeyPath, Problem, SceneError, closest, key_text, shown
+from softjaw.study.scene.problems import KeyPath, Problem, SceneError, closest, shown
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
-CURES = {  # start of tomllib's sentence: what to do
-    "Expected newline or end of document": "give each key its own line, and write decimals with a point, `mu = 0.8`",
-    "Invalid value": "write text in quotes, numbers as 0.8 or 1e-3, and true or false in small letters",
-    "Unclosed array": "close the list with `]`",
-    "Unterminated string": "close the text with a quote",
-    "Expected '=' after a key": "write `key = value`; a key has no blanks in it",
-    "Cannot": "give each key and section once",
-    "Expected ']'": "close the section's name with `]`",
-    "Expected \"'": "close the text with a quote",
-    "Found invalid character": "close the text with a quote on the same line",
-}
+REMEDY = "write each `key = value` once and on a line of its own, text in quotes, decimals with a point, lists in [ ]"
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?"{3,5}|' + r"'''.*?'{3,5}|" + r'"(?:\\.|[^"\\\n])*"|' + r"'[^'\n]*'|"
     r"#[^\n]*|\n|[\[\]{}=,.]|[^\s\[\]{}=,.\"'#]+",
@@ -39,18 +28,14 @@ def read_text(path: Path) -> str:
         return SceneError([Problem(str(path), None, "", found, expected, remedy)])
 
     toml = "a scene, which is a text file in TOML"
-    if path.is_dir():
-        inside = sorted(p.name for p in path.glob("*.toml"))
-        raise refuse("a directory", toml, f"name one of {', '.join(inside)}" if inside else "name a file in it")
-    if not path.exists():
-        scenes = [p.name for p in path.parent.glob("*.toml") if p.name != "pyproject.toml"]
-        near = closest(path.name, scenes)
-        raise refuse("no such file", toml, f"did you mean `{path.with_name(near)}`?" if near else "check the path")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)
     except OSError as error:
-        raise refuse(f"a file that cannot be read ({error.strerror})", toml, "check its permissions") from None
+        scenes = [p.name for p in path.parent.glob("*.toml") if p != path and p.name != "pyproject.toml"]
+        near = closest(path.name, scenes)
+        remedy = f"did you mean `{path.with_name(near)}`?" if near else "check the path and its permissions"
+        raise refuse(f"a file that cannot be read ({error.strerror})", toml, remedy) from None
     if b"\0" in content:
         hint = "use `softjaw show` for results" if content.startswith(b"\x89HDF") else "name the scene's .toml file"
         raise refuse("binary data", toml, hint)
@@ -72,37 +57,23 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         deep = Problem(file, None, "", "lists or tables nested too deeply", "a scene", "flatten them")
         raise SceneError([deep]) from None
     except ValueError as error:
-        raise SceneError([_syntax_problem(text, file, str(error))]) from None
+        reason, _, place = str(error).partition(" (at ")
+        lines = text.rstrip("\n").split("\n")
+        number = place.removeprefix("line ").partition(",")[0]  # tomllib gives it as text only
+        line = min(int(number), len(lines)) if number.isdigit() else len(lines)
+        found = f"{shown(lines[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
+        raise SceneError([Problem(file, line, "", found, "TOML", REMEDY)]) from None
 
 
-def _syntax_problem(text: str, file: str, message: str) -> Problem:
-    reason, _, place = message.partition(" (at ")
-    numbers = re.findall(r"\d+", place)
-    last = text.rstrip("\n").count("\n") + 1
-    line = min(int(numbers[0]), last) if numbers else last
-    if reason.startswith(("Cannot overwrite", "Cannot declare", "Cannot mutate", "Duplicate")):
-        seen: dict[KeyPath, int] = {}
-        with contextlib.suppress(ValueError):  # the rest of the line may not be TOML
-            for path, again in key_lines("\n".join(text.split("\n")[:line])):
-                if path in seen:
-                    found = f"the same {'section' if len(path) == 1 else 'key'} again"
-                    expected = f"it once, and line {seen[path]} has it"
-                    return Problem(file, again, key_text(path), found, expected, "remove one of them")
-                seen[path] = again
-    cure = next((c for start, c in CURES.items() if reason.startswith(start)), "correct this line")
-    found = f"{shown(text.split(chr(10))[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
-    return Problem(file, line, "", found, "TOML", cure)
-
-
-def key_lines(text: str) -> list[tuple[KeyPath, int]]:
-    """Path and line of every section, key and list member of a text that is TOML, but perhaps for duplicates."""
+def key_lines(text: str) -> dict[KeyPath, int]:
+    """First line of every section, key and list member of a text that is TOML, and of sections that are implied."""
     tokens, line = [], 1
     for match in _TOKEN.finditer(text):
         if not match[0].startswith("#"):
             tokens.append((match[0], line))
         line += match[0].count("\n")
     tokens.reverse()  # they are taken from the end
-    found: list[tuple[KeyPath, int]] = []
+    lines: dict[KeyPath, int] = {}
     base: KeyPath = ()
     counts: dict[KeyPath, int] = {}
     while tokens:
@@ -118,10 +89,15 @@ def key_lines(text: str) -> list[tuple[KeyPath, int]]:
                 tokens.pop()
             else:  # a table within the last of its kind
                 base = next(((*p, n, *base[len(p) :]) for p, n in counts.items() if base[: len(p)] == p), base)
-            found.append((base, line))
+            _note(base, line, lines)
         else:
-            _entry(tokens, base, found)
-    return found
+            _entry(tokens, base, lines)
+    return lines
+
+
+def _note(path: KeyPath, line: int, lines: dict[KeyPath, int]) -> None:
+    for n in range(1, len(path) + 1):
+        lines.setdefault(path[:n], line)
 
 
 def _names(tokens: list[tuple[str, int]], end: str) -> KeyPath:
@@ -132,24 +108,24 @@ def _names(tokens: list[tuple[str, int]], end: str) -> KeyPath:
     return tuple(parts)
 
 
-def _entry(tokens: list[tuple[str, int]], base: KeyPath, found: list[tuple[KeyPath, int]]) -> None:
+def _entry(tokens: list[tuple[str, int]], base: KeyPath, lines: dict[KeyPath, int]) -> None:
     line = tokens[-1][1]
     path = (*base, *_names(tokens, "="))
-    found.append((path, line))
-    _value_lines(tokens, path, found)
+    _note(path, line, lines)
+    _value_lines(tokens, path, lines)
 
 
-def _value_lines(tokens: list[tuple[str, int]], path: KeyPath, found: list[tuple[KeyPath, int]]) -> None:
+def _value_lines(tokens: list[tuple[str, int]], path: KeyPath, lines: dict[KeyPath, int]) -> None:
     opening = tokens.pop()[0] if tokens and tokens[-1][0] in "[{" else ""
     index = 0
     while tokens and tokens[-1][0] not in ("]", "}") and (opening or tokens[-1][0] not in (",", "\n")):
         if not opening or tokens[-1][0] in (",", "\n"):
             tokens.pop()
         elif opening == "{":
-            _entry(tokens, path, found)
+            _entry(tokens, path, lines)
         else:
-            found.append(((*path, index), tokens[-1][1]))
-            _value_lines(tokens, (*path, index), found)
+            _note((*path, index), tokens[-1][1], lines)
+            _value_lines(tokens, (*path, index), lines)
             index += 1
     if opening and tokens:
         tokens.pop()

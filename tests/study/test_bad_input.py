@@ -75,30 +75,19 @@ def spoilt(*changes):
     return text
 
 
-# test_scene has the sentences of all keys; here they come out of the program, all at once.
-OFF, NOT_TOML = "off the object", "not toml"
-WRONG_SCENES = {
-    "every key": (
-        spoilt(
-            ("radius_mm = 30", "colour = 3"), ("[4, 4, 2]", "[4, 4, 2]\npad_thickness_mm = 0.01"),
-            ("stations_mm = [0]", 'stations_mm = "top"'), ("normal_force_n = [2]", "normal_force_n = [-2]"),
-        ),
-        ("object.colour", "object.radius_mm", "pad_thickness_mm", "stations_mm", "normal_force_n"),
-    ),
-    OFF: (spoilt(("stations_mm = [0]", "stations_mm = [31]")), ("-30 to 30 mm",)),
-    NOT_TOML: (spoilt(("[load]", "[load")), ("scene.toml",)),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", ["every key", *(pytest.param(w, marks=pytest.mark.long) for w in (OFF, NOT_TOML))])
-def test_a_wrong_scene_starts_nothing(once, folder, what):
-    text, words = WRONG_SCENES[what]
+def test_a_wrong_scene_starts_nothing(once, folder):
+    """All errors at once, out of the program; tests/study/scene has each of them."""
+    text = spoilt(
+        ("radius_mm = 30", "colour = 3"), ("[4, 4, 2]", "[4, 4, 2]\npad_thickness_mm = 0.01"),
+        ("stations_mm = [0]", 'stations_mm = "top"'), ("normal_force_n = [2]", "normal_force_n = [-2]"),
+    )  # fmt: skip
+    keys = ("object.colour", "object.radius_mm", "pad_thickness_mm", "stations_mm", "normal_force_n")
 
     def spoil():
         (folder / "scene.toml").write_text(text)
         return run(0, folder)
 
-    refused(once(spoil), folder, 2, *words, sentences=len(words))
+    refused(once(spoil), folder, 2, *keys, sentences=len(keys))
 
 
 def read_stl(path):
@@ -147,20 +136,13 @@ def test_a_mesh_that_is_no_object_is_found_by_check(once, folder, what, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("what", "ranks"), [("open", 0), ("a bottle of 200 m", 2)])
-def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(once, folder, what, ranks):
-    once(spoil_mesh, folder, what)
-    refused(once(lambda: run(ranks, folder, scene="mesh.toml")), folder, 2, *WRONG_MESHES[what][1])
+def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(once, folder):
+    once(spoil_mesh, folder, "a bottle of 200 m")
+    refused(once(lambda: run(2, folder, scene="mesh.toml")), folder, 2, "200 m", "unit")
 
 
 def test_options_of_another_solver_are_refused(once, folder):
     refused(once(run, 0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
-
-
-@pytest.mark.long
-def test_a_misspelt_option_of_the_solver_is_refused(once, folder):
-    """Through the whole program; test_refusals has the sentences."""
-    refused(once(run, 0, folder, "--", "-contact_snes_typ", "vinewtonrsls"), folder, 2, "contact_snes_typ")
 
 
 def every_rank(folder, *words):

@@ -21,7 +21,7 @@ from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.scene.objects import EllipticCylinder, Sphere
+from softjaw.study.scene.objects import EllipticCylinderShape, SphereShape
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, shape_outline
 from softjaw.study.show.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
@@ -399,10 +399,10 @@ def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
 
 def test_outlines_are_those_of_the_shapes():
     """Extent of an ellipse along a direction: sqrt((a cos)^2 + (b sin)^2)."""
-    tube = EllipticCylinder(shape="elliptic_cylinder", semi_axis_a_mm=30, semi_axis_b_mm=40, length_mm=100)
+    tube = EllipticCylinderShape(shape="elliptic_cylinder", semi_axis_a_mm=30, semi_axis_b_mm=40, length_mm=100)
     _, r = shape_outline(tube, np.pi / 4)
     assert r == pytest.approx(np.hypot(0.03, 0.04) / np.sqrt(2))
-    z, r = shape_outline(Sphere(shape="sphere", radius_mm=7.0), 0.3)
+    z, r = shape_outline(SphereShape(shape="sphere", radius_mm=7.0), 0.3)
     assert np.hypot(z, r) == pytest.approx(0.007)
 
 

@@ -98,13 +98,13 @@ def changed(path, folder, name, values, index=...):
 
 def test_check_tells_the_wall_and_how_its_level_is_chosen(solved):
     text = scene_text(solved[0], "can.toml")
-    assert "0.3 mm PP (1.3 GPa, yields at 31000 kPa), standing, open top, dents up to 1.5 mm allowed" in text
+    assert "0.3 mm PP (1.3 GPa, yields at 31000 kPa), standing, open top, indentation up to 1.5 mm allowed" in text
     assert RULE in text
     # the sentence states the numbers that the choice is made by
     assert f"below {100 * wall.STIFF:g} % of the pads' closing displacement" in RULE
     assert f"up to {wall.SMALL_INDENTATION:g} of the wall's thickness" in RULE
     forced = solved[0].with_values({"effects.object": "rigid"})
-    assert "rigid for every candidate, no indentation and no stress will be known" in scene_text(forced, "can.toml")
+    assert "rigid for every candidate, indentation and stress are not computed" in scene_text(forced, "can.toml")
 
 
 def test_a_rigid_object_has_no_line_about_a_wall(solved):

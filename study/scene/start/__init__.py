@@ -19,21 +19,21 @@ PAD_LENGTH, PAD_WIDTH = 50.0, 22.0  # mm; of objects that are large enough for s
 
 
 def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) -> str:
-    """Write both files, and tell what to do next; ``measure`` gives the extents of the mesh [mm], the axis last.
+    """Write both files, and say what to do next; ``measure`` gives the extents of the mesh [mm], the axis last.
 
     Raises
     ------
     StudyError
-        A mesh that is missing or cannot be read, files that are there, or a folder that cannot be written.
+        A mesh that is missing or cannot be read, files that exist, or a folder that cannot be written.
     """
     if options.kind != "mesh" and options.mesh:
         raise StudyError(USAGE, f"--mesh: found beside '{options.kind}'; write 'softjaw init mesh --mesh ...'")
     base = _base(options)
     scene, batch = (base.with_name(base.name + ending) for ending in (".toml", ".sbatch"))
-    there = [str(path) for path in (scene, batch) if path.exists()]
-    if there and not options.force:
+    existing = [str(path) for path in (scene, batch) if path.exists()]
+    if existing and not options.force:
         raise StudyError(
-            CANNOT_WRITE, f"{' and '.join(there)}: there already; choose another name with -o, or add --force"
+            CANNOT_WRITE, f"{' and '.join(existing)}: existing file; choose another name with -o, or add --force"
         )
     words = {"NAME": base.name, "SOFTJAW": _program()}
     mesh = _about_mesh(options, scene, measure) if options.kind == "mesh" else {}
@@ -43,7 +43,7 @@ def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) ->
     measured = [f"object:  {mesh['SIZE']} mm, the last along its axis, with {unit}"] if mesh else []
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
-        f"written: {batch}  a Slurm job that goes on after its time limit",
+        f"written: {batch}  a Slurm job that resumes after its time limit",
         *measured,
         f"next:    softjaw check {shlex.quote(str(scene))}",
         f"         mpirun -n 2 softjaw run {shlex.quote(str(scene))}",
@@ -52,17 +52,17 @@ def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) ->
 
 
 def _base(options: Namespace) -> Path:
-    """Both files without their endings; their name stands in a scene and in a shell script."""
+    """Both files without their endings; their name is part of a scene and of a shell script."""
     default = Path(options.mesh).stem if options.mesh else options.kind
     base = Path((options.name or default).removesuffix(".toml"))
     if not re.fullmatch(r"\w[\w.+-]*", base.name):
-        text = f"-o: found '{base.name}', expected letters, digits and _ . + -, as in 'bottle-2'"
-        raise StudyError(USAGE, f"{text}; the name stands in both files")
+        text = f"-o: found '{base.name}', expected letters, digits and _ . + -; write a name as in 'bottle-2'"
+        raise StudyError(USAGE, text)
     return base
 
 
 def _program() -> str:
-    """The program that a batch job, which knows no virtual environment, has to start."""
+    """The program that a batch job starts; it has no virtual environment."""
     called = Path(sys.argv[0])
     return str(called.absolute() if called.name == "softjaw" else Path(sys.executable).with_name("softjaw"))
 
@@ -75,7 +75,7 @@ def _filled(template: str, words: dict[str, str]) -> str:
 
 
 def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str, str]:
-    """What the scene says of a mesh: its file, and stations and pads that fit its size."""
+    """What the scene says about a mesh: its file, and stations and pads that fit its size."""
     if not options.mesh or not options.unit:
         needs = {"--mesh FILE": options.mesh, "--unit": options.unit}
         lacks = " and ".join(name for name, given in needs.items() if not given)

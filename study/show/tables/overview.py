@@ -29,7 +29,7 @@ def scene_text(scene: Any, file: str) -> str:
         "wall": wall_text(o),
         "candidates": where,
         "forces": _list(scene.load.normal_force_n, "N"),
-        "friction": f"mu = {scene.friction.mu:g}; curved, flat and projected",
+        "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
         "cases": str(scene.cases),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
@@ -42,15 +42,15 @@ def scene_text(scene: Any, file: str) -> str:
         "each case": limits_text(scene.run),
         "results": scene.output.file,
     }
-    told = [f"warning: {text}" for text in warnings(scene)]
-    return "\n".join([f"{file}: no errors", *aligned(rows), *told])
+    lines = [f"warning: {text}" for text in warnings(scene)]
+    return "\n".join([f"{file}: no errors", *aligned(rows), *lines])
 
 
 def limits_text(run: Any) -> str:
     """What a single case may take before it fails."""
     limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
     memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
-    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that, and the others go on"
+    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that; the run continues"
 
 
 def _target(scene: Any) -> str:
@@ -88,19 +88,19 @@ def wall_text(shape: Any) -> str:
     given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
     strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""
-    strength = f", yields at {strength}" if strength else ", yield strength not known"
+    strength = f", yields at {strength}" if strength else ", yield strength unknown"
     words = [
         f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa{strength})",
         shape.support,
         "open top" if shape.open_top else "closed top",
-        f"dents up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "no limit for dents",
+        f"indentation up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "any indentation",
     ]
     return ", ".join(words)
 
 
 RULE = (  # as study.case.wall chooses
-    "by the indentation that a linear wall would get at the largest force: rigid below 2 % of the pads' closing,"
-    " linear shell up to 0.6 of the wall's thickness, nonlinear shell beyond"
+    "by the indentation that a linear wall would get at the largest force: rigid below 2 % of the pads' closing"
+    " displacement, linear shell up to 0.6 of the wall's thickness, nonlinear shell beyond"
 )
 
 
@@ -109,8 +109,8 @@ def compliance_text(scene: Any) -> str:
     level = scene.effects.object
     if level == "auto":
         return f"chosen for each candidate: {RULE}"
-    told = "no indentation and no stress will be known" if level == "rigid" else "as the scene says"
-    return f"{level.replace('_', ' ')} for every candidate, {told}"
+    note = "indentation and stress are not computed" if level == "rigid" else "as the scene says"
+    return f"{level.replace('_', ' ')} for every candidate, {note}"
 
 
 def _extent(shape: Any) -> str:
@@ -119,7 +119,7 @@ def _extent(shape: Any) -> str:
 
     span = axis_span(shape)
     if span is None:
-        return ", without end along its axis"
+        return ", unbounded along its axis"
     text = f", {span[0]:g} to {span[1]:g} mm along its axis"
     if shape.shape != "mesh":
         return text

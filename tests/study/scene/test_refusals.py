@@ -7,11 +7,12 @@ from argparse import Namespace
 
 import pytest
 
-from softjaw.study.case.build import check_object, shapes_of, warnings
+from softjaw.study.case.build import build_object, check_object, shapes_of, warnings
 from softjaw.study.cli import main
 from softjaw.study.messages import StudyError
 from softjaw.study.preparation import petsc_overrides, prepare
 from softjaw.study.scene import SceneError, load_scene, parse_scene
+from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
@@ -52,6 +53,11 @@ def test_every_object_of_a_sweep_is_judged():
     with pytest.raises(StudyError, match=r"object.mesh: .* an object of 120 m"):
         check_object(swept)
     check_object(at([60], FLASK))
+
+
+def test_a_shape_that_nothing_builds_is_refused():
+    with pytest.raises(ValueError, match="'cone'"):
+        build_object(SphereShape.model_construct(shape="cone", radius_mm=30.0))
 
 
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])

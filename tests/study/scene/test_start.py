@@ -96,7 +96,7 @@ def test_stations_and_pads_follow_the_box_round_the_mesh(tmp_path):
 def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     (tmp_path / there).write_text("mine")
     assert started("bottle") == CANNOT_WRITE
-    assert f"{there}: there already" in capsys.readouterr().err
+    assert f"{there}: existing file" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == [there]
     assert (tmp_path / there).read_text() == "mine"
     assert started("bottle", "--force") == 0

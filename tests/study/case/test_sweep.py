@@ -9,7 +9,7 @@ import pytest
 from softjaw.study.case import candidates, sweep
 from softjaw.study.scene import load_scene, parse_scene
 
-JOBS = Path(__file__).parents[2] / "jobs"
+JOBS = Path(__file__).parents[3] / "jobs"
 Z = np.array([0.0, 0.0, 1.0])
 CYLINDER = """
 [object]

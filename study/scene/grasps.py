@@ -1,0 +1,206 @@
+"""The ``[candidates]`` section: where to grasp, the rules of stations and poses, and grasps that are seldom meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
+from softjaw.study.scene.problems import Finding, closest, shown
+from softjaw.study.scene.section import Direction, Interval, SceneSection, Text, Vector, once_and_rising
+from softjaw.study.scene.sections import Gripper
+from softjaw.study.units import converted, si
+
+Angle = Annotated[float, Field(ge=-360, le=360)]
+POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
+EXAMPLE = "for example `stations = 35` with `station_range_mm = [25, 175]`"
+NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
+ALONG = 0.996  # cosine between approach and long side from which they are parallel
+
+
+class GraspPose(SceneSection):
+    """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
+
+    point_mm: Vector = Field(
+        description="a point on the line along which the fingers close, [x, y, z]", examples=[[0, 0, 20]]
+    )
+    approach: Direction = Field(description="direction from finger 1 towards the object", examples=[[1, 0, 0]])
+    long_side: Direction = Field(
+        description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
+    )
+    label: Text = Field("", max_length=100, description="name of the grasp")
+    point = si("point_mm")
+
+    def findings(self) -> Iterator[Finding]:
+        """Directions that do not fix a frame, points far from any object."""
+        cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
+        if abs(cosine) > ALONG:
+            found, remedy = f"{shown(list(self.long_side))}, along the approach", "the long side lies in the pad's face"
+            yield Finding(("long_side",), found, "a direction across the approach", remedy)
+        if max(map(abs, self.point_mm)) > LARGEST_MM:
+            expected = f"a point within {LARGEST_MM:g} mm of the origin"
+            yield Finding(("point_mm",), shown(list(self.point_mm)), expected, "check the unit, which is mm")
+
+    def clearance_mm(self, spans: dict[str, Span], gripper: Gripper) -> float:
+        """Distance at which a pad passes the box round the object along one of its sides [mm]; <= 0 where it meets."""
+        width = _cross(self.approach, self.long_side)
+        length = _cross(width, self.approach)
+        passing = []
+        for side, size in ((length, gripper.pad_length_mm), (width, gripper.pad_width_mm)):
+            axis = dict(zip("xyz", _unit(side), strict=True))
+            point = dict(zip("xyz", self.point_mm, strict=True))
+            off = sum((point[k] - sum(spans[k]) / 2) * axis[k] for k in "xyz")
+            passing.append(abs(off) - size / 2 - sum((spans[k][1] - spans[k][0]) / 2 * abs(axis[k]) for k in "xyz"))
+        return max(passing)
+
+
+class Candidates(SceneSection):
+    """Where to grasp: stations along the object's axis x angles about it, or explicit poses."""
+
+    stations: int | None = Field(
+        None, ge=2, le=10_000, description="number of stations, spread evenly over station_range_mm"
+    )
+    station_range_mm: Interval | None = Field(
+        None, description="first and last station along the object's axis", examples=[[25, 175]]
+    )
+    stations_mm: (
+        Annotated[
+            tuple[float, ...], Field(strict=False, min_length=1, max_length=10_000), AfterValidator(once_and_rising)
+        ]
+        | None
+    ) = Field(None, description="stations along the object's axis", examples=[[25, 50, 75]])
+    angles_deg: Annotated[
+        tuple[Angle, ...], Field(strict=False, min_length=1, max_length=3600), AfterValidator(once_and_rising)
+    ] = Field((0.0, 90.0), description="angles about the axis", examples=[[0, 90]])
+    roll_deg: Angle = Field(
+        0.0, description="turn of the gripper about the approach; 0 has the long side along the axis"
+    )
+    poses: tuple[GraspPose, ...] = Field(
+        (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
+    )
+    angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
+
+    @property
+    def station_values_mm(self) -> tuple[float, ...]:
+        """Stations along the object's axis, rising [mm]; empty with explicit poses."""
+        if self.stations_mm is not None or self.stations is None or self.station_range_mm is None:
+            return self.stations_mm or ()
+        (low, high), n = self.station_range_mm, self.stations
+        return tuple(low + (high - low) * i / (n - 1) for i in range(n))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the candidates: stations, then angles at each."""
+        if self.poses:
+            return tuple(pose.label or f"pose {i}" for i, pose in enumerate(self.poses))
+        return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
+
+    @property
+    def count(self) -> int:
+        """Number of candidates."""
+        return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
+
+    def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
+        """Numbers of the candidates that are given by number or label, each once, in the order given."""
+        return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
+
+    def findings(self) -> Iterator[Finding]:
+        """Exactly one way of giving the candidates."""
+        spread = self.stations is not None or self.station_range_mm is not None
+        given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
+        ways = [way for way in given if given[way]]
+        if len(ways) != 1:
+            expected = "one of stations_mm, stations with station_range_mm, or [[candidates.poses]]"
+            remedy = "keep one of them" if ways else f"add one, {EXAMPLE}"
+            yield Finding(tuple(ways[-1:]), " and ".join(ways) or "no grasp candidates", expected, remedy)
+        if spread and (self.stations is None or self.station_range_mm is None):
+            found, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
+            yield Finding((found,), f"{found} alone", f"{missing} beside it", f"add {missing}, {EXAMPLE}")
+        for key in ("angles_deg", "roll_deg") if self.poses else ():
+            if getattr(self, key) != Candidates.model_fields[key].default:
+                yield Finding((key,), f"{key} beside explicit poses", "it with stations only", "remove it")
+        for i, pose in enumerate(self.poses):
+            yield from (f.below("poses", i) for f in pose.findings())
+
+    def findings_on(self, shape: Shape) -> Iterator[Finding]:
+        """Stations beside the object, or along its faces, cannot touch it."""
+        low, high = shape.spans_mm.get("z", (-math.inf, math.inf))
+        outside = [s for s in self.station_values_mm if not low <= s <= high]
+        if outside:
+            found = f"{len(outside)} station{'s' * (len(outside) > 1)} beside the object: {_listed(outside)} mm"
+            expected = f"stations from {low:g} to {high:g} mm, where the object is"
+            remedy = "stations are coordinates along the object's axis, in mm"
+            yield Finding((self._station_key,), found, expected, remedy)
+        for angle in self.angles_deg if isinstance(shape, Plate) and self.station_values_mm else ():
+            if abs(math.cos(math.radians(angle))) < 0.5:
+                expected = "angles within 60 of 0 or 180: the planes face x"
+                yield Finding(("angles_deg",), f"{angle:g} degrees with two planes", expected, "write angles_deg = [0]")
+
+    def pose_findings(self, shape: Shape, gripper: Gripper) -> Iterator[Finding]:
+        """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
+        for i, pose in enumerate(self.poses if len(shape.spans_mm) == 3 else ()):
+            if any(pose.findings()) or (distance := pose.clearance_mm(shape.spans_mm, gripper)) <= 0:
+                continue
+            label = f" of '{pose.label}'" if pose.label else ""
+            found = f"a pad{label} that passes the object at a distance of {distance:.3g} mm"
+            remedy = "point_mm is in mm, in the frame in which the object's shape is given"
+            yield Finding(("poses", i, "point_mm"), found, "a pad that meets it", remedy)
+
+    def unknown_names(self, key: str, wanted: Any) -> Iterator[Finding]:
+        """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""
+        labels = self.labels
+        numbers = f"0 to {len(labels) - 1}"
+        for i, name in enumerate(wanted if isinstance(wanted, tuple) else ()):
+            if isinstance(name, int) and not 0 <= name < len(labels):
+                remedy = "numbers count stations, then angles"
+                yield Finding((key, i), f"{name}", f"a candidate's number, {numbers}", remedy)
+            elif isinstance(name, str) and name not in labels:
+                near = closest(name, labels)
+                remedy = f"did you mean {shown(near)}?" if near else f"write the candidate's number, {numbers}"
+                yield Finding((key, i), shown(name), f"a candidate's label, as {shown(labels[0])}", remedy)
+
+    def half_extent_mm(self, gripper: Gripper) -> float:
+        """Half of what a pad covers along the object's axis [mm]."""
+        along, across = abs(math.cos(self.roll)), abs(math.sin(self.roll))
+        return (gripper.pad_length_mm * along + gripper.pad_width_mm * across) / 2
+
+    def warnings(self, shape: Shape, span: Span | None, gripper: Gripper) -> Iterator[str]:
+        """Sentences about the stations on an object that reaches from ``span[0]`` to ``span[1]`` on its axis [mm]."""
+        places = self.station_values_mm
+        if span is None or not places:
+            return
+        (low, high), half = span, self.half_extent_mm(gripper)
+        first, last = (converted(place, "m", "mm") for place in (places[0], places[-1]))
+        spread = places[-1] - places[0]
+        if len(places) > 1 and spread < NARROW * (high - low) and low <= first <= last <= high:
+            yield (
+                f"candidates.{self._station_key}: {spread:.3g} mm between first and last station of an object of"
+                f" {high - low:g} mm; metres? Then write {first:g} to {last:g}"
+            )
+        slack = 1e-6 * (high - low)
+        over = [s for s in places if s - half < low - slack or s + half > high + slack]
+        if over and not isinstance(shape, Plate | SphereShape):
+            yield (
+                f"candidates: at {len(over)} of {len(places)} stations ({_listed(over)} mm) the pad, {2 * half:g} mm"
+                f" along the object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: it meets the"
+                " edge"
+            )
+
+    @property
+    def _station_key(self) -> str:
+        return "stations_mm" if self.stations_mm is not None else "station_range_mm"
+
+
+def _listed(places: Sequence[float]) -> str:
+    return ", ".join(f"{s:g}" for s in places[:4]) + (", ..." if len(places) > 4 else "")
+
+
+def _unit(vector: Sequence[float]) -> tuple[float, ...]:
+    return tuple(v / math.hypot(*vector) for v in vector)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
