@@ -49,7 +49,7 @@ DOORS = {
 # is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; preparation
 # joins what a run needs, from the scene to the report in its file; commands joins everything, cli above it.
 ORDER = (
-    "messages", "units", "flags", "quantities", "environment", "writing", "pictures",
+    "messages", "units", "flags", "quantities", "environment", "writing", "pictures", "templates", "page",
     "scene", "case", "pipeline", "result", "run", "accuracy", "lookup", "export", "patch", "show",
     "preparation", "doctor", "commands", "cli",
 )  # fmt: skip
