@@ -212,7 +212,7 @@ def completion(options: Namespace) -> int:
 def cost(options: Namespace) -> int:
     """Measure what accuracy costs in time."""
     require_room()
-    from softjaw.study.accuracy.cost.command import run
+    from softjaw.study.accuracy.cost import run
 
     run(options, scene_of(options))
     return DONE

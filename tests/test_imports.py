@@ -40,7 +40,7 @@ DOORS = {
         "study/result/result_writer.py",
         "study/result/guarded.py",
         "study/result/vtkhdf.py",
-        "study/accuracy/cost/study.py",
+        "study/accuracy/cost_study.py",
     },
     "pyvista": PICTURES | {"study/patch/reading.py"},
     "vtkmodules": PICTURES | {"study/patch/reading.py"},

@@ -1,7 +1,8 @@
-"""The knobs that trade accuracy for time, each an ordered list of settings, the cheapest first.
+"""The parameters that trade accuracy for time, each a series of levels, the cheapest first.
 
-A level is a set of values of scene keys. What a scene cannot use is left out with the reason that the scene's own
-checks give, so an effect that is added to ``[effects]`` becomes a knob without a word here.
+A discretisation parameter changes the contact solve: its levels are values of scene keys. What a scene cannot use is
+left out with the reason that the scene's own checks give, so an effect that is added to ``[effects]`` becomes a
+parameter without a word here. An evaluation parameter changes what is computed from a solved contact.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, get_args
 
 from softjaw.study.case.build import has_wall
 from softjaw.study.quantities import EFFECTS
+from softjaw.study.run.plan import wall_size
 from softjaw.study.scene import Scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.sections import Effects, WallSize
@@ -22,28 +24,29 @@ HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
 STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
-OWN = ("friction", "limit_surface")  # effects with knobs of their own, see `judging_knobs`
+OWN = ("friction", "limit_surface")  # effects whose levels are evaluation parameters
 EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
-# Time over that of the level which is taken for granted, about; more than the unknowns tell.
+# Time over that of the level which is taken for granted, about; more than the unknowns say.
 DEARER = {
     "gripper.element": {"hex27": 1.25}, "effects.sheet": {"elastic": 1.3},
     "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
 }  # fmt: skip
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 4000)
-SURFACES = (
-    ("three motions", "three_motions", "least_squares"), ("axis-aligned ellipsoid", "axis_aligned", "least_squares"),
-    ("full ellipsoid", "full", "least_squares"), ("full ellipsoid, zhou", "full", "zhou"),
-    ("quartic", "quartic", "least_squares"), ("quartic, zhou", "quartic", "zhou"),
-)  # fmt: skip
-HULL = 3000  # wrenches whose hull stands for the limit surface itself
+SURFACES = {  # name -> model and objective of ``[limit_surface]``
+    "three motions": ("three_motions", "least_squares"), "axis-aligned ellipsoid": ("axis_aligned", "least_squares"),
+    "full ellipsoid": ("full", "least_squares"), "full ellipsoid, zhou": ("full", "zhou"),
+    "quartic": ("quartic", "least_squares"), "quartic, zhou": ("quartic", "zhou"),
+}  # fmt: skip
+HULL = 3000  # wrenches whose hull is the reference solution of the limit surfaces
 POINTS = {"hull of 20 points": None, "hull of 50 points": 50}
+SLOW = {"hull of 20 points": 0.5, "hull of 50 points": 5.0}  # s, expected of one case
 WINKLER = "Winkler foundation, planar contact"
 
 
 @dataclass(frozen=True)
 class Level:
-    """One setting of a knob.
+    """One setting of a parameter.
 
     Parameters
     ----------
@@ -66,53 +69,52 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Knob:
-    """Levels of one knob, the cheapest first.
+class Parameter:
+    """A refinement series: levels of one parameter, the cheapest first.
 
-    ``formal`` is the highest order that an extrapolation may use; knobs of one ``family`` lead to the same limit.
-    ``own`` is the place of the scene's own setting, -1 where that is no level.
+    ``formal`` is the highest order that an extrapolation may use; parameters of one ``family`` lead to the same limit.
+    ``own`` is the place of the scene's own setting, -1 where that is no level. ``evaluation`` parameters leave the
+    contact as it is.
     """
 
     name: str
     long_name: str
     levels: tuple[Level, ...]
-    own: int
+    own: int = -1
     formal: float = math.nan
     family: str = ""
+    evaluation: bool = False
 
 
 @dataclass(frozen=True)
 class Skipped:
     """A level that is not measured, and why."""
 
-    knob: str
+    parameter: str
     level: str
     reason: str
 
 
-def contact_knobs(scene: Scene) -> tuple[list[Knob], list[Skipped]]:
-    """Knobs of a scene's contact solve; every level is a scene that its checks accept."""
-    made = [*_pad_meshes(scene), *_object_mesh(scene), _tolerance(scene), _steps(), _collocation(scene)]
-    made += list(_effects(scene))
-    knobs, skipped = [], []
-    for knob in made:
-        own = scene.digest
+def contact_parameters(scene: Scene) -> tuple[list[Parameter], list[Skipped]]:
+    """Discretisation parameters of a scene; every level is a scene that its checks accept."""
+    made = [*_pad_meshes(scene), *_object_mesh(scene), _tolerance(scene), _load_steps(), _collocation()]
+    parameters, skipped = [], []
+    for parameter in (*made, *_effects(scene)):
         good: list[Level] = []
-        for level in knob.levels:
-            reason = refusal(scene, level)
-            if reason:
-                skipped.append(Skipped(knob.name, level.name, reason))
+        for level in parameter.levels:
+            if reason := refusal(scene, level):
+                skipped.append(Skipped(parameter.name, level.name, reason))
             else:
                 good.append(replace(level, work=weight(with_level(scene, level)) / weight(scene)))
-        place = next((i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == own), -1)
+        own = (i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == scene.digest)
         if len(good) > 1:
-            knobs.append(Knob(knob.name, knob.long_name, tuple(good), place, knob.formal, knob.family))
-    return knobs, skipped
+            parameters.append(replace(parameter, levels=tuple(good), own=next(own, -1)))
+    return parameters, skipped
 
 
-def with_level(scene: Scene, *levels: Level) -> Scene:
-    """The scene, without its sweep, with the values of some levels."""
-    return scene.with_values({key: value for level in levels for key, value in level.values})
+def with_level(scene: Scene, level: Level) -> Scene:
+    """The scene, without its sweep, with the values of a level."""
+    return scene.with_values(dict(level.values))
 
 
 def refusal(scene: Scene, level: Level) -> str:
@@ -124,14 +126,15 @@ def refusal(scene: Scene, level: Level) -> str:
     return ""
 
 
+def value_of(scene: Scene, key: str) -> Any:
+    """Value of a dotted key of a scene."""
+    section, _, name = key.partition(".")
+    return getattr(getattr(scene, section), name)
+
+
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
-    from softjaw.study.run.plan import wall_size
-
-    times = 1.0
-    for key, levels in DEARER.items():
-        section, _, name = key.partition(".")
-        times *= levels.get(getattr(getattr(scene, section), name), 1.0)
+    times = math.prod(levels.get(value_of(scene, key), 1.0) for key, levels in DEARER.items())
     if has_wall(scene.object) and scene.effects.object != "rigid" and (wall := wall_size(scene)):
         return times * float(wall.pad + wall.shell) ** WEIGHT_POWER
     per_side = {"hex8": 1, "hex27": 2}[scene.gripper.element]
@@ -153,28 +156,26 @@ def elements(count: Sequence[int], factor: float) -> tuple[int, int, int]:
     return (_even(factor * count[0]), _even(factor * count[1]), max(2, math.floor(factor * count[2] + 0.5)))
 
 
-def _pad_meshes(scene: Scene) -> Iterable[Knob]:
+def _pad_meshes(scene: Scene) -> Iterable[Parameter]:
     """Both kinds of elements; a triquadratic mesh has the nodes of a trilinear one of twice as many along a side."""
     own, kind = scene.gripper.elements, scene.gripper.element
     trilinear = own if kind == "hex8" else elements(own, 2.0)
-    yield _pad_mesh("pad mesh, hex8", "trilinear elements of the pad", "hex8", trilinear, HEX8, 2.0)
-    yield _pad_mesh("pad mesh, hex27", "triquadratic elements of the pad", "hex27",
-                    own if kind == "hex27" else trilinear, HEX27, 3.0)  # fmt: skip
+    yield _pad_mesh("hex8", "trilinear", trilinear, HEX8, 2.0)
+    yield _pad_mesh("hex27", "triquadratic", own if kind == "hex27" else trilinear, HEX27, 3.0)
 
 
-def _pad_mesh(
-    name: str, long_name: str, kind: str, own: Sequence[int], factors: Sequence[float], formal: float
-) -> Knob:
+def _pad_mesh(kind: str, degree: str, own: Sequence[int], factors: Sequence[float], formal: float) -> Parameter:
     counts = sorted({elements(own, f) for f in factors}, key=math.prod)
     levels = tuple(
         Level(" x ".join(map(str, n)), (("gripper.elements", list(n)), ("gripper.element", kind)),
               math.prod(n) ** (-1 / 3))
         for n in counts
     )  # fmt: skip
-    return Knob(name, long_name, levels, -1, formal, "pad mesh")
+    name, long_name = f"pad mesh, {kind}", f"{degree} elements of the pad"
+    return Parameter(name, long_name, levels, formal=formal, family="pad mesh")
 
 
-def _object_mesh(scene: Scene) -> Iterable[Knob]:
+def _object_mesh(scene: Scene) -> Iterable[Parameter]:
     """The wall's mesh, or the grid on which a mesh's distance is sampled; other objects are exact."""
     if has_wall(scene.object) and scene.effects.object != "rigid":
         least, most = WallSize.__metadata__[0].metadata[0].ge, WallSize.__metadata__[0].metadata[1].le
@@ -185,38 +186,39 @@ def _object_mesh(scene: Scene) -> Iterable[Knob]:
                   tuple((f"accuracy.{k}", s) for k, s in zip(keys, size, strict=True)), f)
             for f, size in zip(WALL, sizes, strict=True)
         ]  # fmt: skip
-        yield Knob("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), -1, 2.0)
+        yield Parameter("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), formal=2.0)
     elif scene.object.shape == "mesh":
         own = scene.object.grid_step_mm
         start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
         steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
         levels = [Level("auto" if s == "auto" else f"{s:.3g} mm", (("object.grid_step_mm", s),),
                         start if s == "auto" else s) for s in steps]  # fmt: skip
-        yield Knob("object grid", "step of the grid on which the object's distance is sampled", tuple(levels), -1, 2.0)
+        long_name = "step of the grid on which the object's distance is sampled"
+        yield Parameter("object grid", long_name, tuple(levels), formal=2.0)
 
 
-def _tolerance(scene: Scene) -> Knob:
-    own = scene.accuracy.residual_tolerance
-    key = "accuracy.residual_tolerance"
-    levels = [Level(f"{t:g}", ((key, t),)) for t in sorted({*TOLERANCES, own}, reverse=True)]
-    return Knob("solver tolerance", "residual over load at which a contact solve ends", tuple(levels), -1)
+def _tolerance(scene: Scene) -> Parameter:
+    tolerances = sorted({*TOLERANCES, scene.accuracy.residual_tolerance}, reverse=True)
+    levels = tuple(Level(f"{t:g}", (("accuracy.residual_tolerance", t),)) for t in tolerances)
+    return Parameter("solver tolerance", "residual over load at which a contact solve ends", levels)
 
 
-def _steps() -> Knob:
+def _load_steps() -> Parameter:
     levels = (
         Level("one after the other"), Level("each from scratch", between=EACH_ALONE), Level("1 between", between=1),
         Level("3 between", between=3),
     )  # fmt: skip
-    return Knob("load steps", "forces solved on the way to each force", levels, -1)
+    return Parameter("load steps", "forces solved on the way to each force", levels)
 
 
-def _collocation(scene: Scene) -> Knob:
+def _collocation() -> Parameter:
     levels = tuple(Level(rule, (("accuracy.contact", rule),)) for rule in ("nodal", "weighted"))
-    return Knob("gap collocation", "gaps that vanish at nodes, or on average round them", levels, -1, family="pad mesh")
+    long_name = "gaps that vanish at nodes, or on average round them"
+    return Parameter("gap collocation", long_name, levels, family="pad mesh")
 
 
-def _effects(scene: Scene) -> Iterable[Knob]:
-    """One knob for every effect with levels to choose from, in the order of `study.quantities.EFFECTS`."""
+def _effects(scene: Scene) -> Iterable[Parameter]:
+    """A parameter for every effect with levels to choose from, in the order of `study.quantities.EFFECTS`."""
     for name, field in Effects.model_fields.items():
         levels = [level for level in get_args(field.annotation) if level != "auto"]
         if name in OWN or len(levels) < 2 or (name == "object" and not has_wall(scene.object)):
@@ -225,25 +227,21 @@ def _effects(scene: Scene) -> Iterable[Knob]:
         ranked = sorted(levels, key=lambda v: order.index(v.split("_")[0]) if v.split("_")[0] in order else len(order))
         if name == "object":  # chosen for every candidate, at most the finest
             ranked.insert(-1, "auto")
-        steps = [Level(v.replace("_", " "), ((f"effects.{name}", v),)) for v in ranked]
-        yield Knob(f"effect: {name.replace('_', ' ')}", "level of the effect", tuple(steps), -1)
+        steps = tuple(Level(v.replace("_", " "), ((f"effects.{name}", v),)) for v in ranked)
+        yield Parameter(f"effect: {name.replace('_', ' ')}", "level of the effect", steps)
 
 
-# --- knobs that change what is made of a contact, and not the contact ------------------------------------------------
-
-
-def judging_knobs(scene: Scene) -> dict[str, list[str]]:
-    """Levels of every knob, the cheapest first; the last is the reference."""
-    samples = sorted({*SAMPLES, scene.limit_surface.samples})
-    return {
+def evaluation_parameters(scene: Scene) -> list[Parameter]:
+    """Parameters of what is computed from a solved contact; the last level is the reference solution."""
+    series = {
         "contact model": [WINKLER, "finite elements, planar", "finite elements, curved"],
-        "motions sampled": [str(n) for n in samples],
-        "limit surface": [*(name for name, *_ in SURFACES), f"hull of {HULL} wrenches"],
+        "motions sampled": [str(n) for n in sorted({*SAMPLES, scene.limit_surface.samples})],
+        "limit surface": [*SURFACES, f"hull of {HULL} wrenches"],
         "score": [*POINTS, "exact"],
     }
+    return [Parameter(name, "", tuple(map(Level, levels)), evaluation=True) for name, levels in series.items()]
 
 
-def expected_seconds(knob: str, level: str) -> float:
-    """Rough time of one case [s], before anything is measured."""
-    slow = {"hull of 20 points": 0.5, "hull of 50 points": 5.0}
-    return slow.get(level, 0.03) * (1 if knob == "score" else 2)
+def expected_seconds(parameter: str, level: str) -> float:
+    """Rough time of one case of an evaluation parameter [s], before anything is measured."""
+    return SLOW.get(level, 0.03) * (1 if parameter == "score" else 2)
