@@ -42,8 +42,8 @@ DOORS = {
         "study/result/vtkhdf.py",
         "study/accuracy/cost_study.py",
     },
-    "pyvista": PICTURES | {"study/patch/reading.py"},
-    "vtkmodules": PICTURES | {"study/patch/reading.py"},
+    "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
+    "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},
 }
 # Folders of study, and modules directly in it, the lowest first: each imports only what stands before it, so that there
 # is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; preparation

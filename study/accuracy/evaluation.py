@@ -20,7 +20,7 @@ from softjaw.study.accuracy.parameters import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, volume_in_pose
+from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, soft, volume_in_pose
 from softjaw.study.case.probes import Probe, winkler_pad
 from softjaw.study.case.solving import solver
 from softjaw.study.quantities import MODELS
@@ -111,15 +111,15 @@ def _ellipsoids(contacts: list[Contact]) -> list[EllipsoidBody]:
 
 def _with_bodies(found: SolvedProbe, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
     """Quantities with the exact quality of any bodies in the pose that the contacts have."""
-    return np.array([*_limits(contacts, "ccm"), volume_in_pose(contacts, bodies, found.settings)])
+    volume = volume_in_pose(soft(contacts, bodies), found.settings.arms, found.settings.torques)
+    return np.array([*_limits(contacts, "ccm"), volume])
 
 
 def _with_hulls(found: SolvedProbe, contacts: list[Contact], points: int | None) -> FloatArray:
     """Quantities with the quality by hulls in six dimensions, of so many points on each ellipsoid."""
     settings = found.settings
-    soft = [c.soft(body) for c, body in zip(contacts, _ellipsoids(contacts), strict=True)]
     cones = []
-    for contact in linearised_contacts(soft, points, settings.torques):
+    for contact in linearised_contacts(soft(contacts, _ellipsoids(contacts)), points, settings.torques):
         V = contact.body.vertices
         loads = contact.wrench_map(settings.arms, settings.torques, np.zeros(3))
         cones.append(np.vstack([np.zeros(6), np.hstack([np.ones((len(V), 1)), V]) @ loads.T]))

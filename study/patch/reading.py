@@ -2,39 +2,39 @@
 
 from __future__ import annotations
 
+import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softjaw.friction.orientation import slivers
-from softjaw.friction.patch import ContactPatch, FloatArray
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
-from softjaw.study.scene.problems import Problem, closest
+from softjaw.friction.patch import FloatArray
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, shortened
+from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
+from softjaw.study.result.trial import trouble
+from softjaw.study.scene.problems import Problem, shown
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes
 MOST_FACES = 500_000
-MOST_PROBLEMS = 10  # reported of one file
 FACTORS = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "area": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
     "pressure": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm2": 1e6},
     "number": {"-": 1.0, "1": 1.0},
 }
+OPTIONS = {"length": ("--unit", "mm", "mm"), "area": ("--unit", "mm2", "mm"),
+           "pressure": ("--pressure-unit", "kpa", "kpa")}  # fmt: skip
 CENTRE, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
 CORNERS = tuple(f"{axis}{k}" for k in (1, 2, 3, 4) for axis in "xyz")
 KINDS = dict.fromkeys((*CENTRE, *CORNERS), "length") | dict.fromkeys(NORMAL, "number")
 KINDS |= {"area": "area", "pressure": "pressure"}
 ALIASES = {f"{stem}_{axis}": f"n{axis}" for stem in ("n", "normal") for axis in "xyz"}
 HEADER = re.compile(r"(?P<name>.*?)\s*(?:_(?P<tail>[^_\s\[\]()]+)|[\[(](?P<boxed>[^\[\]()]*)[\])])?")
-TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9  # VTK's cell types
-LARGEST = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa")}  # beyond is no contact on earth
-LONGEST_NORMAL, LEAST_LOAD = 1e6, 1e-12  # -, N
+MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
 
 
 @dataclass(frozen=True)
@@ -64,21 +64,6 @@ class Reading:
         return {"length": self.unit, "area": area, "pressure": self.pressure_unit, "number": "-"}[kind]
 
 
-@dataclass(frozen=True, eq=False)
-class ReadPatch:
-    """The loaded faces of a file as a patch [m, Pa].
-
-    ``faces`` counts all faces; ``place`` gives the words for the place of a loaded face, ``line 7`` or ``cell 3``;
-    ``notes`` say what the reader of the answer should know about the file.
-    """
-
-    file: str
-    patch: ContactPatch
-    faces: int
-    place: Callable[[int], str]
-    notes: tuple[str, ...] = ()
-
-
 def read_patch(file: str, reading: Reading) -> ReadPatch:
     """The patch in a file, in the file's coordinates.
 
@@ -95,7 +80,7 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     try:
         size = path.stat().st_size
         if not path.is_file():  # a device or a pipe may have no end
-            raise StudyError(OTHER_FILE, f"{file}: is no regular file; name the file of a patch")
+            raise StudyError(OTHER_FILE, f"{file}: not a regular file; name the file of a patch")
         path.open("rb").close()
     except OSError as error:
         raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
@@ -103,29 +88,23 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
         text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
         raise StudyError(USAGE, f"{text}; export the contact surface alone")
     if ending == ".csv":
-        from softjaw.study.patch.table import read_table
+        return checked(_read_table(path, reading), reading.flip_normals)
+    from softjaw.study.patch.vtk_faces import read_vtk  # slow to import, and not needed for tables
 
-        return checked(read_table(path, reading), reading.flip_normals)
-    from softjaw.study.result.trial import trouble
-
-    if why := trouble(lambda: _read_vtk(path, reading)):  # VTK may not survive the file
-        raise StudyError(OTHER_FILE, f"{path}: is damaged ({why}); write it again")
-    return checked(_read_vtk(path, reading), reading.flip_normals)
+    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
+        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
+    return checked(read_vtk(path, reading), reading.flip_normals)
 
 
-def refuse(problems: Sequence[Problem]) -> None:
-    """Raise if there are problems, naming the first of them."""
-    if problems:
-        lines = [str(p) for p in problems[:MOST_PROBLEMS]]
-        if len(problems) > len(lines):
-            lines.append(f"{problems[0].file}: and {len(problems) - len(lines)} more")
-        raise StudyError(USAGE, "\n".join(lines))
+def refused(path: Path, line: int | None, key: str, found: str, expected: str, remedy: str) -> StudyError:
+    """The error of a single problem of a file."""
+    return StudyError(USAGE, str(Problem(str(path), line, key, found, expected, remedy)))
 
 
-def check_count(file: object, count: int) -> None:
+def check_count(path: Path, count: int) -> None:
     """Refuse more faces than a patch may have, before they are read."""
     if count > MOST_FACES:
-        text = f"{file}: found {count} faces, expected at most {MOST_FACES}; export the contact surface alone"
+        text = f"{path}: found {count} faces, expected at most {MOST_FACES}; export the contact surface alone"
         raise StudyError(USAGE, text)
 
 
@@ -155,236 +134,124 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
     return (name, unit) if known else None
 
 
-# --- VTK --------------------------------------------------------------------------------------------------------------
+# --- table ------------------------------------------------------------------------------------------------------------
 
 
-def _read_vtk(path: Path, reading: Reading) -> Faces:
-    """Faces of a VTU or VTP file of triangles and quadrilaterals.
+def _read_table(path: Path, reading: Reading) -> Faces:
+    """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
+    numbers, (headers, *cells) = _rows(path)
+    headers = [header.strip() for header in headers]
+    found = [split_header(header, reading.pressure_name) for header in headers]
+    position = {pair[0]: i for i, pair in enumerate(found) if pair}
+    twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(found)
+             if pair and position[pair[0]] != i]  # fmt: skip
+    refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
+            for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
+    needed = _needed(position)
+    units = {name: found[position[name]][1] or reading.unit_of(KINDS[name]) for name in needed}
+    bare = [name for name in needed if units[name] is None]
+    refuse([_without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
+            for kind in dict.fromkeys(KINDS[name] for name in bare)])  # fmt: skip
+    values = _numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
+    with np.errstate(over="ignore"):  # what is not finite is reported with its place
+        values = {name: FACTORS[KINDS[name]][units[name]] * row for name, row in values.items()}
+    unused = [h for pair, h in zip(found, headers, strict=True) if pair and pair[0] not in needed]
+    unused += [h for pair, h in zip(found, headers, strict=True) if pair is None]
+    notes = (f"not used of {path}: {', '.join(unused)}",) if unused else ()
+    stacked = {names: np.stack([values[name] for name in names], axis=-1) for names in (CENTRE, NORMAL)
+               if names[0] in values}  # fmt: skip
+    corners = None
+    if CORNERS[0] not in values:
+        geometry = stacked[CENTRE], values["area"], stacked[NORMAL]
+    else:
+        corners = np.stack([values[name] for name in CORNERS if name in values], axis=-1).reshape(len(cells), -1, 3)
+        if corners.shape[1] == 4:  # a triangle leaves its fourth corner empty
+            corners[:, 3] = np.where(np.isnan(corners[:, 3]).all(axis=1)[:, None], corners[:, 2], corners[:, 3])
+        centroid, area, normal = corner_geometry(corners)
+        geometry = centroid, area, stacked.get(NORMAL, normal)
+    return Faces(str(path), lambda i: f"line {numbers[i + 1]}", *geometry, values["pressure"], corners, notes)
 
-    The pressure is a scalar array of the cells, or one of the points, whose mean over its corners a face takes.
-    Normals are the cells' array ``Normals`` if there is one, and follow from the order of the corners otherwise.
-    """
-    grid = _grid(path)
-    if reading.unit is None:
-        refuse([Problem(str(path), None, "coordinates", "no unit, which these files never have", "a unit of length",
-                        "add --unit mm, or m or cm: units are not guessed")])  # fmt: skip
-    ids = _corner_ids(path, grid)
-    if ids.min() < 0 or ids.max() >= grid.n_points:
-        raise StudyError(OTHER_FILE, f"{path}: a cell refers to a point that does not exist; write the file again")
-    name, values, at_points = _pressure_array(path, grid, reading)
-    unit = (split_header(name, reading.pressure_name) or ("", None))[1] or reading.pressure_unit
-    if unit is None:
-        refuse([Problem(str(path), None, name, "no unit", "a unit of pressure",
-                        f"add --pressure-unit kpa, or name the array {name}_kpa: units are not guessed")])  # fmt: skip
-    if len(values) != (grid.n_points if at_points else len(ids)):
-        text = f"'{name}' has {len(values)} values for {len(ids)} cells"
-        raise StudyError(OTHER_FILE, f"{path}: damaged ({text}); write it again")
-    with np.errstate(all="ignore"):  # what is not finite is reported with its place
-        corners = FACTORS["length"][reading.unit] * np.asarray(grid.points).astype(float)[ids]
-        pressure = FACTORS["pressure"][unit] * values.astype(float)
-    notes: tuple[str, ...] = ()
-    if at_points:
-        pressure = _mean_over_corners(pressure[ids], ids)
-        notes = (f"{path}: '{name}' belongs to the points; every face takes the mean of its corners",)
-    centroid, area, normal = corner_geometry(corners)
-    for key, array in grid.cell_data.items():
-        if key.lower() in ("normals", "normal") and array.shape == normal.shape:
-            normal = np.asarray(array).astype(float)
-            break
-    return Faces(str(path), lambda i: f"cell {i}", centroid, area, normal, pressure, corners, notes)
 
-
-def _grid(path: Path) -> Any:
-    """The data set of a file as an unstructured grid; VTK's own complaints become one sentence."""
-    import pyvista as pv  # slow to import, and not needed for tables
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-
-    # VTK writes its complaints past Python's streams
-    before, complaints = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
-    vtkOutputWindow.SetInstance(complaints)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
+    """Numbers of the lines that are neither empty nor comments, and their cells."""
     try:
-        reader = pv.get_reader(path).reader
-        able = reader.CanReadFile(str(path))
-        if able:
-            reader.Update()
-    finally:
-        vtkOutputWindow.SetInstance(before)
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
-    grid = pv.wrap(reader.GetOutput())
-    if not able or complaints.GetOutput() or grid is None:
-        kind = path.suffix[1:].upper()
-        raise StudyError(OTHER_FILE, f"{path}: is damaged or no {kind} file; write it again, from ParaView as {kind}")
-    if isinstance(grid, pv.PolyData):
-        grid = grid.cast_to_unstructured_grid()
-    check_count(path, grid.n_cells)
-    if grid.n_cells == 0:
-        refuse([Problem(str(path), None, "cells", "none", "triangles or quadrilaterals",
-                        "export the contact surface with its cells")])  # fmt: skip
-    return grid
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise StudyError(OTHER_FILE, f"{path}: no text file; export the patch as CSV, VTU or VTP") from error
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        found, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
+        raise refused(path, None, "", found, expected, f"write {MINIMAL}")
+    check_count(path, len(lines) - 1)
+    mark = max(",;\t", key=lines[0][1].count)
+    rows = []
+    for number, line in lines:  # one by one: no quotation mark may swallow the lines behind it
+        try:
+            rows += csv.reader([line], delimiter=mark, strict=True)
+        except csv.Error as error:
+            remedy = "write numbers with a decimal point, without quotation marks"
+            raise refused(path, number, "", f"a line that is no table ({error})", "cells", remedy) from error
+    return [k for k, _ in lines], rows
 
 
-def _corner_ids(path: Path, grid: Any) -> NDArray[np.int64]:
-    """Point numbers around every cell ``(n, k)``, k = 3 or 4; triangles among quadrilaterals repeat the last."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    kinds, points = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity)
-    start = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
-    sizes = np.diff(start)
-    # ParaView writes rectangles of image data as pixels, whose corners go line by line
-    flat = np.isin(kinds, (TRIANGLE, QUAD, PIXEL)) | ((kinds == POLYGON) & (sizes >= 3) & (sizes <= 4))
-    if not flat.all():
-        i = int(np.argmin(flat))
-        name = grid.GetCell(i).GetClassName().removeprefix("vtk")
-        remedy = "in ParaView, extract the surface (Extract Surface), triangulate it (Triangulate) and save that"
-        refuse([Problem(str(path), None, f"cell {i}", f"a {name} of {sizes[i]} points",
-                        "triangles and quadrilaterals only", remedy)])  # fmt: skip
-    order = np.minimum(np.arange(sizes.max()), sizes[:, None] - 1)
-    if (kinds == PIXEL).any():
-        order[kinds == PIXEL] = [0, 1, 3, 2]
-    return points[start[:-1, None] + order].astype(np.int64)
+def _needed(names: Any) -> list[str]:
+    """Quantities that are read: corners and what goes with them if there are any."""
+    if CORNERS[0] in names:
+        return [*CORNERS[:9], *(n for n in (*CORNERS[9:], *NORMAL) if n in names), "pressure"]
+    return [*CENTRE, "area", *NORMAL, "pressure"]
 
 
-def _pressure_array(path: Path, grid: Any, reading: Reading) -> tuple[str, NDArray[Any], bool]:
-    """Name and values of the scalar array that holds the pressure, and whether it belongs to the points."""
-    names: list[str] = []
-    for at_points, data in ((False, grid.cell_data), (True, grid.point_data)):  # cells come first
-        for name, array in data.items():
-            if np.ndim(array) == 1:
-                names.append(name)
-                if (split_header(name, reading.pressure_name) or ("",))[0] == "pressure":
-                    return name, np.asarray(array), at_points
-    wanted = reading.pressure_name or "pressure"
-    remedy = f"give its name with --pressure-name {closest(wanted, names) or (names[0] if names else 'NAME')}"
-    found = f"the arrays {', '.join(names)}" if names else "no array of scalars"
-    refuse([Problem(str(path), None, wanted, found, "the pressure", remedy)])
-    raise AssertionError
+def _missing(path: Path, headers: Sequence[str], names: Any, reading: Reading) -> list[Problem]:
+    wanted = _needed(names)
+    for group in (CORNERS[9:], NORMAL):  # all or none of them
+        wanted += group if any(n in names for n in group) else ()
+    absent = [name for name in dict.fromkeys(wanted) if name not in names]
+    if not absent:
+        return []
+    remedy = f"name the columns, for example {MINIMAL}"
+    if all(map(_is_number, headers)):
+        return [Problem(str(path), 1, "", "numbers and no column names", "column names in the first line", remedy)]
+    if absent == ["pressure"]:
+        named = f"called {reading.pressure_name}" if reading.pressure_name else "named pressure"
+        remedy = f"no column is {named}: give the column's name with --pressure-name"
+    units = ", ".join(unit for kind, factors in FACTORS.items() if kind != "number" for unit in factors)
+    found = f"the columns {shortened(', '.join(headers), 300)}"
+    return [Problem(str(path), 1, "", found, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
 
 
-def _mean_over_corners(values: FloatArray, ids: NDArray[np.int64]) -> FloatArray:
-    """Mean over the corners of each face, ``(n, k) -> (n,)``; a repeated last corner counts once."""
-    triangle = ids[:, -1] == ids[:, 2]
-    return np.where(triangle, values[:, :3].mean(axis=1), values.mean(axis=1))
+def _without_unit(path: Path, kind: str, headers: Sequence[str]) -> Problem:
+    option, suffix, unit = OPTIONS[kind]
+    remedy = f"write {headers[0]}_{suffix}, or add {option} {unit}: units are not guessed"
+    return Problem(str(path), 1, ", ".join(headers), "no unit", f"a unit of {kind}", remedy)
 
 
-# --- faces ------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Faces:
-    """Faces of a file in SI units, not yet checked.
-
-    Parameters
-    ----------
-    file : str
-    place : callable
-        Words for the place of face ``i`` in the file.
-    centroid, normal : (n, 3) array
-        Centres [m] and normals of any length [-].
-    area, pressure : (n,) array
-        Areas [m^2] and pressures [Pa].
-    corners : (n, k, 3) array or None
-        Corners in order around each face [m].
-    notes : tuple of str
-    """
-
-    file: str
-    place: Callable[[int], str]
-    centroid: FloatArray
-    area: FloatArray
-    normal: FloatArray
-    pressure: FloatArray
-    corners: FloatArray | None = None
-    notes: tuple[str, ...] = ()
-
-    def problems(
-        self, wrong: NDArray[np.bool_], key: str, found: Callable[[int], str], expected: str, remedy: str
-    ) -> list[Problem]:
-        """A problem for every face that is wrong ``(n,)``."""
-        places = np.flatnonzero(wrong).tolist()
-        return [Problem(f"{self.file}, {self.place(i)}", None, key, found(i), expected, remedy) for i in places]
-
-
-def corner_geometry(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres, areas and normals of plane faces from their corners.
-
-    Parameters
-    ----------
-    corners : (n, k, 3) array
-        Three or four corners around each face; a triangle among quadrilaterals repeats its last corner [m].
-
-    Returns
-    -------
-    centroid : (n, 3) array
-        Mean of the corners [m].
-    area : (n,) array
-        Half the product of the diagonals [m^2].
-    normal : (n, 3) array
-        By the right-hand rule; zero for a face without area.
-    """
-    q = corners
-    last = q.shape[1] - 1
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later, with its place
-        vector = 0.5 * np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1])
-        area = np.linalg.norm(vector, axis=1)
-        triangle = (q[:, last] == q[:, 2]).all(axis=1)
-        centroid = np.where(triangle[:, None], q[:, :3].mean(axis=1), q.mean(axis=1))
-        return centroid, area, vector / np.where(area > 0, area, 1.0)[:, None]
-
-
-def checked(faces: Faces, flip: bool = False) -> ReadPatch:
-    """The loaded faces as a contact patch; all that is wrong with them at once, by their places in the file."""
-    refuse([*_not_finite(faces), *_out_of_range(faces)])
-    # corners on one line give an area of rounding, which is none either
-    flat = faces.area == 0 if faces.corners is None else (faces.area == 0) | slivers(faces.corners)
-    loaded = (faces.pressure > 0) & ~flat
-    refuse(_unusable(faces, loaded, flat))
-    normal = -faces.normal if flip else faces.normal
-    corners = None if faces.corners is None else faces.corners[loaded]
-    patch = ContactPatch(faces.centroid[loaded], faces.area[loaded], normal[loaded], faces.pressure[loaded], corners)
-    kept = np.flatnonzero(loaded).tolist()
-    return ReadPatch(faces.file, patch, len(loaded), lambda i: faces.place(kept[i]), faces.notes)
-
-
-def _not_finite(faces: Faces) -> list[Problem]:
+def _numbers(
+    path: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], headers: Sequence[str], position: dict[str, int]
+) -> dict[str, FloatArray]:
+    """Values of the columns at some positions, as they stand there; a fourth corner may be empty (NaN)."""
     problems = []
-    for key in ("centroid", "area", "normal", "pressure", "corners"):
-        value = getattr(faces, key)
-        if value is not None:
-            rows = value.reshape(len(value), -1)
-            first = rows[np.arange(len(rows)), (~np.isfinite(rows)).argmax(axis=1)]
-            problems += faces.problems(~np.isfinite(rows).all(axis=1), key, lambda i, first=first: f"{first[i]:g}",
-                                       "finite numbers", "repair the export or leave the face out")  # fmt: skip
-    return problems
+    values = {name: np.full(len(rows), np.nan) for name in position}
+    for i, (line, cells) in enumerate(zip(numbers, rows, strict=True)):
+        if len(cells) != len(headers):
+            found, expected = f"{len(cells)} cells", f"{len(headers)} as in the line of names"
+            remedy = "complete the line; write numbers with a decimal point, not a comma"
+            problems.append(Problem(str(path), line, "", found, expected, remedy))
+            continue
+        for name, k in position.items():
+            cell = cells[k].strip()
+            if _is_number(cell):
+                values[name][i] = float(cell)
+            elif cell or name not in CORNERS[9:]:
+                comma = "," in cell and "." not in cell
+                remedy = "write a decimal point" if comma else "repair the cell or leave the face out"
+                found = shown(cell) if cell else "an empty cell"
+                problems.append(Problem(str(path), line, headers[k], found, "a finite number", remedy))
+    refuse(problems)
+    return values
 
 
-def _out_of_range(faces: Faces) -> list[Problem]:
-    """Negative pressures and areas, and numbers of no contact on earth, which would overflow further on."""
-    pressure, area, length = faces.pressure, faces.area, np.abs(faces.normal).max(axis=1)
-    adhesion = (pressure <= 0).all() and (pressure < 0).any()
-    remedy = "change the sign of the column" if adhesion else "set faces that do not press to 0"
-    problems = faces.problems(pressure < 0, "pressure", lambda i: f"{pressure[i]:g} Pa",
-                              "a pressure of 0 or more, positive in compression", remedy)  # fmt: skip
-    problems += faces.problems(area < 0, "area", lambda i: f"{area[i]:g} m^2", "an area of 0 or more",
-                               "the normal alone gives the direction of a face")  # fmt: skip
-    for key, (most, unit) in LARGEST.items():
-        size = np.abs(getattr(faces, key)).reshape(len(area), -1).max(axis=1)
-        problems += faces.problems(size > most, key, lambda i, size=size, unit=unit: f"{size[i]:g} {unit}",
-                                   f"at most {most:g} {unit}", "check the unit")  # fmt: skip
-    astray = (length > LONGEST_NORMAL) | ((length > 0) & (length < 1 / LONGEST_NORMAL))
-    return problems + faces.problems(astray, "normal", lambda i: f"a length of about {length[i]:g}", "a length of 1",
-                                     "normalise it")  # fmt: skip
-
-
-def _unusable(faces: Faces, loaded: NDArray[np.bool_], flat: NDArray[np.bool_]) -> list[Problem]:
-    """No load at all, pressure on faces without area, load on faces without normal."""
-    problems = []
-    if not loaded.any() or (faces.pressure * faces.area).sum() <= LEAST_LOAD:
-        problems.append(Problem(faces.file, None, "pressure", f"{len(loaded)} faces and no load on any",
-                                "a face with an area and a pressure above 0",
-                                "zero normal force, so no friction: export a loaded state"))  # fmt: skip
-    problems += faces.problems(flat & (faces.pressure > 0), "area", lambda i: f"0 under {faces.pressure[i]:g} Pa",
-                               "an area above 0 where there is pressure",
-                               "correct the face or set its pressure to 0")  # fmt: skip
-    return problems + faces.problems(loaded & ~faces.normal.any(axis=1), "normal", lambda i: "0, 0, 0", "a direction",
-                                     "recompute the normals or give corners instead of them")  # fmt: skip
+def _is_number(cell: str) -> bool:
+    try:
+        return bool(np.isfinite(float(cell)))
+    except ValueError:
+        return False
