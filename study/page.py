@@ -95,7 +95,7 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
     shown = [dict(zip(("anchor", "heading", "blocks"), s, strict=True)) for s in sections if s[2]]
     own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")]
-    drawn = any(block["kind"] == "plot" for s in shown for block in s["blocks"])
+    drawn = any(block["kind"] == "plot" for _, _, blocks in sections for block in blocks)
     scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if drawn else []
     return made.get_template("page.html").render(
         title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)

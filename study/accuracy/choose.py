@@ -136,7 +136,7 @@ def unchanged(target: float, note: str, seconds: float = math.nan) -> Choice:
 
 def explicit(scene: Scene) -> dict[str, Any]:
     """Keys that the scene gives itself, but for those that say ``auto``, and those that it sweeps."""
-    given = {}
+    given: dict[str, Any] = {}
     for name in ("object", "gripper", "effects", "accuracy"):
         section = getattr(scene, name)
         given |= {f"{name}.{key}": getattr(section, key) for key in section.model_fields_set}

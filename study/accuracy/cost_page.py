@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -67,7 +67,7 @@ def cost_page(study: CostStudy, tables: Sequence[ParameterErrors]) -> tuple[str,
     return page(f"What accuracy costs: {study.title}", subtitle, sections), png
 
 
-def _front(study: CostStudy, best: Sequence[Combination]) -> Iterable[Block]:
+def _front(study: CostStudy, best: Sequence[Combination]) -> list[Block]:
     rows = [[seconds_text(c.seconds), f"{c.seconds / study.base_seconds:.2g}", percent(c.error),
              settings(dict(c.level.values))] for c in best[:MOST_SHOWN]]  # fmt: skip
     head = ("CPU per case", "over the scene's", "predicted error of e_n", "settings")
@@ -75,7 +75,7 @@ def _front(study: CostStudy, best: Sequence[Combination]) -> Iterable[Block]:
     return [table("Pareto front, the cheapest first", head, rows, texts=(0,), wide=(3,)), text(FRONT + more, "note")]
 
 
-def _parameter(errors: ParameterErrors) -> Iterable[Block]:
+def _parameter(errors: ParameterErrors) -> list[Block]:
     """Everything that the page says of one parameter."""
     with_own = any(np.isfinite(level.own) for level in errors.levels)
     long_name = errors.parameter.long_name

@@ -180,7 +180,8 @@ def new_study(scene: Scene, probes: Sequence[Any], title: str, scene_file: str) 
 
 def plain(scene: Scene) -> Scene:
     """The scene without its sweep and its target: what the settings are compared with."""
-    return scene.with_values({"accuracy.e_n": None, "accuracy.cost_file": None})
+    target: dict[str, Any] = {"accuracy.e_n": None, "accuracy.cost_file": None}
+    return scene.with_values(target)
 
 
 def same(one: Any, other: Any) -> bool:
@@ -273,8 +274,8 @@ def save(path: Path, study: CostStudy) -> None:
             made = file.create_dataset(f"measurements/{name}", data=data, **kind)
             made.attrs.update(units=units or "", long_name=meaning)
         for i, column in enumerate(fields(Skipped)):
-            values = np.array([astuple(s)[i] for s in study.skipped], object)
-            file.create_dataset(f"skipped/{column.name}", data=values, dtype=TEXT)
+            texts = np.array([astuple(s)[i] for s in study.skipped], object)
+            file.create_dataset(f"skipped/{column.name}", data=texts, dtype=TEXT)
 
 
 def load(path: Path) -> CostStudy:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from softjaw.study.case.solving import solver
 from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
-Work = Callable[[list[Contact], float], FloatArray]
+Work = Callable[[Sequence[Contact], float], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class SolvedProbe:
 
     probe: Probe
     obj: Any
-    contacts: list[list[Contact]]
+    contacts: Sequence[Sequence[Contact]]
     seconds: float
 
     @property
@@ -99,23 +99,23 @@ def _evaluated(found: SolvedProbe, friction_model: str, score: str, **choice: An
     return lambda contacts, _: as_quantities(evaluate(contacts, settings)[0], friction_model, score)
 
 
-def _limits(contacts: list[Contact], name: str) -> tuple[float, float, float]:
+def _limits(contacts: Sequence[Contact], name: str) -> tuple[float, float, float]:
     """e_n, largest force and torque that the weaker finger carries."""
     own = [c.limits[name] for c in contacts]
     return min(x.e_n for x in own), max(min(x.f_x for x in own), min(x.f_y for x in own)), min(x.tau_z for x in own)
 
 
-def _ellipsoids(contacts: list[Contact]) -> list[EllipsoidBody]:
+def _ellipsoids(contacts: Sequence[Contact]) -> list[EllipsoidBody]:
     return [EllipsoidBody(c.ellipsoids["ccm"].semi_axes) for c in contacts]
 
 
-def _with_bodies(found: SolvedProbe, contacts: list[Contact], bodies: list[Any]) -> FloatArray:
+def _with_bodies(found: SolvedProbe, contacts: Sequence[Contact], bodies: list[Any]) -> FloatArray:
     """Quantities with the exact quality of any bodies in the pose that the contacts have."""
     volume = volume_in_pose(soft(contacts, bodies), found.settings.arms, found.settings.torques)
     return np.array([*_limits(contacts, "ccm"), volume])
 
 
-def _with_hulls(found: SolvedProbe, contacts: list[Contact], points: int | None) -> FloatArray:
+def _with_hulls(found: SolvedProbe, contacts: Sequence[Contact], points: int | None) -> FloatArray:
     """Quantities with the quality by hulls in six dimensions, of so many points on each ellipsoid."""
     settings = found.settings
     cones = []

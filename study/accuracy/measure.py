@@ -51,8 +51,8 @@ def measure(setting: str, probe: Probe, level: Level, repeats: int = REPEATS) ->
         found: dict[float, Case] = {}
         messages = []
         for forces in load_paths(probe.forces, level.between):
-            point = scene.with_values({"load.normal_force_n": list(forces)})
-            outcome, message = _solve_path(replace(probe.unit, scene=point), forces)
+            load: dict[str, Any] = {"load.normal_force_n": list(forces)}
+            outcome, message = _solve_path(replace(probe.unit, scene=scene.with_values(load)), forces)
             found |= outcome
             messages.append(message)
         return found, next(filter(None, messages), "")

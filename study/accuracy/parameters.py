@@ -23,6 +23,7 @@ HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side ov
 HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
+LIMITS = get_args(WallSize)[1].metadata  # of the sizes that a scene may give
 STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
 OWN = ("friction", "limit_surface")  # effects whose levels are evaluation parameters
 EACH_ALONE = -1
@@ -152,7 +153,7 @@ def elements(count: Sequence[int], factor: float) -> tuple[int, int, int]:
     ((10, 6, 3), (20, 10, 6))
     """
     if factor == 1.0:
-        return tuple(count)
+        return count[0], count[1], count[2]
     return (_even(factor * count[0]), _even(factor * count[1]), max(2, math.floor(factor * count[2] + 0.5)))
 
 
@@ -178,7 +179,7 @@ def _pad_mesh(kind: str, degree: str, own: Sequence[int], factors: Sequence[floa
 def _object_mesh(scene: Scene) -> Iterable[Parameter]:
     """The wall's mesh, or the grid on which a mesh's distance is sampled; other objects are exact."""
     if has_wall(scene.object) and scene.effects.object != "rigid":
-        least, most = WallSize.__metadata__[0].metadata[0].ge, WallSize.__metadata__[0].metadata[1].le
+        least, most = (getattr(limit, name) for limit, name in zip(LIMITS, ("ge", "le"), strict=True))
         keys = ("wall_around_mm", "wall_along_mm", "wall_coarse_mm")
         sizes = [[min(max(round(f * getattr(scene.accuracy, k), 3), least), most) for k in keys] for f in WALL]
         levels = [
@@ -191,8 +192,9 @@ def _object_mesh(scene: Scene) -> Iterable[Parameter]:
         own = scene.object.grid_step_mm
         start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
         steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
-        levels = [Level("auto" if s == "auto" else f"{s:.3g} mm", (("object.grid_step_mm", s),),
-                        start if s == "auto" else s) for s in steps]  # fmt: skip
+        sizes = {step: start if step == "auto" else float(step) for step in steps}
+        levels = [Level("auto" if step == "auto" else f"{size:.3g} mm", (("object.grid_step_mm", step),), size)
+                  for step, size in sizes.items()]  # fmt: skip
         long_name = "step of the grid on which the object's distance is sampled"
         yield Parameter("object grid", long_name, tuple(levels), formal=2.0)
 

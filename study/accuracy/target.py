@@ -80,7 +80,7 @@ def _from_file(scene: Scene) -> Choice:
         others = held_out(measured.scene, found)
         warm_up(found[0])
     solve = measure_once if found else None
-    choice = choose(measured, study, float(scene.accuracy.e_n), explicit(scene), found, others, solve)
+    choice = choose(measured, study, float(scene.accuracy.e_n or 0.0), explicit(scene), found, others, solve)
     save(Path(str(scene.accuracy.cost_file)), study)
     return choice
 
@@ -196,20 +196,20 @@ def quick_choice(
 
     A mesh that meets it on ``found`` is tried on ``others``, which from then on count like the probes.
     """
-    target, own, levels = float(scene.accuracy.e_n), plain(scene), refinement_series(scene)
+    target, own, levels = float(scene.accuracy.e_n or 0.0), plain(scene), refinement_series(scene)
     if len(levels) < FEWEST:
         note = "the scene gives the mesh itself, so nothing is left to choose and its error is not known"
         return unchanged(target, note)
 
     def solved(level: Level) -> list[Measured]:
         setting = setting_of(own, level)
-        return study.completed(setting, probes, lambda probe: solve(setting, probe, level), save)
+        return study.completed(setting, tried, lambda probe: solve(setting, probe, level), save)
 
-    probes = list(found)
+    tried = list(found)
     for count in range(FEWEST, len(levels) + 1):
         errors = mesh_errors(levels[:count], [solved(level) for level in levels[:count]], target)
-        if errors.chosen is not None and len(probes) == len(found):
-            probes += others
+        if errors.chosen is not None and len(tried) == len(found):
+            tried += others
             errors = mesh_errors(levels[:count], [solved(level) for level in levels[:count]], target)
         if errors.known and errors.chosen is not None and errors.chosen < len(errors.levels) - 1:
             break

@@ -249,7 +249,8 @@ def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: st
 def _closed(contacts: Sequence[Contact], model: str, settings: EvaluationSettings) -> Score:
     """Score of the ellipsoids of contacts that face each other."""
     distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
-    return score(*(c.ellipsoids[model].semi_axes for c in contacts), distance, settings.arms, settings.torques)
+    one, two = (c.ellipsoids[model].semi_axes for c in contacts)
+    return score(one, two, distance, settings.arms, settings.torques)
 
 
 def _closed_volume(
@@ -299,7 +300,8 @@ def soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact
 
 def volume_in_pose(pair: Sequence[SoftContact], arms: float, torques: float) -> float:
     """Volume of the grasp wrench space (L-infinity) of two contacts with any full bodies, in any pose."""
-    return pose_volume(*pair, arms, torques, with_l1=False).linf
+    one, two = pair
+    return pose_volume(one, two, arms, torques, with_l1=False).linf
 
 
 def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dict[str, Any]:

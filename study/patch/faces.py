@@ -108,9 +108,9 @@ def checked(faces: Faces, flip: bool = False) -> ReadPatch:
     for key in ("centroid", "area", "normal", "pressure", "corners"):
         if (value := getattr(faces, key)) is not None:
             rows = value.reshape(len(value), -1)
-            first = rows[np.arange(len(rows)), (~np.isfinite(rows)).argmax(axis=1)].tolist()
-            wrong(~np.isfinite(rows).all(axis=1), key, lambda i, v=first: f"{v[i]:g}",
-                  "finite numbers", "repair the export or leave the face out")  # fmt: skip
+            first = [f"{v:g}" for v in rows[np.arange(len(rows)), (~np.isfinite(rows)).argmax(axis=1)].tolist()]
+            wrong(~np.isfinite(rows).all(axis=1), key, first.__getitem__, "finite numbers",
+                  "repair the export or leave the face out")  # fmt: skip
     _check_range(faces, wrong)
     refuse(problems)
     pressure, normal = faces.pressure, faces.normal

@@ -144,12 +144,13 @@ def _read_table(path: Path, reading: Reading) -> Faces:
     found = [split_header(header, reading.pressure_name) for header in headers]
     position = {pair[0]: i for i, pair in enumerate(found) if pair}
     twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(found)
-             if pair and position[pair[0]] != i]  # fmt: skip
+             if pair is not None and position[pair[0]] != i]  # fmt: skip
     refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
             for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
     needed = _needed(position)
-    units = {name: found[position[name]][1] or reading.unit_of(KINDS[name]) for name in needed}
-    bare = [name for name in needed if units[name] is None]
+    given = {pair[0]: pair[1] for pair in found if pair}
+    units = {name: given[name] or reading.unit_of(KINDS[name]) or "" for name in needed}
+    bare = [name for name in needed if not units[name]]
     refuse([_without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
             for kind in dict.fromkeys(KINDS[name] for name in bare)])  # fmt: skip
     values = _numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
@@ -184,7 +185,7 @@ def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
         raise refused(path, None, "", found, expected, f"write {MINIMAL}")
     check_count(path, len(lines) - 1)
     mark = max(",;\t", key=lines[0][1].count)
-    rows = []
+    rows: list[list[str]] = []
     for number, line in lines:  # one by one: no quotation mark may swallow the lines behind it
         try:
             rows += csv.reader([line], delimiter=mark, strict=True)

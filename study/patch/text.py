@@ -32,7 +32,7 @@ from softjaw.study.writing import write_file
 PICTURES = (".png", ".svg")
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
 PLANES = ((0, 1), (0, 2), (1, 2))
-LOOK = {
+LOOK: dict[str, dict[str, Any]] = {
     "exact": {"color": "#1d2429", "linewidth": 2.2},
     "three_motions": {"color": "#c05a00", "linestyle": "--"},
     "axis_aligned": {"color": "#8a5a9e", "linestyle": "-."},
