@@ -19,15 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.accuracy.parameters import (
-    EACH_ALONE,
     Level,
     Parameter,
     Skipped,
     contact_parameters,
     evaluation_parameters,
     value_of,
-    weight,
-    with_level,
 )
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import provenance
@@ -199,22 +196,15 @@ def setting_of(scene: Scene, level: Level) -> str:
 
 @dataclass(frozen=True)
 class Task:
-    """A setting to be measured on every probe; ``parameter`` is None for the scene as it is."""
+    """A setting to be measured on every probe; ``name`` of the parameter is empty for the scene as it is.
 
-    parameter: Parameter | None
+    ``evaluation`` says whether the contact is that of the scene as it is.
+    """
+
+    name: str
     level: Level
     setting: str
-    weight: float
-
-    @property
-    def name(self) -> str:
-        """Name of the parameter; empty for the scene as it is."""
-        return self.parameter.name if self.parameter else ""
-
-    @property
-    def evaluation(self) -> bool:
-        """Whether the contact is that of the scene as it is."""
-        return self.parameter is not None and self.parameter.evaluation
+    evaluation: bool = False
 
 
 @dataclass(frozen=True)
@@ -232,14 +222,11 @@ class Costs:
     @cached_property
     def tasks(self) -> list[Task]:
         """Everything to be measured, each setting once, the scene's own first."""
-        base = Task(None, Level("as in the scene"), BASE, weight(self.scene))
-        found = {BASE: base}
+        found = {BASE: Task("", Level("as in the scene"), BASE)}
         for parameter in self.parameters:
             for level in parameter.levels:
                 setting = self.setting(parameter, level)
-                times = {0: 1, EACH_ALONE: 1.5}.get(level.between, level.between)
-                work = math.nan if parameter.evaluation else times * weight(with_level(self.scene, level))
-                found.setdefault(setting, Task(parameter, level, setting, work))
+                found.setdefault(setting, Task(parameter.name, level, setting, parameter.evaluation))
         return list(found.values())
 
 

@@ -29,7 +29,6 @@ T = TypeVar("T")
 Case = tuple[FloatArray, int]  # values and flags
 ENOUGH, REPEATS = 1.0, 3  # seconds after which, and times, that a cheap measurement is repeated
 CALIBRATION = 24  # points along a side of the cube whose Laplacian is factorised
-FIRST_GUESS = 2e-8  # seconds of one force over `weight`, before anything is measured
 
 
 def timed(work: Callable[[], T], repeats: int = REPEATS) -> tuple[float, T, int]:
@@ -168,17 +167,18 @@ class Measuring:
         self._save()
 
     def expected(self, task: Task) -> float:
-        """CPU time that a task will take, by the measured level of its parameter that is nearest to it [s]."""
+        """CPU time that a task will take, by the measured level of its parameter that is nearest to it [s].
+
+        The scene as it is has been measured before.
+        """
         cases = sum(len(p.forces) for p in self.probes)
         if task.evaluation:
             return expected_seconds(task.name, task.level.name) * cases
         known = [t for t in self.costs.tasks if not t.evaluation and self.study.has(t.setting)]
         alike = [t for t in known if t.name == task.name] or [t for t in known if t.setting == self.study.base]
-        if not alike:
-            return FIRST_GUESS * task.weight * cases
-        near = min(alike, key=lambda t: abs(np.log(t.weight / task.weight)))
+        near = min(alike, key=lambda t: abs(np.log(t.level.work / task.level.work)))
         measured = np.mean([m.seconds for m in self.study.of(near.setting)])
-        return float(measured * task.weight / near.weight * cases)
+        return float(measured * task.level.work / near.level.work * cases)
 
     def _measure(self, task: Task) -> None:
         def solve(probe: Probe) -> Measured:

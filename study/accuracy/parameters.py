@@ -106,7 +106,8 @@ def contact_parameters(scene: Scene) -> tuple[list[Parameter], list[Skipped]]:
             if reason := refusal(scene, level):
                 skipped.append(Skipped(parameter.name, level.name, reason))
             else:
-                good.append(replace(level, work=weight(with_level(scene, level)) / weight(scene)))
+                paths = {0: 1.0, EACH_ALONE: 1.5}.get(level.between, float(level.between))
+                good.append(replace(level, work=paths * weight(with_level(scene, level)) / weight(scene)))
         own = (i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == scene.digest)
         if len(good) > 1:
             parameters.append(replace(parameter, levels=tuple(good), own=next(own, -1)))
