@@ -171,7 +171,7 @@ def report(options: Namespace) -> int:
 
 def patch(options: Namespace) -> int:
     """Judge a pressure field from elsewhere."""
-    from softjaw.study.patch.text import answer_text
+    from softjaw.study.patch.answer_text import answer_text
 
     say(answer_text(options))
     return DONE

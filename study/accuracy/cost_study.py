@@ -195,7 +195,7 @@ def setting_of(scene: Scene, level: Level) -> str:
 
 
 @dataclass(frozen=True)
-class Task:
+class Planned:
     """A setting to be measured on every probe; ``name`` of the parameter is empty for the scene as it is.
 
     ``evaluation`` says whether the contact is that of the scene as it is.
@@ -220,13 +220,13 @@ class Costs:
         return f"{parameter.name}: {level.name}" if parameter.evaluation else setting_of(self.scene, level)
 
     @cached_property
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[Planned]:
         """Everything to be measured, each setting once, the scene's own first."""
-        found = {BASE: Task("", Level("as in the scene"), BASE)}
+        found = {BASE: Planned("", Level("as in the scene"), BASE)}
         for parameter in self.parameters:
             for level in parameter.levels:
                 setting = self.setting(parameter, level)
-                found.setdefault(setting, Task(parameter.name, level, setting, parameter.evaluation))
+                found.setdefault(setting, Planned(parameter.name, level, setting, parameter.evaluation))
         return list(found.values())
 
 

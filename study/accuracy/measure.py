@@ -17,7 +17,7 @@ from softjaw.fem.contact.pattern import Pattern
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.petsc import Factors
 from softjaw.study import pipeline
-from softjaw.study.accuracy.cost_study import QUANTITIES, Costs, CostStudy, Measured, Task, save
+from softjaw.study.accuracy.cost_study import QUANTITIES, Costs, CostStudy, Measured, Planned, save
 from softjaw.study.accuracy.evaluation import SolvedProbe, as_quantities, solved, work_of
 from softjaw.study.accuracy.parameters import EACH_ALONE, WINKLER, Level, Skipped, expected_seconds, with_level
 from softjaw.study.case.probes import Probe
@@ -166,7 +166,7 @@ class Measuring:
             self.study.skipped.append(Skipped(task.name, task.level.name, reason))
         self._save()
 
-    def expected(self, task: Task) -> float:
+    def expected(self, task: Planned) -> float:
         """CPU time that a task will take, by the measured level of its parameter that is nearest to it [s].
 
         The scene as it is has been measured before.
@@ -180,7 +180,7 @@ class Measuring:
         measured = np.mean([m.seconds for m in self.study.of(near.setting)])
         return float(measured * task.level.work / near.level.work * cases)
 
-    def _measure(self, task: Task) -> None:
+    def _measure(self, task: Planned) -> None:
         def solve(probe: Probe) -> Measured:
             if not task.evaluation:
                 return measure(task.setting, probe, task.level)

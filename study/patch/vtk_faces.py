@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutput
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.patch.faces import Faces, corner_geometry
-from softjaw.study.patch.reading import FACTORS, Reading, check_count, refused, split_header
+from softjaw.study.patch.patch_reader import FACTORS, Reading, check_count, refused, split_header
 from softjaw.study.scene.problems import closest
 
 TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9  # VTK's cell types

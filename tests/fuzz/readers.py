@@ -96,7 +96,7 @@ def _scene(path):
 
 
 def _patch(path):
-    from softjaw.study.patch.reading import Reading, read_patch
+    from softjaw.study.patch.patch_reader import Reading, read_patch
 
     return read_patch(str(path), Reading("mm", "kpa"))
 

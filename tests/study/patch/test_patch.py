@@ -18,9 +18,9 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
 from softjaw.study.messages import StudyError
 from softjaw.study.patch.answer import SURFACES, check_facing, evaluate_patch, principal_direction
+from softjaw.study.patch.answer_text import PLANES, section
 from softjaw.study.patch.faces import corner_geometry
-from softjaw.study.patch.reading import Reading, read_patch
-from softjaw.study.patch.text import PLANES, section
+from softjaw.study.patch.patch_reader import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT

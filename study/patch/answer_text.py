@@ -24,7 +24,7 @@ from softjaw.study.patch.answer import (
     evaluate_patch,
     grasp_record,
 )
-from softjaw.study.patch.reading import Reading, read_patch
+from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
 from softjaw.study.writing import write_file
