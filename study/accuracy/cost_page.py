@@ -84,7 +84,7 @@ def _parameter(errors: ParameterErrors) -> list[Block]:
     rows = [_row(level, i == errors.own, with_own) for i, level in enumerate(errors.levels)]
     failed = [f"{level.level.name}: {level.message}" for level in errors.levels if level.message]
     return [
-        heading(errors.name), table(about + ABOUT.get(errors.name, ""), head, rows, texts=(0,)),
+        heading(errors.name), table((about + ABOUT.get(errors.name, "")).strip(), head, rows, texts=(0,)),
         text(_orders(errors), "note"), *([bullets(failed)] if failed else []),
     ]  # fmt: skip
 
