@@ -11,24 +11,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.study.accuracy.combinations import Combination, best_of, combinations, explicit, families
 from softjaw.study.accuracy.convergence import (
     ParameterErrors,
     best_known,
     error_tables,
     flagged,
     flags_of,
-    pareto_front,
     places,
     unsure,
 )
-from softjaw.study.accuracy.cost_study import Costs, CostStudy, Measured, costs, load, same, setting_of
+from softjaw.study.accuracy.cost_study import Costs, CostStudy, Measured, costs, load, setting_of
 from softjaw.study.accuracy.parameters import Level
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.derived import MEANING
@@ -37,11 +36,8 @@ from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.text import changes, toml_text, value_text
 
 FloatArray = NDArray[np.float64]
-NO_LOSS = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")
-NOT_CHOSEN = (*NO_LOSS, "effect: friction pressure coupling")  # which is another model than the paper's
 HOPE, CHEAPEST = 2.0, 5  # predicted errors up to so many targets are tried, and so many of the cheapest
 BELOW = 1e-6  # errors below this are none
-SMALL, ALIKE = 1e-4, 1e-6  # differences of e_n, and relative ones of work and error, that are none
 Solve = Callable[[str, Any, Level], Measured]
 CHOSEN = ("gripper.elements", "gripper.element")  # with the sections effects and accuracy: what a choice may change
 FREE = tuple(f"{name}." for name in ("accuracy", "candidates", "load", "effects", "limit_surface", "score", "sweep",
@@ -134,20 +130,6 @@ def unchanged(target: float, note: str, seconds: float = math.nan) -> Choice:
     return Choice({}, target, math.nan, math.nan, seconds, note)
 
 
-def explicit(scene: Scene) -> dict[str, Any]:
-    """Keys that the scene gives itself, but for those that say ``auto``, and those that it sweeps."""
-    given: dict[str, Any] = {}
-    for name in ("object", "gripper", "effects", "accuracy"):
-        section = getattr(scene, name)
-        given |= {f"{name}.{key}": getattr(section, key) for key in section.model_fields_set}
-    return {key: value for key, value in given.items() if value != "auto"} | dict.fromkeys(scene.sweep)
-
-
-def allowed(level: Level, given: Mapping[str, Any]) -> bool:
-    """Whether a level leaves what is given as it is."""
-    return all(key not in given or same(value, given[key]) for key, value in level.values)
-
-
 # --- how errors are judged --------------------------------------------------------------------------------------------
 
 
@@ -178,99 +160,12 @@ def reference(study: CostStudy, tables: Sequence[ParameterErrors]) -> Reference:
     """The limit that the scene's own setting is moved to by what every parameter's own limit moves."""
     base = e_n(study.of(study.base))
     value, estimate, flags = base.copy(), np.zeros(base.shape), np.full(base.shape, -1)
-    for family in _families(tables):
+    for family in families(tables):
         best = best_known(tables, family)
         value = value * best.limits[0].value / base
         estimate = estimate + best.estimates
         flags &= best.levels[-1].flags
     return Reference(value, estimate, np.where(flags < 0, flags_of(study.of(study.base)), flags))
-
-
-def _families(tables: Sequence[ParameterErrors]) -> dict[str, list[ParameterErrors]]:
-    """The parameters that are chosen from, by what they lead to."""
-    found: dict[str, list[ParameterErrors]] = {}
-    for table in tables:
-        if not table.parameter.evaluation and table.name not in NOT_CHOSEN:
-            found.setdefault(table.family, []).append(table)
-    return found
-
-
-# --- combinations -----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Combination:
-    """Levels of several parameters, their predicted CPU time per case [s], error of e_n, and work over the scene's."""
-
-    levels: tuple[Level, ...]
-    seconds: float
-    error: float
-    work: float = 1.0
-
-    @property
-    def level(self) -> Level:
-        """All of it as one level."""
-        values = tuple(pair for level in self.levels for pair in level.values)
-        return Level("; ".join(level.name for level in self.levels) or "as in the scene", values)
-
-
-def combinations(
-    tables: Sequence[ParameterErrors], base_seconds: float, given: Mapping[str, Any]
-) -> list[Combination]:
-    """Every combination of levels that a scene leaves open, one of each family, the cheapest first."""
-    families: list[list[tuple[Level, float, FloatArray]]] = []
-    estimate: FloatArray | float = 0.0
-    sure: NDArray[np.bool_] | bool = True
-    for family, own in _families(tables).items():
-        best = best_known(tables, family)
-        sure = sure & ~unsure(best.levels[-1].flags)
-        estimate = estimate + best.estimates
-        if (options := _options(own, best, base_seconds, given)) is not None:
-            families.append(options)
-    made = []
-    for chosen in product(*families):
-        error = np.atleast_1d(sum((c[2] for c in chosen), estimate))[sure].max(initial=0.0) if np.any(sure) else np.inf
-        seconds = base_seconds * math.prod(c[1] for c in chosen)
-        work = math.prod(c[0].work for c in chosen)
-        made.append(Combination(tuple(c[0] for c in chosen), seconds, float(error), work))
-    return sorted(made, key=lambda c: (float(f"{c.work:.6g}"), float(f"{c.error:.6g}"), c.level.name))
-
-
-def _options(
-    tables: Sequence[ParameterErrors], best: ParameterErrors, base_seconds: float, given: Mapping[str, Any]
-) -> list[tuple[Level, float, FloatArray]] | None:
-    """Levels of one family, time over the base's and errors; None where the scene leaves none open.
-
-    Levels with a flag that the finest of the family does not carry are left out.
-    """
-    options, found_any = [], False
-    for table in tables:
-        for i, found in enumerate(table.levels):
-            level, own = found.level, i == table.own
-            if not own and not (allowed(level, given) and _matters(table, i)):
-                continue
-            found_any = True
-            if np.isfinite(found.by_case[0]).all() and not flagged(found.flags, best.levels[-1].flags).any():
-                option = (Level(level.name), 1.0) if own else (level, found.seconds / base_seconds)
-                options.append((*option, found.by_case[0]))
-    return options if found_any else None
-
-
-def _matters(table: ParameterErrors, i: int) -> bool:
-    """Whether a level is cheaper than the scene's own, or more accurate."""
-    if table.own < 0:
-        return True
-    level, own = table.levels[i], table.levels[table.own]
-    return level.level.work < (1.0 - ALIKE) * own.level.work or level.worst[0] < own.worst[0] - SMALL
-
-
-def best_of(made: Sequence[Combination]) -> list[Combination]:
-    """Those that no other beats in both work and predicted error, the cheapest first, by more than a tenth."""
-    kept: list[Combination] = []
-    for i in pareto_front([c.work for c in made], [c.error for c in made]):
-        if not kept or made[i].error < 0.9 * kept[-1].error:
-            kept.append(made[i])
-    return kept
 
 
 # --- choice -----------------------------------------------------------------------------------------------------------

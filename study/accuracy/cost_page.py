@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.accuracy.choose import BELOW, NO_LOSS, Combination, best_of, combinations, percent, seconds_text
+from softjaw.study.accuracy.choose import BELOW, percent, seconds_text
 from softjaw.study.accuracy.choose import values_text as settings
+from softjaw.study.accuracy.combinations import NO_LOSS, Combination, best_of, combinations
 from softjaw.study.accuracy.convergence import LevelErrors, ParameterErrors
 from softjaw.study.accuracy.cost_study import CostStudy
 from softjaw.study.page import Block, box, bullets, heading, image, page, table, text, verbatim

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.accuracy.choose import Choice, Solve, allowed, choose, e_n, explicit, stored_costs, unchanged
+from softjaw.study.accuracy.choose import Choice, Solve, choose, e_n, stored_costs, unchanged
+from softjaw.study.accuracy.combinations import allowed, explicit
 from softjaw.study.accuracy.convergence import extrapolate, flagged, flags_of, places, unsure
 from softjaw.study.accuracy.cost_study import CostStudy, Measured, load, new_study, plain, save, setting_of
 from softjaw.study.accuracy.measure import measure_once, warm_up

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.objects.shapes import EllipticCylinder, Plane
-from softjaw.study.accuracy.choose import choose, combinations, explicit, reference
+from softjaw.study.accuracy.choose import choose, reference
+from softjaw.study.accuracy.combinations import combinations, explicit
 from softjaw.study.accuracy.convergence import error_tables, extrapolate, pareto_front
 from softjaw.study.accuracy.cost import refuse_ranks
 from softjaw.study.accuracy.cost_page import cost_page, sentences
