@@ -127,20 +127,21 @@ def hold_task(
         raise ValueError("wrench is zero: any grasp holds that; give the load to hold")
     # Torques about the middle of the contacts, by their own length, keep the numbers of one size.
     middle = np.mean([contact.position for contact in contacts], axis=0)
-    spread = max(np.linalg.norm(contact.position - middle) for contact in contacts)
+    spread = max(float(np.linalg.norm(contact.position - middle)) for contact in contacts)
     grip = max(float(np.max(contact.body.support(np.diag([0.0, 0.0, 1.0])))) for contact in contacts)
     length = max(spread, grip) or 1.0
-    C = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
-    w = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
-    lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
+    C: FloatArray = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
+    w: FloatArray = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
+    # both are exact up to the gap of a programme: a bisection over factors would leave more
+    lowest, bounds = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
-    factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
-    u = np.concatenate([found.u[:3] - np.cross(found.u[3:] / length, middle), found.u[3:] / length])
-    gap = max(found.upper - factor, 0.0)
+    factor = bounds.lower if bounds.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
+    u = np.concatenate([bounds.u[:3] - np.cross(bounds.u[3:] / length, middle), bounds.u[3:] / length])
+    gap = max(bounds.upper - factor, 0.0)
     holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
     inside = factor > 1 + _LIMIT and lowest < 1 - _LIMIT
     outside = factor + gap < 1 - _LIMIT or lowest > 1 + _LIMIT
-    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, found.u))
+    return TaskResult(factor, gap, lowest, holds, not (inside or outside), -u, _limits(contacts, C, bounds.u))
 
 
 def least_grip_force(
@@ -177,8 +178,8 @@ def _range_up_to(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     off = w - U @ (U.T @ w)
     if np.linalg.norm(off) > _NOTHING * np.linalg.norm(w):
         return 0.0, Reach(0.0, 0.0, off / (off @ w))
-    found = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
-    return 0.0, found._replace(u=U @ found.u)
+    bounds = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
+    return 0.0, bounds._replace(u=U @ bounds.u)
 
 
 def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
@@ -190,13 +191,14 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
     if small_w and np.linalg.norm(off_b) <= nothing:
         C, w = U.T @ C, U.T @ w
+        # with fixed normal forces the held multiples are an interval that need not begin at 0
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
         return lowest, forth._replace(u=U @ forth.u)
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
     s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
     rest = s * w - b
-    balanced = np.linalg.norm(s * off_w - off_b) <= nothing
+    balanced = bool(np.linalg.norm(s * off_w - off_b) <= nothing)
     if balanced and s >= 0 and np.linalg.norm(rest) > nothing:
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
         balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT

@@ -13,9 +13,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, hull_volume
 from softjaw.scoring.graspit import linearised_contacts
-from softjaw.scoring.polytope import hull_volume
 from softjaw.study.accuracy.parameters import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
@@ -105,8 +105,8 @@ def _limits(contacts: Sequence[Contact], name: str) -> tuple[float, float, float
     return min(x.e_n for x in own), max(min(x.f_x for x in own), min(x.f_y for x in own)), min(x.tau_z for x in own)
 
 
-def _ellipsoids(contacts: Sequence[Contact]) -> list[EllipsoidBody]:
-    return [EllipsoidBody(c.ellipsoids["ccm"].semi_axes) for c in contacts]
+def _ellipsoids(contacts: Sequence[Contact]) -> list[Ellipsoid]:
+    return [Ellipsoid(c.ellipsoids["ccm"].semi_axes) for c in contacts]
 
 
 def _with_bodies(found: SolvedProbe, contacts: Sequence[Contact], bodies: list[Any]) -> FloatArray:

@@ -193,9 +193,9 @@ def _object_mesh(scene: Scene) -> Iterable[Parameter]:
         own = scene.object.grid_step_mm
         start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
         steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
-        sizes = {step: start if step == "auto" else float(step) for step in steps}
+        grid = {step: start if step == "auto" else float(step) for step in steps}
         levels = [Level("auto" if step == "auto" else f"{size:.3g} mm", (("object.grid_step_mm", step),), size)
-                  for step, size in sizes.items()]  # fmt: skip
+                  for step, size in grid.items()]  # fmt: skip
         long_name = "step of the grid on which the object's distance is sampled"
         yield Parameter("object grid", long_name, tuple(levels), formal=2.0)
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.friction.frame import FrameFlag
-from softjaw.friction.orientation import behind, wound
+from softjaw.friction.frame import FrameFlag, behind, wound
 from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_wrench

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.orientation import slivers
-from softjaw.friction.patch import ContactPatch, FloatArray
+from softjaw.friction.patch import ContactPatch, FloatArray, slivers
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene.problems import Problem
 
