@@ -171,7 +171,7 @@ def report(options: Namespace) -> int:
 
 def patch(options: Namespace) -> int:
     """Judge a pressure field from elsewhere."""
-    from softjaw.study.patch.command import answer_text
+    from softjaw.study.patch.answer_text import answer_text
 
     say(answer_text(options))
     return DONE
@@ -212,7 +212,7 @@ def completion(options: Namespace) -> int:
 def cost(options: Namespace) -> int:
     """Measure what accuracy costs in time."""
     require_room()
-    from softjaw.study.accuracy.cost.command import run
+    from softjaw.study.accuracy.cost import run
 
     run(options, scene_of(options))
     return DONE

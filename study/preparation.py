@@ -55,7 +55,7 @@ def with_target_met(scene: Any, path: Path) -> tuple[Any, Any]:
     """The scene with what its target of accuracy chooses, and the choice; by one rank."""
     if scene.accuracy.e_n is None:
         return scene, None
-    from softjaw.study.accuracy.cost.target import settled
+    from softjaw.study.accuracy.target import settled
     from softjaw.study.case.build import check_object
 
     check_object(scene)
@@ -69,11 +69,11 @@ def work(scene: Any, choice: Any = None) -> Any:
     from softjaw.study.show.tables.status import summary
 
     def finalise(writer: Any) -> None:  # loads what one rank needs at the end
-        from softjaw.study.accuracy.cost.target import fill
         from softjaw.study.result import derived
         from softjaw.study.show.report.plain_report import plain_report
 
-        fill(writer, choice)
+        if choice is not None:
+            choice.fill(writer)
         derived.finalise(writer, scene)
         writer.write_report(plain_report(writer.result(), scene.friction.mu))
 
@@ -89,13 +89,12 @@ def work(scene: Any, choice: Any = None) -> Any:
 
 def prepare(scene: Any, options: Namespace, choice: Any = None) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
-    from softjaw.study.accuracy.cost.target import overrides
     from softjaw.study.case.build import warnings
     from softjaw.study.case.model import check_poses
     from softjaw.study.run.plan import make_plan
 
     _check_petsc(dict(scene.petsc))
-    given = [*options.overrides, *petsc_overrides(options.petsc), *overrides(choice)]
+    given = [*options.overrides, *petsc_overrides(options.petsc), *(choice.overrides() if choice else [])]
     plan = make_plan(scene, options.scene, given)
     check_poses(scene, [unit.scene for unit in plan.units])
     for text in warnings(scene):

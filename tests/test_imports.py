@@ -40,16 +40,16 @@ DOORS = {
         "study/result/result_writer.py",
         "study/result/guarded.py",
         "study/result/vtkhdf.py",
-        "study/accuracy/cost/study.py",
+        "study/accuracy/cost_study.py",
     },
-    "pyvista": PICTURES | {"study/patch/reading.py"},
-    "vtkmodules": PICTURES | {"study/patch/reading.py"},
+    "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
+    "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},
 }
 # Folders of study, and modules directly in it, the lowest first: each imports only what stands before it, so that there
 # is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; preparation
 # joins what a run needs, from the scene to the report in its file; commands joins everything, cli above it.
 ORDER = (
-    "messages", "units", "flags", "quantities", "environment", "writing", "pictures",
+    "messages", "units", "flags", "quantities", "environment", "writing", "pictures", "templates", "page",
     "scene", "case", "pipeline", "result", "run", "accuracy", "lookup", "export", "patch", "show",
     "preparation", "doctor", "commands", "cli",
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """Friction, fit and score in one function: two contact patches in, all values of a case out.
 
-The study, the cost study and the uncertainty call `evaluate` or `quality`; ``softjaw patch`` fits and scores with the
-same `Contact` and `fit_surfaces`.
+The study, the cost study and the uncertainty call `evaluate`, or `quality` and `volume_in_pose` where one number is
+enough; ``softjaw patch`` takes the limits and fits of the same `Contact`, and `exact_score`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.scoring.bodies import PolytopeBody, polytope_volume
 from softjaw.scoring.closed_form import volume_linf
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.quality import Score, score
+from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.scoring.task import hold_task, weight_wrench
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
@@ -248,7 +249,8 @@ def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: st
 def _closed(contacts: Sequence[Contact], model: str, settings: EvaluationSettings) -> Score:
     """Score of the ellipsoids of contacts that face each other."""
     distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
-    return score(*(c.ellipsoids[model].semi_axes for c in contacts), distance, settings.arms, settings.torques)
+    one, two = (c.ellipsoids[model].semi_axes for c in contacts)
+    return score(one, two, distance, settings.arms, settings.torques)
 
 
 def _closed_volume(
@@ -268,7 +270,7 @@ def _graspit(contacts: Sequence[Contact], model: str, settings: EvaluationSettin
     points = [graspit_vertices(a) for a in axes]
     if facing:
         return _closed_volume([polytope_volume(p) for p in points], contacts, settings)
-    return volume_in_pose(contacts, [PolytopeBody(p * scale) for p in points], settings)
+    return volume_in_pose(soft(contacts, [PolytopeBody(p * scale) for p in points]), settings.arms, settings.torques)
 
 
 def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], settings: EvaluationSettings) -> float:
@@ -286,20 +288,40 @@ def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], settings:
 
 def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
     """Volume of the grasp wrench space in any pose; 0 for a contact that carries no load in some direction."""
-    return 0.0 if any(body.rank < 3 for body in bodies) else volume_in_pose(contacts, bodies, settings)
+    if any(body.rank < 3 for body in bodies):
+        return 0.0
+    return volume_in_pose(soft(contacts, bodies), settings.arms, settings.torques)
 
 
-def volume_in_pose(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
-    """Volume of the grasp wrench space of any full bodies in the pose that the contacts have."""
-    soft = [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
-    return pose_volume(*soft, settings.arms, settings.torques, with_l1=False).linf
+def soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact]:
+    """Contacts as a score takes them, each with a limit surface in ``(f_x, f_y, tau_z)`` per unit of S."""
+    return [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
+
+
+def volume_in_pose(pair: Sequence[SoftContact], arms: float, torques: float) -> float:
+    """Volume of the grasp wrench space (L-infinity) of two contacts with any full bodies, in any pose."""
+    one, two = pair
+    return pose_volume(one, two, arms, torques, with_l1=False).linf
+
+
+def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dict[str, Any]:
+    """Score of one grasp with any bodies in any pose, which may take seconds.
+
+    Returns
+    -------
+    dict
+        ``quality`` and ``quality_l1``, the volumes of the grasp wrench space, and lower and upper bound of ``epsilon``
+        for a centre of mass halfway between the contacts.
+    """
+    lengths = arms, torques, (pair[0].position + pair[1].position) / 2
+    volume, ball = grasp_score(pair, *lengths, with_epsilon=False), epsilon(pair, *lengths)
+    return {"quality": volume.quality, "quality_l1": volume.quality_l1, "epsilon": [ball.lower, ball.upper]}
 
 
 def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
     """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
     middle = 0.5 * (contacts[0].origin + contacts[1].origin)
-    soft = [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
-    return epsilon(soft, settings.arms, settings.torques, middle, tolerance=NEAR).upper
+    return epsilon(soft(contacts, bodies), settings.arms, settings.torques, middle, tolerance=NEAR).upper
 
 
 def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: ArrayLike) -> list[float]:
@@ -313,10 +335,10 @@ def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: A
     grip = [c.limits[MODELS[0]].F_N for c in contacts]
     factors = []
     for m in MODELS:
-        soft = []
-        for c, own in zip(contacts, fits, strict=True):
-            # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
-            wrench = c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]]
-            soft.append(c.soft(PolytopeBody(np.vstack([wrench, -wrench]))))
-        factors.append(hold_task(soft, grip, weight).safety_factor)
+        # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
+        wrenches = [
+            c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]] for c, own in zip(contacts, fits, strict=True)
+        ]
+        hulls = [PolytopeBody(np.vstack([wrench, -wrench])) for wrench in wrenches]
+        factors.append(hold_task(soft(contacts, hulls), grip, weight).safety_factor)
     return factors

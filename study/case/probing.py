@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of
+from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of, volume_in_pose
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.case.solving import solver
 from softjaw.study.case.variations import Variation, moved_poses, variations
@@ -119,4 +118,4 @@ def _volume(frames: dict[str, FloatArray], semi_axes: FloatArray, arms: float, t
         )
         for i in range(2)
     ]
-    return pose_volume(*contacts, arms, torques, with_l1=False).linf
+    return volume_in_pose(contacts, arms, torques)

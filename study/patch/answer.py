@@ -16,13 +16,12 @@ from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.body import ExactSurface
-from softjaw.scoring.epsilon import epsilon
-from softjaw.scoring.quality import grasp_score
 from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
+from softjaw.study.case.evaluate import exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
-from softjaw.study.flags import Flag
+from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.patch.reading import ReadPatch, refuse
+from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene.problems import Problem
 
@@ -36,9 +35,9 @@ FITTED_ON = 500  # motions; a fit is judged on others
 EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
 EQUAL = 1e-6  # relative difference of extents, and difference of cosines, that decide nothing
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
-FACING = np.diag([1.0, -1.0, -1.0])  # half a turn about x: how the second of two equal fingers stands
-FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", "e_n": "e_n",
-            "e_n_projected": "e_n_projected"}  # fmt: skip
+HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
+LIMITS = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "e_n": "e_n", "e_n_projected": "e_n_projected"}
+FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",
     "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", "e_n": "m", "e_n_projected": "m",
@@ -49,8 +48,8 @@ DEFINITIONS = {
     "S": "sum of pressure times area over the patch",
     "F_N": "its part along the contact normal: the force of the gripper",
     "rho": "longer side of the rectangle round the loaded faces in the contact frame",
-    "curved, flat, projected": "every face resists in its own plane; all faces in one plane, scaled by S (the paper's"
-    " planar model); the same scaled by F_N",
+    "ccm, pcm, pcm_projected": "curved contact model: every face resists in its own plane; planar contact model: all"
+    " faces in one plane, scaled by S (as in the paper); the same scaled by F_N",
     "f_x_max, f_y_max, tau_z_max": "largest friction along x and y, and about the contact normal through the origin",
     "tau_pure": "largest friction torque while no net force is transmitted",
     "e_n": "tau_z_max / (mu S)",
@@ -62,17 +61,11 @@ DEFINITIONS = {
     " upper bound, which a quartic leaves apart",
 }
 SCORES = ("quality", "epsilon")
-FRAME = {
-    FrameFlag.CYCLE: "the contact normal is a mean, because its search went in a circle between faces",
-    FrameFlag.HOLE: "the centre of pressure lies over a hole of the loaded faces, so the nearest face gave the contact"
-    " frame",
-    FrameFlag.NO_CORNERS: "the faces have no corners, so the face with the nearest centre gave the contact frame",
-    FrameFlag.OVERHANG: "some loaded faces are turned more than 90 deg from the contact normal",
-}
+OF_FRAME = Flag.CYCLE | Flag.HOLE | Flag.NO_CORNERS | Flag.OVERHANG
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedPatch:
+class EvaluatedPatch:
     """A patch from a file and all that friction can carry there.
 
     Parameters
@@ -83,8 +76,6 @@ class JudgedPatch:
         With its contact frame and friction limits.
     x_given : bool
         Whether the user gave the direction of x.
-    tau_pure : mapping
-        For each friction model the largest torque without a net force [N m].
     fits : mapping
         For each friction model the fitted surfaces by kind.
     exact : mapping
@@ -94,7 +85,6 @@ class JudgedPatch:
     read: ReadPatch
     contact: Contact
     x_given: bool
-    tau_pure: Mapping[str, float]
     fits: Mapping[str, Mapping[str, SurfaceFit]]
     exact: Mapping[str, ExactSurface]
 
@@ -108,7 +98,7 @@ class JudgedPatch:
         return self.exact[model] if kind == "exact" else self.fits[model][kind].body(self.contact.mu)
 
 
-def judge(read: ReadPatch, mu: float, long_side: FloatArray | None = None) -> JudgedPatch:
+def evaluate_patch(read: ReadPatch, mu: float, long_side: FloatArray | None = None) -> EvaluatedPatch:
     """Frame, friction and limit surfaces of a patch.
 
     Parameters
@@ -142,12 +132,8 @@ def judge(read: ReadPatch, mu: float, long_side: FloatArray | None = None) -> Ju
         share = mu / contact.limits[model].S
         return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, EXACT)
 
-    return JudgedPatch(
-        read, contact, long_side is not None,
-        tau_pure={m: pure_torque(contact.local, mu, m) for m in MODELS},
-        fits={m: fit_surfaces(contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS},
-        exact={m: exact(m) for m in MODELS},
-    )  # fmt: skip
+    fits = {m: fit_surfaces(contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS}
+    return EvaluatedPatch(read, contact, long_side is not None, fits, {m: exact(m) for m in MODELS})
 
 
 def _minority(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -183,8 +169,8 @@ def principal_direction(patch: ContactPatch) -> FloatArray:
 
 
 def grasp_record(
-    one: JudgedPatch,
-    two: JudgedPatch | None,
+    one: EvaluatedPatch,
+    two: EvaluatedPatch | None,
     kind: str,
     distance: float | None = None,
     object_length: float | None = None,
@@ -194,7 +180,7 @@ def grasp_record(
 
     Parameters
     ----------
-    one, two : JudgedPatch
+    one, two : EvaluatedPatch
         The contacts, in the coordinates of one object; without ``two`` the second is like the first, half a turn
         about x away from it.
     kind : str
@@ -209,19 +195,12 @@ def grasp_record(
     contacts = one.contact, two.contact if two else _opposite(one.contact, float(distance or 0.0))
     if two is not None:
         check_facing(contacts, (one.read.file, two.read.file))
-    O1, O2 = (c.origin for c in contacts)
-    d = float(np.linalg.norm(O2 - O1))
-    lengths = object_length or d, contact_length or max(c.rho for c in contacts), (O1 + O2) / 2
-    scores = {}
-    for model in MODELS:
-        soft = [c.soft(judged.surface(model, kind)) for c, judged in zip(contacts, both, strict=True)]
-        # exact in any pose: one grasp may take its time, unlike the maps of a study
-        volume, ball = grasp_score(soft, *lengths, with_epsilon=False), epsilon(soft, *lengths)
-        scores[model] = {"quality": volume.quality, "quality_l1": volume.quality_l1}
-        scores[model]["epsilon"] = [ball.lower, ball.upper]
+    d = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
+    lengths = object_length or d, contact_length or max(c.rho for c in contacts)
+    score = {m: exact_score(soft(contacts, [p.surface(m, kind) for p in both]), *lengths) for m in MODELS}
     return {
         "surface": kind, "distance": d, "object_length": lengths[0], "contact_length": lengths[1],
-        "misalignment": max(angles(*contacts)), "slips": bool(pose_flags(contacts) & Flag.SLIPS), "score": scores,
+        "misalignment": max(angles(*contacts)), "slips": bool(pose_flags(contacts) & Flag.SLIPS), "score": score,
     }  # fmt: skip
 
 
@@ -229,7 +208,7 @@ def _opposite(contact: Contact, distance: float) -> Contact:
     """The same contact facing this one, half a turn about its x away."""
     axes, origin = contact.frame.axes, contact.frame.origin
     # half a turn that leaves the contact's own x where it is, seen from the object
-    turn = axes.T @ FACING @ axes
+    turn = axes.T @ HALF_TURN @ axes
     return contact.at(Pose(turn, origin + distance * axes[2] - turn @ origin))
 
 
@@ -238,30 +217,27 @@ def check_facing(contacts: Sequence[Contact], files: Sequence[str]) -> None:
     line = contacts[1].origin - contacts[0].origin
     distance = float(np.linalg.norm(line))
     if distance <= 1e-9 * max(c.rho for c in contacts):
-        raise StudyError(
-            USAGE,
-            f"--other: {files[1]} has its contact at the same place as {files[0]}; both files have to use the "
-            "coordinates of one object",
-        )
+        text = f"--other: {files[1]} has its contact at the same place as {files[0]}"
+        raise StudyError(USAGE, f"{text}; both files have to use the coordinates of one object")
     pairs = zip(contacts, files, (line, -line), strict=True)
     away = [file for c, file, to in pairs if c.normal @ to < -EQUAL * distance]
-    expected = "expected the direction in which each finger presses, into the object"
-    if len(away) == 2:
-        found = f"the normals of {away[0]} and {away[1]} point away from each other"
-        raise StudyError(USAGE, f"--other: {found}, {expected}; add --flip-normals")
     if away:
-        found = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
-        raise StudyError(USAGE, f"--other: {found}, {expected}; turn the normals of {away[0]}")
+        found, remedy = f"the normals of {away[0]} and {away[-1]} point away from each other", "add --flip-normals"
+        if len(away) == 1:
+            found = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
+            remedy = f"turn the normals of {away[0]}"
+        expected = "expected the direction in which each finger presses, into the object"
+        raise StudyError(USAGE, f"--other: {found}, {expected}; {remedy}")
 
 
 # --- record -----------------------------------------------------------------------------------------------------------
 
 
-def as_record(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> dict[str, Any]:
+def as_record(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> dict[str, Any]:
     """Everything as plain numbers, lists and texts, in SI units; what is not there is None."""
     return {
         "mu": patches[0].contact.mu,
-        "patches": [_patch_record(judged) for judged in patches],
+        "patches": [_patch_record(patch) for patch in patches],
         "grasp": grasp,
         "notes": _notes(patches, grasp),
         "units": UNITS,
@@ -274,16 +250,17 @@ def as_json(record: dict[str, Any]) -> str:
     return json.dumps(_plain(record), indent=2, allow_nan=False)
 
 
-def _patch_record(judged: JudgedPatch) -> dict[str, Any]:
-    patch, contact, frame = judged.read.patch, judged.contact, judged.contact.frame
+def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
+    patch, contact, frame = evaluated.read.patch, evaluated.contact, evaluated.contact.frame
     names = ("origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share")
     friction = {}
     for model, limits in contact.limits.items():
-        friction[model] = {key: getattr(limits, name) for key, name in FRICTION.items() if name}
-        friction[model] = {key: friction[model].get(key, judged.tau_pure[model]) for key in FRICTION}
+        found = {key: getattr(limits, name) for key, name in LIMITS.items()}
+        found["tau_pure"] = pure_torque(contact.local, contact.mu, model)
+        friction[model] = {name: found[name] for name in FRICTION}
     return {
-        "file": judged.read.file,
-        "faces": judged.read.faces,
+        "file": evaluated.read.file,
+        "faces": evaluated.read.faces,
         "loaded_faces": len(patch.area),
         "area": patch.area.sum(),
         "pressure": patch.pressure.max(),
@@ -291,64 +268,60 @@ def _patch_record(judged: JudgedPatch) -> dict[str, Any]:
         "F_N": contact.limits["ccm"].F_N,
         "rho": contact.rho,
         "frame": {name: getattr(frame, name) for name in names} | {"flag": int(frame.flag)},
-        "rank": judged.rank,
+        "rank": evaluated.rank,
         "friction": friction,
-        "limit_surface": {model: _surfaces_record(judged, model) for model in MODELS},
+        "limit_surface": {model: _surfaces_record(evaluated, model) for model in MODELS},
     }
 
 
-def _surfaces_record(judged: JudgedPatch, model: str) -> dict[str, Any]:
+def _surfaces_record(evaluated: EvaluatedPatch, model: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for kind in ("exact", *SURFACES):
-        surface = judged.surface(model, kind)
+        surface = evaluated.surface(model, kind)
         found[kind] = {"volume": surface.volume, "semi_axes": surface.semi_axes}
         if kind != "exact":
-            fit = judged.fits[model][kind]
+            fit = evaluated.fits[model][kind]
             # samples in a plane bound no body, so there is nothing to be off from
-            errors = fit.fit_error if judged.exact[model].rank == SPACE else (None, None, None)
+            errors = fit.fit_error if evaluated.exact[model].rank == SPACE else (None, None, None)
             found[kind] |= {"stands_in": fit.certificate == STANDS_IN}
             found[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))
     return found
 
 
-def _notes(patches: Sequence[JudgedPatch], grasp: dict[str, Any] | None) -> list[str]:
+def _notes(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> list[str]:
     """What the reader should know, in sentences."""
     notes = []
-    for judged in patches:
-        name = f"{judged.read.file}: " if len(patches) > 1 else ""
-        notes += [note if note.startswith(judged.read.file) else name + note for note in _patch_notes(judged)]
+    for patch in patches:
+        name = f"{patch.read.file}: " if len(patches) > 1 else ""
+        notes += [*patch.read.notes, *(name + note for note in _patch_notes(patch))]
     if grasp is None:
         return notes
     if grasp["misalignment"] > ANTIPODAL - ALIKE:
         notes.append(f"the contacts are {np.degrees(grasp['misalignment']):.2g} deg from antipodal")
     if grasp["slips"]:
-        notes.append("the line that joins the contacts leaves a friction cone: the grasp slips as it stands")
+        notes.append(Flag.SLIPS.sentence)
     if len(patches) == 1:
-        notes.append("the second contact of the grasp is the same patch facing the first, because no --other was "
-                       "given")  # fmt: skip
+        notes.append("the second contact of the grasp is the same patch facing the first: no --other was given")
     return notes
 
 
-def _patch_notes(judged: JudgedPatch) -> list[str]:
-    frame, notes = judged.contact.frame, list(judged.read.notes)
-    if not judged.x_given:
-        notes.append("x follows the longer direction of the patch, because no --long-side was given")
-    for flag, sentence in FRAME.items():
-        if frame.flag & flag:
-            share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
-            notes.append(sentence + share * (flag == FrameFlag.OVERHANG))
+def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
+    frame, notes = evaluated.contact.frame, []
+    if not evaluated.x_given:
+        notes.append("x follows the longer direction of the patch: no --long-side was given")
+    for flag in flags_in(raised(frame.flag) & OF_FRAME):
+        share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
+        notes.append(flag.sentence + share * (flag == Flag.OVERHANG))
     if frame.flag & FrameFlag.WINDING:
-        against = _count(judged.read, _minority(wound(judged.read.patch) < 0))
+        against = _count(evaluated.read, _minority(wound(evaluated.read.patch) < 0))
         notes.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
-    for model, fits in judged.fits.items():
-        failed = [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]
-        if failed:
-            notes.append(f"{model} model: no {' and no '.join(failed)} surface could be fitted, the ellipsoid of "
-                           "three motions stands in")  # fmt: skip
-    if judged.rank < SPACE:
-        space = {1: "one line", 2: "a plane"}.get(judged.rank, "a point")
-        notes.append(f"the loads that friction can carry fill {space} only (rank {judged.rank}): the limit surface "
-                       "has no volume and no fit is judged")  # fmt: skip
+    for model, fits in evaluated.fits.items():
+        if failed := [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]:
+            notes.append(f"{model}: fit failed of {', '.join(failed)}; three-motion ellipsoid used")
+    if evaluated.rank < SPACE:
+        space = {1: "one line", 2: "a plane"}.get(evaluated.rank, "a point")
+        notes.append(f"the loads that friction can carry fill {space} only (rank {evaluated.rank}): the limit surface "
+                     "has no volume and no fit is judged")  # fmt: skip
     return notes
 
 
@@ -356,10 +329,8 @@ def _plain(value: Any) -> Any:
     """Numbers, lists and texts that JSON knows."""
     if isinstance(value, dict):
         return {key: _plain(v) for key, v in value.items()}
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list):
         return [_plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
     return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -20,7 +20,7 @@ PREDICTED, MEASURED, HELD_OUT = "e_n_error_predicted", "e_n_error_on_probes", "e
 SECONDS = "seconds_per_case_predicted"
 MEANING = {
     PREDICTED: ("", "predicted relative error of e_n", "Largest relative error of e_n that the cost study predicts for"
-                " the settings that accuracy.e_n chose: the sum over its knobs, or that of the chosen mesh."),
+                " the settings that accuracy.e_n chose: the sum over its parameters, or that of the chosen mesh."),
     MEASURED: ("", "relative error of e_n on probe cases", "Largest relative error of e_n of the chosen settings on the"
                " probe cases, against the limit of finer ones and with what that limit may be off. NaN: they were not"
                " solved there."),

@@ -96,7 +96,7 @@ def _scene(path):
 
 
 def _patch(path):
-    from softjaw.study.patch.reading import Reading, read_patch
+    from softjaw.study.patch.patch_reader import Reading, read_patch
 
     return read_patch(str(path), Reading("mm", "kpa"))
 
@@ -120,7 +120,7 @@ def _result(path):
 
 
 def _cost(path):
-    from softjaw.study.accuracy.cost.study import load
+    from softjaw.study.accuracy.cost_study import load
 
     return load(path)
 
@@ -139,8 +139,7 @@ QUICK = {
 
 def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
-    from softjaw.study.accuracy.cost.measure import Measured
-    from softjaw.study.accuracy.cost.study import CostStudy, save
+    from softjaw.study.accuracy.cost_study import CostStudy, Measured, save
     from tests.study.formula_results import make
     from tests.study.patch_files import cylinder_mesh, vtk
 

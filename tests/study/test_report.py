@@ -17,6 +17,7 @@ import pytest
 from softjaw.study.case.result import CaseResult
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
@@ -24,7 +25,6 @@ from softjaw.study.result.store import ResultWriter, create, open_result
 from softjaw.study.scene.objects import EllipticCylinderShape, SphereShape
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, shape_outline
-from softjaw.study.show.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report
 from softjaw.study.show.tables.show import best

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 
-from softjaw.study.accuracy.cost.command import SIZES
+from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
 from softjaw.study.environment import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.page import Block, plot
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number
-from softjaw.study.show.page import Block, plot
 from softjaw.study.show.stored_surface import StoredSurface, shadow_outline, stored_surface
 from softjaw.study.show.tables.ranking import largest
 from softjaw.study.show.view.pads import Pad, pads

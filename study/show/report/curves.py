@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.flags import Flag
+from softjaw.study.page import Block, heading, label, plot
 from softjaw.study.quantities import MODELS
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.outline import swept_object
-from softjaw.study.show.page import Block, heading, label, plot
 from softjaw.study.show.view.model import View
 
 # map, title, factor from SI; "F" divides by the normal force

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.page import Block, label, plot
 from softjaw.study.quantities import EFFECTS, PARTS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.show import plots
 from softjaw.study.show.data import Data, number, shown
-from softjaw.study.show.page import Block, label, plot
 from softjaw.study.show.report.tables import note
 from softjaw.study.show.tables.ranking import largest
 

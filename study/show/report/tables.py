@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.flags import flags_in
+from softjaw.study.page import Block, bullets, details, table, text, verbatim
 from softjaw.study.quantities import EFFECTS, PARTS, REASONS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.run.progress import duration
 from softjaw.study.show.data import ABOVE, LIMITS, Data, number, passes
-from softjaw.study.show.page import Block, bullets, details, table, text, verbatim
 from softjaw.study.show.report.verdict import VALUES, flags_of, listed, safe_range, value
 from softjaw.study.show.tables.overview import RULE, wall_text
 from softjaw.study.show.tables.ranking import largest

@@ -14,13 +14,13 @@ import numpy as np
 
 from softjaw.study import pictures
 from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.page import Block, Section, box, heading, page, text
+from softjaw.study.page import answer as answer_block
 from softjaw.study.result.grid_surface import edges
 from softjaw.study.result.layout import FAILED
 from softjaw.study.result.store import open_result
 from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.outline import read_scene, swept_object
-from softjaw.study.show.page import Block, Section, box, heading, page, text
-from softjaw.study.show.page import answer as answer_block
 from softjaw.study.show.report import curves, maps, tables, verdict
 from softjaw.study.writing import write_file
 

@@ -57,7 +57,7 @@ def _target(scene: Any) -> str:
     """What will be chosen for a target of accuracy; empty without one."""
     if scene.accuracy.e_n is None:
         return ""
-    from softjaw.study.accuracy.cost.target import expected
+    from softjaw.study.accuracy.choose import expected
 
     return expected(scene)
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from softjaw.study.page import Block, Section, label, page, plot, text
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
-from softjaw.study.show.page import Block, Section, label, page, plot, text
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
 from softjaw.study.show.report.tables import note
 from softjaw.study.show.stored_surface import stored_surface

@@ -17,9 +17,10 @@ from softjaw.friction.frame import FrameFlag
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
 from softjaw.study.messages import StudyError
-from softjaw.study.patch.answer import SURFACES, check_facing, judge, principal_direction
-from softjaw.study.patch.reading import Reading, corner_geometry, read_patch
-from softjaw.study.patch.text import PLANES, section
+from softjaw.study.patch.answer import SURFACES, check_facing, evaluate_patch, principal_direction
+from softjaw.study.patch.answer_text import PLANES, section
+from softjaw.study.patch.faces import corner_geometry
+from softjaw.study.patch.patch_reader import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT
@@ -224,11 +225,11 @@ def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
     picture = tmp_path / "sections.svg"
     limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["ccm"]
     assert picture.read_text().count("<path") > 20
-    judged = judge(read_patch(str(EXAMPLE), Reading()), MU)
-    largest = [limits[f"{name}_max"] / judged.contact.limits["ccm"].S for name in ("f_x", "f_y", "tau_z")]
+    patch = evaluate_patch(read_patch(str(EXAMPLE), Reading()), MU)
+    largest = [limits[f"{name}_max"] / patch.contact.limits["ccm"].S for name in ("f_x", "f_y", "tau_z")]
     for name in ("exact", "three_motions"):
         for plane in PLANES:
-            reach = section(judged, name, plane).max(axis=0)
+            reach = section(patch, name, plane).max(axis=0)
             assert reach == pytest.approx([largest[k] for k in plane], rel=2e-2 if name == "exact" else 1e-9)
 
 

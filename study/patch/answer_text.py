@@ -1,26 +1,38 @@
-"""The answer about patches as people read it: the record with lengths in mm and angles in degrees, and a picture."""
+"""``softjaw patch``: from files and options to the answer, as text with lengths in mm, as JSON or as a picture."""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.patch.answer import DEFINITIONS, FRICTION, SCORES, SURFACES, UNITS
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.patch.answer import (
+    DEFINITIONS,
+    FRICTION,
+    SCORES,
+    SURFACES,
+    UNITS,
+    EvaluatedPatch,
+    as_json,
+    as_record,
+    evaluate_patch,
+    grasp_record,
+)
+from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
 from softjaw.study.writing import write_file
 
-if TYPE_CHECKING:
-    from softjaw.study.patch.answer import JudgedPatch
-
+PICTURES = (".png", ".svg")
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
 PLANES = ((0, 1), (0, 2), (1, 2))
-LOOK = {
+LOOK: dict[str, dict[str, Any]] = {
     "exact": {"color": "#1d2429", "linewidth": 2.2},
     "three_motions": {"color": "#c05a00", "linestyle": "--"},
     "axis_aligned": {"color": "#8a5a9e", "linestyle": "-."},
@@ -29,8 +41,34 @@ LOOK = {
 }
 
 
+def answer_text(options: Namespace) -> str:
+    """Read, evaluate and score; the text or the JSON of it."""
+    if options.other and options.distance:
+        raise StudyError(USAGE, "--distance: found beside --other, which gives the distance itself; remove one of them")
+    scored = options.other or options.distance
+    for name in ("object_length", "contact_length"):
+        if getattr(options, name) and not scored:
+            option = f"--{name.replace('_', '-')}"
+            raise StudyError(USAGE, f"{option}: found without a grasp to score; add --distance MM or --other FILE")
+    if options.picture and not options.picture.lower().endswith(PICTURES):
+        text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
+        raise StudyError(USAGE, f"{text}; for numbers write --json and redirect the output into a file")
+    reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
+    read = [read_patch(file, reading) for file in (options.file, options.other) if file]
+    patches = [evaluate_patch(patch, options.mu, options.long_side) for patch in read]
+    grasp = None
+    if scored:
+        lengths = (options.distance, options.object_length, options.contact_length)
+        metres = [None if mm is None else 1e-3 * mm for mm in lengths]
+        grasp = grasp_record(patches[0], patches[1] if options.other else None, options.surface, *metres)
+    if options.picture:
+        write_picture(patches, options.surface, Path(options.picture))
+    record = as_record(patches, grasp)
+    return as_json(record) if options.json else as_text(record)
+
+
 def as_text(record: dict[str, Any]) -> str:
-    """A block for each patch, one for the grasp, what the words mean and what the reader should know."""
+    """A block for each patch, one for the grasp, notes and definitions."""
     grasp = record["grasp"]
     blocks = [_patch_block(patch, record["mu"]) for patch in record["patches"]]
     blocks.append(_grasp_block(grasp) if grasp else ["no grasp is scored: add --distance MM for two such contacts that "
@@ -67,7 +105,7 @@ def _friction_table(patch: dict[str, Any]) -> list[str]:
 
 def _surface_table(surfaces: dict[str, Any]) -> list[str]:
     exact = surfaces["exact"]["volume"]
-    rows = [["limit surface (curved)", "volume / exact", "E_rad [%]", "E_dir [deg]"]]
+    rows = [["limit surface (ccm)", "volume / exact", "E_rad [%]", "E_dir [deg]"]]
     for kind, title in SURFACES.items():
         found = surfaces[kind]
         errors = [("E_rad", 100.0), ("E_dir", np.degrees(1.0))]
@@ -110,7 +148,7 @@ def _number(value: float) -> str:
 # --- picture ----------------------------------------------------------------------------------------------------------
 
 
-def write_picture(patches: Sequence[JudgedPatch], kind: str, path: Path) -> None:
+def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> None:
     """Sections of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format.
 
     Raises
@@ -122,27 +160,27 @@ def write_picture(patches: Sequence[JudgedPatch], kind: str, path: Path) -> None
 
     with pictures.style():
         drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))
-        for row, judged in zip(axes, patches, strict=True):
+        for row, patch in zip(axes, patches, strict=True):
             for place, plane in zip(row, PLANES, strict=True):
                 place.axhline(0, color=pictures.SOFT, linewidth=0.4)
                 place.axvline(0, color=pictures.SOFT, linewidth=0.4)
                 for name in dict.fromkeys(["exact", "three_motions", kind]):
-                    curve = section(judged, name, plane) * [1e3 if k == 2 else 1.0 for k in plane]
+                    curve = section(patch, name, plane) * [1e3 if k == 2 else 1.0 for k in plane]
                     place.plot(*curve.T, label=name.replace("_", " "), **LOOK[name])
                 place.set_xlabel(AXES[plane[0]])
                 place.set_ylabel(AXES[plane[1]])
-            row[0].set_title(f"{Path(judged.read.file).name}, curved model, mu = {judged.contact.mu:g}")
+            row[0].set_title(f"{Path(patch.read.file).name}, ccm, mu = {patch.contact.mu:g}")
         axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center")
         data = {".png": pictures.as_png, ".svg": pictures.as_svg}[path.suffix.lower()](drawn)
     write_file(path, data)
 
 
-def section(judged: JudgedPatch, kind: str, plane: tuple[int, int], n: int = 361) -> FloatArray:
-    """Curve in which a plane of two of ``(f_x, f_y, tau_z)`` meets a limit surface of the curved model, per unit of S.
+def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int], n: int = 361) -> FloatArray:
+    """Curve in which a plane of two of ``(f_x, f_y, tau_z)`` meets a limit surface of the CCM, per unit of S.
 
     Parameters
     ----------
-    judged : JudgedPatch
+    patch : EvaluatedPatch
     kind : str
         ``exact`` or a fitted surface.
     plane : (int, int)
@@ -157,7 +195,7 @@ def section(judged: JudgedPatch, kind: str, plane: tuple[int, int], n: int = 361
     phi = np.linspace(0, 2 * np.pi, n)
     u = np.zeros((n, 3))
     u[:, plane[0]], u[:, plane[1]] = np.cos(phi), np.sin(phi)
-    u *= [1.0, 1.0, judged.contact.rho]  # torque in proportion to force, for even steps
+    u *= [1.0, 1.0, patch.contact.rho]  # torque in proportion to force, for even steps
     with np.errstate(invalid="ignore", divide="ignore"):
-        curve = judged.surface("ccm", kind).radius(u)[:, None] * u
+        curve = patch.surface("ccm", kind).radius(u)[:, None] * u
     return curve[:, list(plane)]

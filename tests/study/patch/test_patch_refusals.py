@@ -9,8 +9,8 @@ import pytest
 
 from softjaw.study.cli import main
 from tests.study.launching import ROOT
+from tests.study.patch.test_patch import EXAMPLE, faceted
 from tests.study.patch_files import centres, cylinder_mesh, vtk
-from tests.study.test_patch import EXAMPLE, faceted
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 

@@ -1,47 +1,44 @@
-"""From measurements to errors: the limit that the levels of a parameter lead to, and how far each level is from it.
+"""From measurements to errors: the limit that a refinement series leads to, and how far each level is from it.
 
 Richardson extrapolation of several cases at once, with the order that the finest three levels show.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from softjaw.study.accuracy.cost.knobs import Knob, Level
-from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured
+from softjaw.study.accuracy.cost_study import QUANTITIES, Costs, CostStudy, Measured
+from softjaw.study.accuracy.parameters import Level, Parameter
 from softjaw.study.flags import Flag
-
-if TYPE_CHECKING:
-    from softjaw.study.accuracy.cost.study import CostStudy
 
 FloatArray = NDArray[np.float64]
 SAME_WAY = 0.75  # share of the change in which both steps must go the same way
 LOWEST, HIGHEST = 0.5, 6.0  # orders that are believed
-NOISE = 1e-9  # relative changes below this tell nothing
+NOISE = 1e-9  # relative changes below this say nothing
 SAFETY = 0.25  # of the correction by an observed order, which may be off by so much: Roache's factor of 1.25
 ASSUMED = 1.5  # order with which the last step is taken to shrink where none is seen: that of a contact's edge
 SAME = 1e-9  # relative difference of values that is none: the same state by another order of sums
 
 
 @dataclass(frozen=True)
-class Limit:
-    """Where a ladder of levels leads.
+class Extrapolation:
+    """Reference solution of a refinement series.
 
     Attributes
     ----------
     value : (cases,) array
         The limit: extrapolated where the order was seen, else the finest level.
-    uncertainty : (cases,) array
-        How far the finest level is from its limit, or from the level before it where no order was seen (absolute).
-    doubt : (cases,) array
-        How far ``value`` itself may be off (absolute); NaN where a single level tells nothing, 0 where the last of
+    distance : (cases,) array
+        Of the finest level from its limit, or from the level before it where no order was seen (absolute).
+    error_estimate : (cases,) array
+        How far ``value`` itself may be off (absolute); NaN where a single level says nothing, 0 where the last of
         discrete levels is exact by definition.
     order : float
         Observed order; NaN where none was seen.
@@ -50,13 +47,13 @@ class Limit:
     """
 
     value: FloatArray
-    uncertainty: FloatArray
-    doubt: FloatArray
+    distance: FloatArray
+    error_estimate: FloatArray
     order: float
     note: str
 
 
-def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
+def extrapolate(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Extrapolation:
     """Limit of values at falling sizes, Roache's generalised Richardson extrapolation.
 
     Parameters
@@ -70,7 +67,7 @@ def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
 
     Examples
     --------
-    >>> found = limit([4, 2, 1], [[1.16], [1.04], [1.01]], formal=2.0)
+    >>> found = extrapolate([4, 2, 1], [[1.16], [1.04], [1.01]], formal=2.0)
     >>> round(found.order, 6), found.value.round(6).tolist()
     (2.0, [1.0])
     """
@@ -78,17 +75,17 @@ def limit(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> Limit:
     finest = f[-1].copy()
     step = np.abs(f[-1] - f[-2]) if len(f) > 1 else np.full(finest.shape, np.nan)
     if not np.isfinite(h).all():
-        return Limit(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
+        return Extrapolation(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
     order, note = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
     used = ASSUMED if note else order if np.isnan(formal) else min(order, formal)
     correction, before = (_correction(h[k - 2 : k or None], f[k - 2 : k or None], used) for k in (0, -1))
     if note:
         shrunk = np.abs(before) * (h[-1] / h[-2]) ** used if len(h) > 1 else before
-        return Limit(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, note)
+        return Extrapolation(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, note)
     known = np.isfinite(correction)
     value = np.where(known, finest + np.where(known, correction, 0.0), finest)
-    doubt = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))
-    return Limit(value, np.where(known, np.abs(value - finest), step), doubt, order, "")
+    estimate = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))
+    return Extrapolation(value, np.where(known, np.abs(value - finest), step), estimate, order, "")
 
 
 def _correction(h: FloatArray, f: FloatArray, order: float) -> FloatArray:
@@ -129,19 +126,18 @@ def observed_order(h: FloatArray, f: FloatArray) -> tuple[float, str]:
     return float(brentq(excess, LOWEST, HIGHEST, xtol=1e-10)), ""
 
 
-def front(seconds: ArrayLike, error: ArrayLike) -> list[int]:
-    """Numbers of the settings on the Pareto front, the cheapest first; those without a value are left out.
+def pareto_front(cost: ArrayLike, error: ArrayLike) -> list[int]:
+    """Numbers of the settings that no other beats, the cheapest first; those without a value are left out.
 
     Examples
     --------
-    >>> front([1.0, 2.0, 3.0, 4.0], [0.1, 0.2, 0.05, float("nan")])
+    >>> pareto_front([1.0, 2.0, 3.0, 4.0], [0.1, 0.2, 0.05, float("nan")])
     [0, 2]
     """
-    t, e = np.asarray(seconds, float), np.asarray(error, float)
-    known = [int(i) for i in np.lexsort((e, t)) if np.isfinite(t[i]) and np.isfinite(e[i])]
+    t, e = np.asarray(cost, float), np.asarray(error, float)
     kept: list[int] = []
-    for i in known:
-        if not kept or e[i] < e[kept[-1]]:
+    for i in np.lexsort((e, t)).tolist():
+        if np.isfinite([t[i], e[i]]).all() and (not kept or e[i] < e[kept[-1]]):
             kept.append(i)
     return kept
 
@@ -153,7 +149,7 @@ class LevelErrors:
     Attributes
     ----------
     seconds, own : float
-        CPU time of one case, the mean over the probes, and the part that the knob itself takes [s].
+        CPU time of one case, the mean over the probes, and the part that the parameter itself takes [s].
     by_case : (4, cases) array
         Relative errors for `QUANTITIES`; NaN where a case has no value.
     message : str
@@ -161,7 +157,7 @@ class LevelErrors:
     flags : (cases,) array
     """
 
-    name: str
+    level: Level
     seconds: float
     own: float
     by_case: FloatArray
@@ -174,42 +170,43 @@ class LevelErrors:
         return self.by_case.max(axis=1)
 
     @property
-    def middle(self) -> FloatArray:
+    def median(self) -> FloatArray:
         """Median error over all cases ``(4,)``."""
         return np.median(self.by_case, axis=1)
 
 
 @dataclass(frozen=True)
-class KnobErrors:
-    """Errors of the measured levels of one knob, the cheapest setting first.
+class ParameterErrors:
+    """Errors of the measured levels of one parameter, the cheapest first.
 
-    ``found[level][probe]`` is what was measured, ``settings`` are the levels of a knob of the contact solve; one that
-    leaves the contact as it is has none. ``own`` is the scene's own level or -1, ``reference`` the limits that errors
-    are measured against where another knob of the family knows them better.
+    ``parameter`` has the measured levels only, and as ``own`` the one that is the scene as it is; ``found[level]
+    [probe]`` is what was measured, ``reference`` the limits that errors are measured against where another parameter of
+    the family knows them better.
     """
 
-    name: str
-    names: tuple[str, ...]
+    parameter: Parameter
     found: Sequence[Sequence[Measured]]
-    knob: Knob | None = None
-    settings: tuple[Level, ...] = ()
-    own: int = -1
-    reference: tuple[Limit, ...] | None = None
+    reference: tuple[Extrapolation, ...] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter."""
+        return self.parameter.name
 
     @property
     def family(self) -> str:
-        """Knobs of one family lead to the same limit."""
-        return self.knob.family if self.knob else ""
+        """Parameters of one family lead to the same limit."""
+        return self.parameter.family or self.parameter.name
 
     @property
-    def judging(self) -> bool:
-        """Whether the knob leaves the contact as it is."""
-        return not self.settings
+    def own(self) -> int:
+        """The scene's own level, or -1."""
+        return self.parameter.own
 
     @property
-    def ladder(self) -> bool:
+    def series(self) -> bool:
         """Whether finer levels lead on to a limit, or the last of discrete levels is exact by definition."""
-        return bool(self.settings) and not any(np.isnan(s.size) for s in self.settings)
+        return not any(math.isnan(level.size) for level in self.parameter.levels)
 
     @cached_property
     def values(self) -> FloatArray:
@@ -217,42 +214,68 @@ class KnobErrors:
         return np.array([np.concatenate([m.values for m in own]) for own in self.found])
 
     @cached_property
-    def limits(self) -> tuple[Limit, ...]:
-        """The knob's own limit of each of `QUANTITIES`."""
-        sizes = [s.size for s in self.settings] or [np.nan] * len(self.names)
-        formal = self.knob.formal if self.knob else np.nan
-        return tuple(limit(sizes, self.values[:, :, q], formal) for q in range(len(QUANTITIES)))
+    def limits(self) -> tuple[Extrapolation, ...]:
+        """The parameter's own limit of each of `QUANTITIES`."""
+        sizes = [level.size for level in self.parameter.levels]
+        return tuple(extrapolate(sizes, self.values[:, :, q], self.parameter.formal) for q in range(len(QUANTITIES)))
 
     @cached_property
     def levels(self) -> tuple[LevelErrors, ...]:
         """Errors of every level; the finest is at least as uncertain as its own limit says."""
         ends = self.reference or self.limits
         made = []
-        for i, (name, own) in enumerate(zip(self.names, self.found, strict=True)):
+        for i, (level, own) in enumerate(zip(self.parameter.levels, self.found, strict=True)):
             errors = np.array([np.abs(self.values[i, :, q] - e.value) / np.abs(e.value) for q, e in enumerate(ends)])
             # an extrapolated limit may lie on the finest level by chance
-            if i == len(self.names) - 1 and self.ladder:
-                errors = np.fmax(errors, np.array([e.uncertainty / np.abs(e.value) for e in self.limits]))
+            if i == len(self.found) - 1 and self.series:
+                errors = np.fmax(errors, np.array([e.distance / np.abs(e.value) for e in self.limits]))
             seconds, part = (float(np.mean([getattr(m, a) for m in own])) for a in ("seconds", "own"))
             message = "; ".join(dict.fromkeys(m.message for m in own if m.message))
-            made.append(LevelErrors(name, seconds, part, errors, message, flags_of(own)))
+            made.append(LevelErrors(level, seconds, part, errors, message, flags_of(own)))
         return tuple(made)
 
     @property
-    def doubts(self) -> FloatArray:
+    def estimates(self) -> FloatArray:
         """To what the limit of e_n is known, relative to it ``(cases,)``; infinite where that is not known."""
-        return np.nan_to_num(self.limits[0].doubt / np.abs(self.limits[0].value), nan=np.inf)
-
-    @property
-    def doubt(self) -> float:
-        """The largest of ``doubts``."""
-        return float(self.doubts.max())
+        return np.nan_to_num(self.limits[0].error_estimate / np.abs(self.limits[0].value), nan=np.inf)
 
 
-def best_known(tables: Sequence[KnobErrors], family: str) -> KnobErrors:
-    """The knob of a family, or of this name, whose limit is known best."""
-    own = [t for t in tables if (t.family or t.name) == family]
-    return min([t for t in own if t.ladder] or own, key=lambda t: t.doubt)
+def best_known(tables: Sequence[ParameterErrors], family: str) -> ParameterErrors:
+    """The parameter of a family whose limit is known best."""
+    own = [t for t in tables if t.family == family]
+    return min([t for t in own if t.series] or own, key=lambda t: float(t.estimates.max()))
+
+
+def error_tables(costs: Costs, study: CostStudy) -> list[ParameterErrors]:
+    """Errors of every parameter with at least two measured levels."""
+    made = []
+    for parameter in costs.parameters:
+        known = [(level, costs.setting(parameter, level)) for level in parameter.levels]
+        known = [(level, setting) for level, setting in known if study.has(setting)]
+        pairs = [(v, setting) for v, setting in known if parameter.evaluation or _any_value(study.of(setting))]
+        if len(pairs) > 1:
+            levels, settings = zip(*pairs, strict=True)
+            table = ParameterErrors(replace(parameter, levels=levels), [study.of(setting) for setting in settings])
+            own = -1 if parameter.evaluation else _own(settings, table.values, study)
+            made.append(replace(table, parameter=replace(table.parameter, own=own)))
+    for i, table in enumerate(made):
+        # meshes of both kinds of elements, and rules of collocation, lead to one limit
+        best = best_known(made, table.family)
+        if best is not table:
+            made[i] = replace(table, reference=best.limits)
+    return made
+
+
+def _any_value(found: Sequence[Measured]) -> bool:
+    return bool(np.isfinite(np.concatenate([m.values for m in found])).any())
+
+
+def _own(settings: Sequence[str], values: FloatArray, study: CostStudy) -> int:
+    """The level that is the scene's own setting, or the cheapest that gives the same; -1 for none."""
+    if study.base in settings:
+        return settings.index(study.base)
+    base = np.concatenate([m.values for m in study.of(study.base)])
+    return next((i for i, v in enumerate(values) if np.allclose(v, base, rtol=SAME, atol=0.0)), -1)
 
 
 def flags_of(found: Sequence[Measured]) -> NDArray[np.int64]:
@@ -273,37 +296,3 @@ def flagged(flags: NDArray[np.int64], reference: NDArray[np.int64]) -> NDArray[n
 def unsure(reference: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which cases of a reference say themselves that their mesh is not to be trusted."""
     return (reference & (Flag.COARSE | Flag.NODAL)) != 0
-
-
-def _own(settings: list[str], values: FloatArray, study: CostStudy) -> int:
-    """The level that is the scene's own setting, or the cheapest that gives the same; -1 for none."""
-    if study.base in settings:
-        return settings.index(study.base)
-    base = np.concatenate([m.values for m in study.of(study.base)])
-    alike = (i for i, v in enumerate(values) if np.allclose(v, base, rtol=SAME, atol=0.0))
-    return next(alike, -1)
-
-
-def tables(study: CostStudy, knobs: Sequence[Knob], settings: dict[tuple[str, str], str],
-           judging: dict[str, list[str]]) -> list[KnobErrors]:  # fmt: skip
-    """Errors of every knob with at least two measured levels; ``settings`` by knob and level."""
-    made = []
-    for knob in knobs:
-        known = [v for v in knob.levels if study.has(settings[knob.name, v.name])]
-        pairs = [(v, study.of(settings[knob.name, v.name])) for v in known]
-        pairs = [(v, found) for v, found in pairs if np.isfinite([m.values for m in found]).any()]
-        if len(pairs) > 1:
-            levels, found = zip(*pairs, strict=True)
-            table = KnobErrors(knob.name, tuple(v.name for v in levels), found, knob, levels)
-            own = _own([settings[knob.name, v.name] for v in levels], table.values, study)
-            made.append(replace(table, own=own))
-    for i, table in enumerate(made):
-        # meshes of both kinds of elements, and rules of collocation, lead to one limit
-        best = best_known(made, table.family) if table.family else table
-        if best is not table:
-            made[i] = replace(table, reference=best.limits)
-    for name, levels in judging.items():
-        known = [v for v in levels if study.has(f"{name}: {v}")]
-        if len(known) > 1:
-            made.append(KnobErrors(name, tuple(known), [study.of(f"{name}: {v}") for v in known]))
-    return made

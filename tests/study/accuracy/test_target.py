@@ -10,16 +10,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softjaw.study.accuracy.cost.measure import Measured
-from tests.study.test_cost import COARSE, CYLINDER, formula_study, scene
+from softjaw.study.accuracy.choose import choose, reference
+from softjaw.study.accuracy.convergence import error_tables, extrapolate
+from softjaw.study.accuracy.cost_study import Measured, new_study, plain
+from softjaw.study.accuracy.measure import measure_once
+from softjaw.study.accuracy.parameters import Level, with_level
+from softjaw.study.accuracy.target import mesh_errors, quick_choice, quick_probes
+from softjaw.study.case.probes import Probe, demanding
+from softjaw.study.case.sweep import units
+from softjaw.study.scene import load_scene
+from tests.study.accuracy.test_cost import COARSE, CYLINDER, formula_study, scene
 
 COARSE_FLAG, NOT_ANTIPODAL = 4096, 256
 SIZES = [1.0, 0.7, 0.5, 0.35, 0.25]
 
 
 def levels(count=5):
-    from softjaw.study.accuracy.cost.knobs import Level
-
     return [Level(f"mesh {i}", (("gripper.elements", [2 + 2 * i, 4, 4]),), SIZES[i]) for i in range(count)]
 
 
@@ -27,42 +33,36 @@ def measured(e_n, flags=None, label="probe"):
     """What was measured of one probe on one mesh; one e_n and one flag for each force."""
     values = np.tile(np.asarray(e_n, float)[:, None], 4)
     forces = np.arange(1.0, len(values) + 1)
-    return Measured("", "", label, forces, values, 1.0, flags=None if flags is None else np.array(flags, float))
+    return Measured("", "", label, forces, values, 1.0, flags=np.array(flags or 0, float))
 
 
 # --- what a limit is worth ------------------------------------------------------------------------------------------
 
 
 def test_the_doubt_of_a_limit_holds_the_truth_where_the_order_is_seen():
-    from softjaw.study.accuracy.cost.errors import limit
-
     h, scale = np.array([2.0, 1.4, 1.0]), np.array([0.1, -0.02, 0.3])
-    found = limit(h, 1.0 + scale * h[:, None] ** 2, formal=2.0)
-    assert found.doubt == pytest.approx(0.25 * np.abs(scale))  # Roache's factor of safety, 1.25
-    steep = limit(h, 1.0 + scale * h[:, None] ** 4, formal=2.0)
-    assert (np.abs(steep.value - 1.0) <= steep.doubt).all()
+    found = extrapolate(h, 1.0 + scale * h[:, None] ** 2, formal=2.0)
+    assert found.error_estimate == pytest.approx(0.25 * np.abs(scale))  # Roache's factor of safety, 1.25
+    steep = extrapolate(h, 1.0 + scale * h[:, None] ** 4, formal=2.0)
+    assert (np.abs(steep.value - 1.0) <= steep.error_estimate).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_one_lucky_step_does_not_make_a_limit_certain(seed):
     """Errors that fall with the order 1.5 and have any sign, of which the last two are the same by chance."""
-    from softjaw.study.accuracy.cost.errors import limit
-
     random = np.random.default_rng(seed)
     h = np.array([2.0, 1.4, 1.0])
     values = 1.0 + 0.03 * h**1.5 * random.choice([-1.0, 1.0], 3)
     values[2] = values[1] * (1 + 1e-7)
-    found = limit(h, values[:, None], formal=2.0)
+    found = extrapolate(h, values[:, None], formal=2.0)
     assert math.isnan(found.order)
     if abs(values[0] - values[1]) > 0.03:
-        assert found.doubt[0] >= abs(values[2] - 1.0) / 3  # the step before is not forgotten
-    assert found.doubt[0] >= 0.5 * abs(values[0] - values[1]) * 0.7**1.5
+        assert found.error_estimate[0] >= abs(values[2] - 1.0) / 3  # the step before is not forgotten
+    assert found.error_estimate[0] >= 0.5 * abs(values[0] - values[1]) * 0.7**1.5
 
 
 def test_levels_without_a_size_end_in_what_is_exact():
-    from softjaw.study.accuracy.cost.errors import limit
-
-    assert limit([math.nan, math.nan], [[1.1], [1.0]]).doubt == 0.0
+    assert extrapolate([math.nan, math.nan], [[1.1], [1.0]]).error_estimate == 0.0
 
 
 # --- which mesh is taken ----------------------------------------------------------------------------------------------
@@ -70,47 +70,39 @@ def test_levels_without_a_size_end_in_what_is_exact():
 
 def test_the_doubt_of_the_reference_counts():
     """The last two meshes agree by chance: nothing shows that the error of the first of them is 1 % and not more."""
-    from softjaw.study.accuracy.cost.target import judge
-
     found = [[measured([v])] for v in (1.04, 1.0101, 1.01)]
-    judged = judge(levels(3), found, 0.01)
+    judged = mesh_errors(levels(3), found, 0.01)
     assert judged.chosen is None
     assert judged.error[1, 0] > 0.01
 
 
 def test_a_mesh_that_is_good_by_chance_is_not_taken():
     """Errors of 0.1, 3, 0.75 and 0.19 %: the coarsest is right for no reason that the finer ones share."""
-    from softjaw.study.accuracy.cost.target import judge
-
     found = [[measured([1.0 + e])] for e in (0.001, 0.03, 0.0147, 0.0072, 0.0035)]
-    judged = judge(levels(), found, 0.01)
+    judged = mesh_errors(levels(), found, 0.01)
     assert judged.error[0, 0] == judged.error[1, 0] > 0.01
     assert judged.chosen == 3
-    assert judge(levels(3), found[:3], 0.01).best == 2  # and not the coarsest where none is good
+    assert mesh_errors(levels(3), found[:3], 0.01).best == 2  # and not the coarsest where none is good
 
 
 @pytest.mark.parametrize("flag", [COARSE_FLAG, NOT_ANTIPODAL, 8])
 def test_a_mesh_with_a_flag_that_the_finest_has_not_is_not_taken(flag):
-    from softjaw.study.accuracy.cost.target import judge
-
     values = [1.0 + 0.004 * h**2 for h in SIZES]
-    free = judge(levels(), [[measured([v])] for v in values], 0.01)
+    free = mesh_errors(levels(), [[measured([v])] for v in values], 0.01)
     assert free.chosen == 0
     flags = [flag, flag, 0, 0, 0]
-    judged = judge(levels(), [[measured([v], [f])] for v, f in zip(values, flags, strict=True)], 0.01)
+    judged = mesh_errors(levels(), [[measured([v], [f])] for v, f in zip(values, flags, strict=True)], 0.01)
     assert judged.chosen == 2
-    assert not judge(levels(2), [[measured([v])] for v in values[:2]], 0.01).known
+    assert not mesh_errors(levels(2), [[measured([v])] for v in values[:2]], 0.01).known
     assert judged.known
 
 
 def test_a_case_that_is_coarse_on_the_finest_mesh_leaves_the_target_open():
-    from softjaw.study.accuracy.cost.target import judge
-
     values = [[1.0 + 0.004 * h**2, 1.0 + h] for h in SIZES]
-    judged = judge(levels(), [[measured(v, [0, COARSE_FLAG])] for v in values], 0.01)
+    judged = mesh_errors(levels(), [[measured(v, [0, COARSE_FLAG])] for v in values], 0.01)
     assert judged.chosen == 0
     assert not judged.known
-    assert "probe, 2 N" in judged.told
+    assert "probe, 2 N" in judged.note
 
 
 def test_the_hardest_contact_is_a_probe():
@@ -118,10 +110,6 @@ def test_the_hardest_contact_is_a_probe():
 
     At the other stations it misses less than 1 %.
     """
-    from softjaw.study.case.probes import demanding
-    from softjaw.study.case.sweep import units
-    from softjaw.study.scene import load_scene
-
     bottle = load_scene("jobs/bottle-rigid.toml", ["candidates.stations_mm=[25, 64.7, 69.1, 104.4, 113.2, 130.9]"])
     chosen = demanding(units(bottle, lambda point: point.axis_symmetry))
     assert chosen[0].candidate.station == pytest.approx(0.0647)
@@ -131,8 +119,6 @@ def test_the_hardest_contact_is_a_probe():
 @pytest.mark.parametrize("forces", [[2], [2, 8], [1, 2, 4, 8, 12]])
 @pytest.mark.parametrize("stations", [[0], list(range(-20, 21, 4))])
 def test_cases_held_out_are_none_of_the_probes(stations, forces):
-    from softjaw.study.accuracy.cost.target import quick_probes
-
     text = CYLINDER.replace("stations_mm = [0]", f"stations_mm = {stations}").replace("[2, 8]", str(forces))
     found, others, cases = quick_probes(scene(text))
     assert cases == 2 * len(stations) * len(forces)
@@ -145,10 +131,6 @@ def test_cases_held_out_are_none_of_the_probes(stations, forces):
 
 def made_up(e_n_of, flags_of=lambda point, label: 0):
     """A climb of meshes on made-up numbers: how it chooses for a target on one probe and one case held out."""
-    from softjaw.study.accuracy.cost.knobs import with_level
-    from softjaw.study.accuracy.cost.study import new_study, plain
-    from softjaw.study.accuracy.cost.target import quick_choice
-
     own = scene(overrides=["accuracy.e_n=0.01"])
     found, others = ([SimpleNamespace(label=name, forces=(1.0, 2.0))] for name in ("probe", "other"))
 
@@ -202,8 +184,6 @@ def test_flagged_meshes_are_passed_over_however_small_their_error():
 @pytest.mark.parametrize("seed", range(6))
 def test_measured_times_do_not_change_the_choice(seed):
     """The same study with every time wrong by a factor of up to three chooses the same."""
-    from softjaw.study.accuracy.cost.choose import choose
-
     what, study, probes, solve, _ = formula_study(scene(overrides=COARSE))
     first = choose(what, study, 0.01, {}, probes, (), solve)
     random = np.random.default_rng(seed)
@@ -216,13 +196,11 @@ def test_measured_times_do_not_change_the_choice(seed):
 
 
 def test_a_choice_from_a_study_counts_flags_doubts_and_cases_held_out():
-    from softjaw.study.accuracy.cost.choose import choose, reference
-
     what, study, probes, solve, _ = formula_study(scene(overrides=COARSE))
     plain_choice = choose(what, study, 0.02, {}, probes, (), solve)
-    goal = reference(study, what.errors(study))
-    assert (goal.doubt > 0).all()
-    assert goal.error(study.of(study.base)) > goal.doubt.max()
+    goal = reference(study, error_tables(what, study))
+    assert (goal.estimate > 0).all()
+    assert goal.error(study.of(study.base)) > goal.estimate.max()
 
     setting = next(key for key, _ in study.measured if all(str(v) in key for v in plain_choice.values.values()))
     for key in [key for key in study.measured if key[0] == setting]:
@@ -277,13 +255,6 @@ FINER = {"gripper.elements": [20, 10, 6], "gripper.element": "hex27"}
 )
 def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(text, target):
     """Five cases that no probe has, at random, on the mesh that was chosen and on a much finer one."""
-    from softjaw.study.accuracy.cost.knobs import Level
-    from softjaw.study.accuracy.cost.measure import measure_once
-    from softjaw.study.accuracy.cost.study import new_study
-    from softjaw.study.accuracy.cost.target import quick_choice, quick_probes
-    from softjaw.study.case.probes import Probe
-    from softjaw.study.case.sweep import units
-
     own = scene(text, [f"accuracy.e_n={target}"])
     found, others, cases = quick_probes(own)
     study = new_study(own, found, "", "")

@@ -1,14 +1,32 @@
-"""What accuracy costs: extrapolation, baseline, knobs, file and choice, on formulas; the command in the long tests."""
+"""What accuracy costs: extrapolation, baseline, parameters, file, choice, on formulas; the command in long tests."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from softjaw.fem.objects.shapes import EllipticCylinder, Plane
+from softjaw.study.accuracy.choose import choose, reference
+from softjaw.study.accuracy.combinations import combinations, explicit
+from softjaw.study.accuracy.convergence import error_tables, extrapolate, pareto_front
+from softjaw.study.accuracy.cost import refuse_ranks
+from softjaw.study.accuracy.cost_page import cost_page, sentences
+from softjaw.study.accuracy.cost_study import Measured, costs, load, new_study, plain, save, setting_of
+from softjaw.study.accuracy.measure import Measuring, measure
+from softjaw.study.accuracy.parameters import Level, Skipped, contact_parameters, refusal, weight, with_level
+from softjaw.study.accuracy.target import quick_choice, refinement_series, with_choice
+from softjaw.study.case import model
+from softjaw.study.case.candidates import axis_poses
+from softjaw.study.case.probes import probes, stiffness, winkler_pad
+from softjaw.study.cli import main
+from softjaw.study.messages import DONE, OTHER_FILE, USAGE, StudyError
+from softjaw.study.result.store import open_result
 from softjaw.study.scene import parse_scene
+from tests.study.launching import launch
 
 CYLINDER = """
 [object]
@@ -50,14 +68,12 @@ def scene(text=CYLINDER, overrides=()):
 
 @pytest.mark.parametrize("order", [0.8, 1.5, 2.0, 2.9])
 def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
-    from softjaw.study.accuracy.cost.errors import limit
-
     h, scale = np.array([3.0, 2.1, 1.0]), np.array([0.1, -0.02, 0.3])
     exact = np.array([1.0, 2.0, 0.5])
-    found = limit(h, exact + scale * h[:, None] ** order, formal=3.0)
+    found = extrapolate(h, exact + scale * h[:, None] ** order, formal=3.0)
     assert found.order == pytest.approx(order, rel=1e-8)
     assert found.value == pytest.approx(exact, rel=1e-9)
-    assert found.uncertainty == pytest.approx(np.abs(scale), rel=1e-7)
+    assert found.distance == pytest.approx(np.abs(scale), rel=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -71,29 +87,23 @@ def test_any_ratio_of_sizes_gives_the_order_and_the_limit(order):
     ],
 )
 def test_an_order_that_is_not_there_is_not_seen(values, why):
-    from softjaw.study.accuracy.cost.errors import limit
-
-    found = limit([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
+    found = extrapolate([4.0, 2.0, 1.0], np.array(values)[:, None], formal=2.0)
     assert math.isnan(found.order)
     assert why in found.note
     assert found.value == values[-1]  # the finest level, not a guess
 
 
 def test_an_order_above_the_formal_one_is_not_trusted():
-    from softjaw.study.accuracy.cost.errors import limit
-
     h = np.array([4.0, 2.0, 1.0])
-    found = limit(h, (1.0 + 0.01 * h**4)[:, None], formal=2.0)
+    found = extrapolate(h, (1.0 + 0.01 * h**4)[:, None], formal=2.0)
     assert found.order == pytest.approx(4.0)
-    assert found.uncertainty[0] == pytest.approx(0.01 * 15 / 3)  # the last step over 2^2 - 1
+    assert found.distance[0] == pytest.approx(0.01 * 15 / 3)  # the last step over 2^2 - 1
 
 
 def test_the_front_is_what_nothing_beats():
-    from softjaw.study.accuracy.cost.errors import front
-
     random = np.random.default_rng(3)
     t, e = random.random((2, 50))
-    kept = front(t, e)
+    kept = pareto_front(t, e)
     for i in range(50):
         beaten = any(t[k] <= t[i] and e[k] <= e[i] and (t[k], e[k]) != (t[i], e[i]) for k in range(50))
         assert (i in kept) != beaten
@@ -103,17 +113,11 @@ def test_the_front_is_what_nothing_beats():
 
 
 def finger_on(obj, gripper):
-    from softjaw.study.case import model
-    from softjaw.study.case.candidates import axis_poses
-
     return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
 
 
 def test_springs_on_a_plane_carry_alike():
     """Uniform pressure, closing displacement F t / (E_oed A); E_oed is 3 G for nu = 1/4."""
-    from softjaw.fem.objects.shapes import Plane
-    from softjaw.study.case.probes import winkler_pad
-
     gripper = scene().gripper
     pad = winkler_pad(gripper, finger_on(Plane(0.02), gripper))
     area = gripper.pad_length * gripper.pad_width
@@ -123,9 +127,6 @@ def test_springs_on_a_plane_carry_alike():
 
 def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     """p = k (d - y^2 / 2R): F = 2/3 k L a^3 / R for narrow contacts, order 2 in the spacing of the springs."""
-    from softjaw.fem.objects.shapes import EllipticCylinder
-    from softjaw.study.case.probes import stiffness, winkler_pad
-
     gripper, R, force = scene().gripper, 0.2, 1.0
     finger = finger_on(EllipticCylinder(R, R, 1.0), gripper)
     k, L = stiffness(gripper), gripper.pad_length
@@ -140,30 +141,26 @@ def test_springs_on_a_cylinder_reach_the_half_width_of_the_closed_form():
     assert (patch.normal == [0, 0, 1]).all()
 
 
-# --- knobs --------------------------------------------------------------------------------------------------------
+# --- parameters -----------------------------------------------------------------------------------------------------
 
 
 def test_every_level_is_a_scene_and_refused_ones_say_why():
-    from softjaw.study.accuracy.cost.knobs import contact_knobs, with_level
-
     own = scene(BOTTLE.format(wall=0.4), COARSE_WALL)
-    knobs, _ = contact_knobs(own)
-    names = [k.name for k in knobs]
+    parameters, _ = contact_parameters(own)
+    names = [p.name for p in parameters]
     assert {"pad mesh, hex8", "pad mesh, hex27", "wall mesh", "solver tolerance", "effect: object"} <= set(names)
-    for knob in knobs:
-        digests = [with_level(own, level).digest for level in knob.levels]
-        assert len(set(digests)) == len(digests) or knob.name == "load steps"
-    pad = knobs[0]
+    for parameter in parameters:
+        digests = [with_level(own, level).digest for level in parameter.levels]
+        assert len(set(digests)) == len(digests) or parameter.name == "load steps"
+    pad = parameters[0]
     assert len(pad.levels) >= 4
     assert with_level(own, pad.levels[pad.own]).digest == own.digest
     assert all(np.diff([level.size for level in pad.levels]) < 0)
-    assert [level.name for level in knobs[names.index("effect: object")].levels][-1] == "nonlinear shell"
-    assert "wall mesh" not in [k.name for k in contact_knobs(scene())[0]]
+    assert [level.name for level in parameters[names.index("effect: object")].levels][-1] == "nonlinear shell"
+    assert "wall mesh" not in [p.name for p in contact_parameters(scene())[0]]
 
 
 def test_a_level_that_the_scene_refuses_is_skipped_with_its_reason():
-    from softjaw.study.accuracy.cost.knobs import Level, refusal
-
     assert not refusal(scene(), Level("good", (("gripper.elements", [8, 4, 2]),)))
     assert "gripper.elements" in refusal(scene(), Level("odd", (("gripper.elements", [7, 4, 2]),)))
 
@@ -182,13 +179,9 @@ def e_n_of(point):
 
 def formula_study(own):
     """A study of the formula on two probes, and how it solves what it lacks."""
-    from softjaw.study.accuracy.cost.knobs import weight, with_level
-    from softjaw.study.accuracy.cost.measure import Measured
-    from softjaw.study.accuracy.cost.study import costs, new_study, plain
-
     own = plain(own)
     probes = [SimpleNamespace(label=f"probe {i}", forces=(1.0, 2.0)) for i in range(2)]
-    what = costs(own, with_judging=False)
+    what = costs(own, with_evaluation=False)
     study = new_study(own, probes, "formula", "formula.toml")
     study.calibration = 0.2
     calls = []
@@ -207,9 +200,6 @@ def formula_study(own):
 
 
 def test_a_study_comes_back_from_its_file(tmp_path):
-    from softjaw.study.accuracy.cost.knobs import Skipped
-    from softjaw.study.accuracy.cost.study import load, save
-
     _, study, *_ = formula_study(scene(overrides=COARSE))
     study.skipped.append(Skipped("pad mesh, hex8", "huge", "would take 3 h; raise --time-limit"))
     save(tmp_path / "cost.hdf", study)
@@ -224,9 +214,6 @@ def test_a_study_comes_back_from_its_file(tmp_path):
 
 
 def test_another_file_is_refused(tmp_path):
-    from softjaw.study.accuracy.cost.study import load
-    from softjaw.study.messages import OTHER_FILE, StudyError
-
     (tmp_path / "text.hdf").write_text("no HDF5")
     for name in ("text.hdf", "missing.hdf"):
         with pytest.raises(StudyError, match=name) as caught:
@@ -236,11 +223,11 @@ def test_another_file_is_refused(tmp_path):
 
 def test_errors_and_orders_are_those_of_the_formula():
     what, study, *_ = formula_study(scene(overrides=COARSE))
-    table = next(t for t in what.errors(study) if t.name == "pad mesh, hex8")
+    table = next(t for t in error_tables(what, study) if t.name == "pad mesh, hex8")
     assert table.limits[0].order == pytest.approx(2.0, abs=1e-6)
-    h = np.array([level.size for level in table.settings])
+    h = np.array([level.size for level in table.parameter.levels])
     assert [level.worst[0] for level in table.levels] == pytest.approx(list(h**2), rel=1e-6)
-    assert table.levels[table.own].name == "12 x 6 x 4"
+    assert table.levels[table.own].level.name == "12 x 6 x 4"
 
 
 @pytest.mark.parametrize(
@@ -253,9 +240,6 @@ def test_errors_and_orders_are_those_of_the_formula():
     ],
 )
 def test_the_choice_meets_the_target_at_the_least_cost(text, target):
-    from softjaw.study.accuracy.cost.choose import choose, combinations
-    from softjaw.study.accuracy.cost.knobs import with_level
-
     what, study, probes, solve, _ = formula_study(scene(text, [*COARSE, *(COARSE_WALL if "wall" in text else [])]))
     choice = choose(what, study, target, {}, probes, (), solve)
     exact = 0.01
@@ -263,17 +247,15 @@ def test_the_choice_meets_the_target_at_the_least_cost(text, target):
     def error(level):
         return e_n_of(with_level(what.scene, level)) / exact - 1
 
-    made = combinations(what.errors(study), float(np.mean([m.seconds for m in study.of(study.base)])), {})
+    made = combinations(error_tables(what, study), float(np.mean([m.seconds for m in study.of(study.base)])), {})
     good = [c for c in made if error(c.level) <= target]
-    assert good, "the ladder of this test has to reach the target"
+    assert good, "the series of this test has to reach the target"
     assert error(next(c.level for c in made if dict(c.level.values) == choice.values)) <= target * (1 + 1e-6)
     assert choice.met
     assert choice.seconds <= 1.5 * min(c.seconds for c in good)
 
 
 def test_what_the_scene_gives_itself_stays():
-    from softjaw.study.accuracy.cost.choose import choose, explicit
-
     own = scene(overrides=[*COARSE, "gripper.element=hex8", "accuracy.e_n=0.01"])
     what, study, probes, solve, _ = formula_study(own)
     given = explicit(own)
@@ -286,26 +268,22 @@ def test_what_the_scene_gives_itself_stays():
 
 
 def test_a_second_choice_solves_nothing_and_chooses_the_same():
-    from softjaw.study.accuracy.cost.choose import choose
-
     own = scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL])
     what, study, probes, solve, calls = formula_study(own)
     first = choose(what, study, 0.02, {}, probes, (), solve)
-    assert calls  # combinations that were not on any ladder
+    assert calls  # combinations that were not of any series
     calls.clear()
     assert repr(choose(what, study, 0.02, {}, probes, (), solve)) == repr(first)
     assert not calls
 
 
 def test_a_run_without_a_study_climbs_no_further_than_needed():
-    from softjaw.study.accuracy.cost.target import ladder, quick_choice
-
     own = scene(overrides=["accuracy.e_n=0.02"])
     _, study, probes, solve, calls = formula_study(own)
     study.measured.clear()
     saved = []
     choice = quick_choice(own, study, probes, (), 1000, lambda: saved.append(1), solve)
-    names = [level.name for level in ladder(own)]
+    names = [level.name for level in refinement_series(own)]
     chosen = names.index(" x ".join(map(str, choice.values["gripper.elements"])))
     assert e_n_of(own.with_values(choice.values)) / 0.01 - 1 <= 0.02
     assert len(calls) / 2 <= max(3, chosen + 2)  # on two probes: the chosen mesh and one finer
@@ -316,8 +294,6 @@ def test_a_run_without_a_study_climbs_no_further_than_needed():
 
 
 def test_a_given_mesh_leaves_nothing_to_choose():
-    from softjaw.study.accuracy.cost.target import quick_choice, with_choice
-
     own = scene(overrides=[*COARSE, "accuracy.e_n=0.02"])
     _, study, probes, solve, _ = formula_study(own)
     choice = quick_choice(own, study, probes, (), 10, list, solve)
@@ -328,10 +304,8 @@ def test_a_given_mesh_leaves_nothing_to_choose():
 
 @pytest.mark.long
 def test_words_tell_price_and_need():
-    from softjaw.study.accuracy.cost.page import cost_page, sentences
-
     what, study, *_ = formula_study(scene(BOTTLE.format(wall=0.4), [*COARSE, *COARSE_WALL]))
-    tables = what.errors(study)
+    tables = error_tables(what, study)
     text = " ".join(sentences(study, tables))
     assert "in e_n costs" in text
     assert "'nonlinear shell' is needed, 'rigid' moves e_n by" in text
@@ -341,9 +315,6 @@ def test_words_tell_price_and_need():
 
 
 def test_ranks_are_refused(monkeypatch):
-    from softjaw.study.accuracy.cost.command import refuse_ranks
-    from softjaw.study.messages import USAGE, StudyError
-
     for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"):
         monkeypatch.delenv(name, raising=False)
     refuse_ranks()
@@ -355,7 +326,7 @@ def test_ranks_are_refused(monkeypatch):
 
 # --- three scenes, solved -----------------------------------------------------------------------------------------
 
-LADDERS = ("pad mesh, hex8", "wall mesh", "effect: object")
+SERIES = ("pad mesh, hex8", "wall mesh", "effect: object")
 
 
 @pytest.mark.long
@@ -369,23 +340,16 @@ LADDERS = ("pad mesh, hex8", "wall mesh", "effect: object")
 )
 def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
     """All that is predicted much cheaper than the choice is solved too: none within 1 % costs below 2/3."""
-    from dataclasses import replace
-
-    from softjaw.study.accuracy.cost.choose import choose, combinations, reference
-    from softjaw.study.accuracy.cost.measure import measure
-    from softjaw.study.accuracy.cost.study import Measuring, costs, new_study, setting_of
-    from softjaw.study.case.probes import probes
-
     own, target = scene(text, overrides), 0.01
-    what = costs(own, with_judging=False)
-    what = replace(what, knobs=tuple(k for k in what.knobs if k.name in LADDERS))
+    what = costs(own, with_evaluation=False)
+    what = replace(what, parameters=tuple(p for p in what.parameters if p.name in SERIES))
     found = probes(own, count=1)
     study = new_study(own, found, "three scenes", "")
     Measuring(study, found, what, None, lambda _: None).run(60.0)
-    choice = choose(what, study, target, {}, found)
+    choice = choose(what, study, target, {}, found, (), measure)
     assert choice.met
     assert choice.measured <= target
-    tables = what.errors(study)
+    tables = error_tables(what, study)
     goal, base = reference(study, tables), float(np.mean([m.seconds for m in study.of(study.base)]))
     for combination in combinations(tables, base, {}):
         if combination.seconds > choice.seconds / 1.5:
@@ -404,10 +368,6 @@ def test_nothing_much_cheaper_than_the_choice_meets_the_target(text, overrides):
 
 @pytest.mark.long
 def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
-    from softjaw.study.accuracy.cost.study import load
-    from softjaw.study.cli import main
-    from softjaw.study.messages import DONE, OTHER_FILE, USAGE
-
     file, out = tmp_path / "small.toml", tmp_path / "small-cost.hdf"
     file.write_text(CYLINDER)
     words = ["cost", str(file), "-o", str(out), *(w for v in COARSE for w in ("--set", v))]
@@ -432,10 +392,6 @@ def test_the_command_measures_goes_on_and_says_what_to_do(tmp_path, capsys):
 @pytest.mark.long
 @pytest.mark.launches
 def test_a_run_with_a_target_says_what_it_chose_and_goes_on_with_it(tmp_path, once):
-    from softjaw.study.messages import DONE
-    from softjaw.study.result.store import open_result
-    from tests.study.launching import launch
-
     file, out = tmp_path / "small.toml", tmp_path / "small.hdf"
     file.write_text(CYLINDER)
     words = ["-m", "softjaw", "run", file, "-o", out, "--set", "accuracy.e_n=0.03"]

@@ -13,9 +13,12 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+import jinja2
+from plotly.offline import get_plotlyjs
+
 Block = dict[str, Any]
 Section = tuple[str, str, list[Block]]
-FOLDER = "softjaw.study.show.templates"
+FOLDER = "softjaw.study.templates"
 
 
 def text(words: str, look: str = "") -> Block:
@@ -88,14 +91,11 @@ def label(words: str) -> str:
 
 def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """The page of sections ``(anchor, heading, blocks)``, the first without a heading; empty ones are left out."""
-    import jinja2
-    from plotly.offline import get_plotlyjs
-
     made = jinja2.Environment(loader=jinja2.PackageLoader(*FOLDER.rsplit(".", 1)), autoescape=True)
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
     shown = [dict(zip(("anchor", "heading", "blocks"), s, strict=True)) for s in sections if s[2]]
     own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")]
-    drawn = any(block["kind"] == "plot" for s in shown for block in s["blocks"])
+    drawn = any(block["kind"] == "plot" for _, _, blocks in sections for block in blocks)
     scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if drawn else []
     return made.get_template("page.html").render(
         title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)

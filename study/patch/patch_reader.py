@@ -1,0 +1,258 @@
+"""Faces of a contact patch from a table (CSV) or a VTK file (VTU, VTP): read, brought to SI units and checked."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.friction.patch import FloatArray
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, shortened
+from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
+from softjaw.study.result.trial import trouble
+from softjaw.study.scene.problems import Problem, shown
+
+ENDINGS = (".csv", ".vtu", ".vtp")
+LARGEST_FILE = 100 * 2**20  # bytes
+MOST_FACES = 500_000
+FACTORS = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "area": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+    "pressure": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm2": 1e6},
+    "number": {"-": 1.0, "1": 1.0},
+}
+OPTIONS = {"length": ("--unit", "mm", "mm"), "area": ("--unit", "mm2", "mm"),
+           "pressure": ("--pressure-unit", "kpa", "kpa")}  # fmt: skip
+CENTRE, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
+CORNERS = tuple(f"{axis}{k}" for k in (1, 2, 3, 4) for axis in "xyz")
+KINDS = dict.fromkeys((*CENTRE, *CORNERS), "length") | dict.fromkeys(NORMAL, "number")
+KINDS |= {"area": "area", "pressure": "pressure"}
+ALIASES = {f"{stem}_{axis}": f"n{axis}" for stem in ("n", "normal") for axis in "xyz"}
+HEADER = re.compile(r"(?P<name>.*?)\s*(?:_(?P<tail>[^_\s\[\]()]+)|[\[(](?P<boxed>[^\[\]()]*)[\])])?")
+MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the user says about a file that the file does not say itself.
+
+    Parameters
+    ----------
+    unit : str or None
+        Unit of lengths and, squared, of areas that carry none: ``m``, ``cm`` or ``mm``.
+    pressure_unit : str or None
+        Unit of a pressure that carries none: ``pa``, ``kpa`` or ``mpa``.
+    pressure_name : str or None
+        Name of the column or data array that holds the pressure; by default ``pressure``.
+    flip_normals : bool
+        Whether all normals are turned to the other side.
+    """
+
+    unit: str | None = None
+    pressure_unit: str | None = None
+    pressure_name: str | None = None
+    flip_normals: bool = False
+
+    def unit_of(self, kind: str) -> str | None:
+        """Unit of a bare ``length``, ``area``, ``pressure`` or ``number``."""
+        area = f"{self.unit}2" if self.unit else None
+        return {"length": self.unit, "area": area, "pressure": self.pressure_unit, "number": "-"}[kind]
+
+
+def read_patch(file: str, reading: Reading) -> ReadPatch:
+    """The patch in a file, in the file's coordinates.
+
+    Raises
+    ------
+    StudyError
+        With code 3 if the file cannot be read as what its ending says, 2 if what it holds is no patch.
+    """
+    path = Path(file)
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        text = f"{file}: found {f'the ending {path.suffix}' if path.suffix else 'no ending'}, expected one of "
+        raise StudyError(USAGE, f"{text}{', '.join(ENDINGS)}; export the patch as CSV, or as VTU or VTP from ParaView")
+    try:
+        size = path.stat().st_size
+        if not path.is_file():  # a device or a pipe may have no end
+            raise StudyError(OTHER_FILE, f"{file}: not a regular file; name the file of a patch")
+        path.open("rb").close()
+    except OSError as error:
+        raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
+    if size > LARGEST_FILE:
+        text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
+        raise StudyError(USAGE, f"{text}; export the contact surface alone")
+    if ending == ".csv":
+        return checked(_read_table(path, reading), reading.flip_normals)
+    from softjaw.study.patch.vtk_faces import read_vtk  # slow to import, and not needed for tables
+
+    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
+        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
+    return checked(read_vtk(path, reading), reading.flip_normals)
+
+
+def refused(path: Path, line: int | None, key: str, found: str, expected: str, remedy: str) -> StudyError:
+    """The error of a single problem of a file."""
+    return StudyError(USAGE, str(Problem(str(path), line, key, found, expected, remedy)))
+
+
+def check_count(path: Path, count: int) -> None:
+    """Refuse more faces than a patch may have, before they are read."""
+    if count > MOST_FACES:
+        text = f"{path}: found {count} faces, expected at most {MOST_FACES}; export the contact surface alone"
+        raise StudyError(USAGE, text)
+
+
+def split_header(header: str, pressure_name: str | None = None) -> tuple[str, str | None] | None:
+    """Quantity and unit of a header (None where it has no unit); None for a column that has no meaning here.
+
+    ``pressure_name`` is the header, with or without its unit, of the column that holds the pressure.
+
+    Examples
+    --------
+    >>> split_header("x_mm"), split_header("Pressure [kPa]"), split_header("area"), split_header("x_inch")
+    (('x', 'mm'), ('pressure', 'kpa'), ('area', None), None)
+    """
+    text = header.strip().lower()
+    wanted = (pressure_name or "pressure").strip().lower()
+    name, unit = text, None
+    if found := HEADER.fullmatch(text):
+        name = found["name"]
+        unit = (found["tail"] or found["boxed"] or "").replace(" ", "").replace("^", "").replace("²", "2") or None
+    if text in ALIASES or text in KINDS:
+        name, unit = ALIASES.get(text, text), None
+    if wanted == text:
+        return "pressure", unit if unit in FACTORS["pressure"] else None
+    if name == "pressure" or wanted == name:
+        return ("pressure", unit) if wanted == name and unit in FACTORS["pressure"] else None
+    known = name in KINDS and (unit is None or unit in FACTORS[KINDS[name]])
+    return (name, unit) if known else None
+
+
+# --- table ------------------------------------------------------------------------------------------------------------
+
+
+def _read_table(path: Path, reading: Reading) -> Faces:
+    """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
+    numbers, (headers, *cells) = _rows(path)
+    headers = [header.strip() for header in headers]
+    found = [split_header(header, reading.pressure_name) for header in headers]
+    position = {pair[0]: i for i, pair in enumerate(found) if pair}
+    twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(found)
+             if pair is not None and position[pair[0]] != i]  # fmt: skip
+    refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
+            for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
+    needed = _needed(position)
+    given = {pair[0]: pair[1] for pair in found if pair}
+    units = {name: given[name] or reading.unit_of(KINDS[name]) or "" for name in needed}
+    bare = [name for name in needed if not units[name]]
+    refuse([_without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
+            for kind in dict.fromkeys(KINDS[name] for name in bare)])  # fmt: skip
+    values = _numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
+    with np.errstate(over="ignore"):  # what is not finite is reported with its place
+        values = {name: FACTORS[KINDS[name]][units[name]] * row for name, row in values.items()}
+    unused = [h for pair, h in zip(found, headers, strict=True) if pair and pair[0] not in needed]
+    unused += [h for pair, h in zip(found, headers, strict=True) if pair is None]
+    notes = (f"not used of {path}: {', '.join(unused)}",) if unused else ()
+    stacked = {names: np.stack([values[name] for name in names], axis=-1) for names in (CENTRE, NORMAL)
+               if names[0] in values}  # fmt: skip
+    corners = None
+    if CORNERS[0] not in values:
+        geometry = stacked[CENTRE], values["area"], stacked[NORMAL]
+    else:
+        corners = np.stack([values[name] for name in CORNERS if name in values], axis=-1).reshape(len(cells), -1, 3)
+        if corners.shape[1] == 4:  # a triangle leaves its fourth corner empty
+            corners[:, 3] = np.where(np.isnan(corners[:, 3]).all(axis=1)[:, None], corners[:, 2], corners[:, 3])
+        centroid, area, normal = corner_geometry(corners)
+        geometry = centroid, area, stacked.get(NORMAL, normal)
+    return Faces(str(path), lambda i: f"line {numbers[i + 1]}", *geometry, values["pressure"], corners, notes)
+
+
+def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
+    """Numbers of the lines that are neither empty nor comments, and their cells."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise StudyError(OTHER_FILE, f"{path}: no text file; export the patch as CSV, VTU or VTP") from error
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        found, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
+        raise refused(path, None, "", found, expected, f"write {MINIMAL}")
+    check_count(path, len(lines) - 1)
+    mark = max(",;\t", key=lines[0][1].count)
+    rows: list[list[str]] = []
+    for number, line in lines:  # one by one: no quotation mark may swallow the lines behind it
+        try:
+            rows += csv.reader([line], delimiter=mark, strict=True)
+        except csv.Error as error:
+            remedy = "write numbers with a decimal point, without quotation marks"
+            raise refused(path, number, "", f"a line that is no table ({error})", "cells", remedy) from error
+    return [k for k, _ in lines], rows
+
+
+def _needed(names: Any) -> list[str]:
+    """Quantities that are read: corners and what goes with them if there are any."""
+    if CORNERS[0] in names:
+        return [*CORNERS[:9], *(n for n in (*CORNERS[9:], *NORMAL) if n in names), "pressure"]
+    return [*CENTRE, "area", *NORMAL, "pressure"]
+
+
+def _missing(path: Path, headers: Sequence[str], names: Any, reading: Reading) -> list[Problem]:
+    wanted = _needed(names)
+    for group in (CORNERS[9:], NORMAL):  # all or none of them
+        wanted += group if any(n in names for n in group) else ()
+    absent = [name for name in dict.fromkeys(wanted) if name not in names]
+    if not absent:
+        return []
+    remedy = f"name the columns, for example {MINIMAL}"
+    if all(map(_is_number, headers)):
+        return [Problem(str(path), 1, "", "numbers and no column names", "column names in the first line", remedy)]
+    if absent == ["pressure"]:
+        named = f"called {reading.pressure_name}" if reading.pressure_name else "named pressure"
+        remedy = f"no column is {named}: give the column's name with --pressure-name"
+    units = ", ".join(unit for kind, factors in FACTORS.items() if kind != "number" for unit in factors)
+    found = f"the columns {shortened(', '.join(headers), 300)}"
+    return [Problem(str(path), 1, "", found, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
+
+
+def _without_unit(path: Path, kind: str, headers: Sequence[str]) -> Problem:
+    option, suffix, unit = OPTIONS[kind]
+    remedy = f"write {headers[0]}_{suffix}, or add {option} {unit}: units are not guessed"
+    return Problem(str(path), 1, ", ".join(headers), "no unit", f"a unit of {kind}", remedy)
+
+
+def _numbers(
+    path: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], headers: Sequence[str], position: dict[str, int]
+) -> dict[str, FloatArray]:
+    """Values of the columns at some positions, as they stand there; a fourth corner may be empty (NaN)."""
+    problems = []
+    values = {name: np.full(len(rows), np.nan) for name in position}
+    for i, (line, cells) in enumerate(zip(numbers, rows, strict=True)):
+        if len(cells) != len(headers):
+            found, expected = f"{len(cells)} cells", f"{len(headers)} as in the line of names"
+            remedy = "complete the line; write numbers with a decimal point, not a comma"
+            problems.append(Problem(str(path), line, "", found, expected, remedy))
+            continue
+        for name, k in position.items():
+            cell = cells[k].strip()
+            if _is_number(cell):
+                values[name][i] = float(cell)
+            elif cell or name not in CORNERS[9:]:
+                comma = "," in cell and "." not in cell
+                remedy = "write a decimal point" if comma else "repair the cell or leave the face out"
+                found = shown(cell) if cell else "an empty cell"
+                problems.append(Problem(str(path), line, headers[k], found, "a finite number", remedy))
+    refuse(problems)
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return bool(np.isfinite(float(cell)))
+    except ValueError:
+        return False
