@@ -7,7 +7,6 @@ are crossed out. Nothing here needs a display.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -15,13 +14,16 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patheffects import withStroke
+
+from softjaw.study.quantities import MODEL_NAMES
 
 INK, SOFT, EMPTY = "#1d2429", "#6b747b", "#e7e9eb"
 MODEL_LOOKS = {  # name, colour, line, marker
-    "ccm": ("CCM", "#12436d", "-", "o"),
-    "pcm": ("PCM", "#c05a00", "--", "s"),
-    "pcm_projected": ("PCM scaled by F_N", "#2a8c82", ":", "^"),
+    "ccm": (MODEL_NAMES["ccm"], "#12436d", "-", "o"),
+    "pcm": (MODEL_NAMES["pcm"], "#c05a00", "--", "s"),
+    "pcm_projected": (MODEL_NAMES["pcm_projected"], "#2a8c82", ":", "^"),
 }
 COLOURS = {
     "quality": "viridis",
@@ -30,7 +32,7 @@ COLOURS = {
     "indentation": "plasma_r",
     "wall_stress": "inferno_r",
 }
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.titlesize": 9.5,
@@ -62,9 +64,8 @@ def figure(
     width: float, height: float, rows: int = 1, columns: int = 1, gap: float = 0.08, **layout: Any
 ) -> tuple[Any, Any]:
     """A figure of so many inches and its axes, ``(rows, columns)`` ``gap`` inches apart; it needs no window."""
-    made = Figure(figsize=(width, height), layout="constrained")
+    made = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=gap))
     FigureCanvasAgg(made)
-    made.get_layout_engine().set(w_pad=gap)
     return made, made.subplots(rows, columns, squeeze=False, **layout)
 
 
@@ -113,10 +114,10 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
     return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), **look)
 
 
-def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, limits: tuple[float, float], **look: Any) -> Any:
+def polygons(axes: Any, corners: np.ndarray, values: np.ndarray, limits: tuple[float, float], **look: Any) -> Any:
     """Polygons in the colours of ``values``."""
     look = {"edgecolor": "face", "linewidth": 0.5, **look}
-    drawn = PolyCollection(corners, array=np.ma.masked_invalid(values), **look)
+    drawn = PolyCollection(list(corners), array=np.ma.masked_invalid(values), **look)
     drawn.set_clim(*limits)
     axes.add_collection(drawn, autolim=False)
     return drawn

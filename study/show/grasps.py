@@ -1,4 +1,4 @@
-"""What report, view and figures ask of the dataset of a study: its grasps in their order, and cases in words.
+"""What report, view and figures ask of the dataset of a study: its grasps in their order, and cases as text.
 
 Everything reads the dataset that `study.result.read.open` gives, after `judge` has decided which force level and which
 grasp are shown. A case is named by its index ``(..., station, angle, force)`` over the axes of ``status``.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -29,13 +30,13 @@ ABOVE = ("min_det_f", "ellipticity")
 
 
 def unit_of(units: str) -> tuple[str, float]:
-    """Unit that people read, and the factor from SI to it."""
+    """Displayed unit, and the factor from SI to it."""
     unit = shown_unit(units)
     return TYPESET.get(unit, unit), shown(1.0, units)
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for people; a dash where there is none.
+    """A number as displayed; a dash where there is none.
 
     >>> number(0.0123456), number(1.6e-9), number(float("nan")), number(120000.0)
     ('0.0123', '1.6 × 10⁻⁹', '–', '120000')
@@ -67,8 +68,8 @@ def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
     return found.assign_attrs(best=next(iter(order(found, level)), None))
 
 
-def field(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray | None:
-    """Values of a variable over all cases, a map of several friction models in one; None where it has no value.
+def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
+    """Array of a variable over all cases, a map of several friction models in one; None where it has no value.
 
     Cases that are not done have NaN.
     """
@@ -93,7 +94,7 @@ def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:
 
 
 def quantity(ds: xr.Dataset, name: str) -> tuple[str, str, float]:
-    """A variable's long name without its unit, the unit people read, and the factor from SI."""
+    """A variable's long name without its unit, the displayed unit, and the factor from SI."""
     found = ds.variables[name].attrs if name in ds.variables else {}
     return found.get("long_name", name), *unit_of(found.get("units", ""))
 
@@ -105,7 +106,7 @@ def label_of(ds: xr.Dataset, name: str) -> str:
 
 
 def axis_label(ds: xr.Dataset, axis: str) -> str:
-    """An axis of the cases with the unit people read."""
+    """An axis of the cases with the displayed unit."""
     if axis == "station" and ds.attrs["poses"]:
         return "candidate"
     unit = unit_of(ds.variables[axis].attrs["units"])[0]
@@ -118,7 +119,7 @@ def spoken(name: str) -> str:
 
 
 def axis_values(ds: xr.Dataset, axis: str) -> np.ndarray:
-    """Values of an axis in the unit people read."""
+    """Values of an axis in the displayed unit."""
     return ds.variables[axis].values * unit_of(ds.variables[axis].attrs["units"])[1]
 
 
@@ -133,15 +134,15 @@ def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
 
 
 def place(ds: xr.Dataset, index: Index, force: bool = False) -> str:
-    """A case in words, without axes that have only one value; poses by their names."""
-    status, words = ds.variables["status"], []
-    for axis, i, length in zip(status.dims[:-1], index, status.shape, strict=False):
+    """A case as text, without axes that have only one value; poses by their names."""
+    status, parts = ds.variables["status"], []
+    for axis, i, length in zip(map(str, status.dims[:-1]), index, status.shape, strict=False):
         if axis == "station" and ds.attrs["poses"]:
-            words.append(str(ds.variables["label"].values[index[-3], index[-2]]) or f"pose {i}")
+            parts.append(str(ds.variables["label"].values[index[-3], index[-2]]) or f"pose {i}")
         elif length > 1 or axis == "station":
             gap = " " if ds.variables[axis].attrs.get("options") else "\u00a0"
-            words.append(f"{spoken(axis)}{gap}{axis_text(ds, axis, i)}")
-    return ", ".join([*words, *[axis_text(ds, "normal_force", index[-1])] * force])
+            parts.append(f"{spoken(axis)}{gap}{axis_text(ds, axis, i)}")
+    return ", ".join([*parts, *[axis_text(ds, "normal_force", index[-1])] * force])
 
 
 def forces(ds: xr.Dataset) -> np.ndarray:
@@ -154,13 +155,18 @@ def candidate_of(ds: xr.Dataset, index: Index) -> int:
     return int(np.ravel_multi_index(index[:-1], ds.status.shape[:-1]))
 
 
+def unravelled(position: int, shape: tuple[int, ...]) -> Index:
+    """Index of a position in the flattened array."""
+    return tuple(int(i) for i in np.unravel_index(position, shape))
+
+
 def order(ds: xr.Dataset, k: int) -> list[Index]:
     """Indices of the solved cases at a force level, the best first."""
     found, states = field(ds, ds.attrs["score"]), ds.status.values[..., k]
     done = np.flatnonzero(states.ravel() == DONE)
     score = np.full(done.shape, -np.inf) if found is None else found[..., k].ravel()[done]
     ranked = done[ranking(score, ds["flags"].values[..., k].ravel()[done])]
-    return [(*(int(i) for i in np.unravel_index(c, states.shape)), k) for c in ranked]
+    return [(*unravelled(int(c), states.shape), k) for c in ranked]
 
 
 def images(ds: xr.Dataset, index: Index) -> list[Index]:

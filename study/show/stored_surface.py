@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -41,9 +42,9 @@ class StoredSurface:
     ellipsoid: LimitSurface
     chosen: LimitSurface | None
     patch: ContactPatch | None
-    model: str
+    model: Any  # one of `softjaw.study.quantities.MODELS`
 
-    def wrenches(self, twist: np.ndarray) -> np.ndarray | None:
+    def wrenches(self, twist: np.ndarray) -> Any:
         """Exact wrenches ``(m, 3)`` [-] for motions ``(v_x, v_y, rho omega)``; None without a patch."""
         if self.patch is None:
             return None
@@ -51,12 +52,12 @@ class StoredSurface:
         found = friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES]
         return found / (S * np.array([1.0, 1.0, self.rho]))
 
-    def samples(self, count: int) -> np.ndarray | None:
+    def samples(self, count: int) -> Any:
         """Exact wrenches of evenly spread motions and of their opposites ``(2 count, 3)`` [-]."""
         found = self.wrenches(fibonacci_twists(count, 1.0))
         return None if found is None else np.vstack([found, -found])
 
-    def outline(self, i: int, j: int, count: int = 90) -> np.ndarray | None:
+    def outline(self, i: int, j: int, count: int = 90) -> Any:
         """Exact outline of the body's shadow on the plane of two components ``(count, 2)`` [-]."""
         found = self.wrenches(circle(i, j, count))
         return None if found is None else found[:, [i, j]]
@@ -112,7 +113,7 @@ def stored_surface(
     found = [field(ds, name) for name in names]
     if ds.status.values[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in found):
         return None
-    semi_axes, rho, S, f_x = (f[index][finger] for f in found if f is not None)
+    semi_axes, rho, S, f_x = (f[index][finger] for f in found)
     planar = f_x[MODELS.index("pcm")]
     if not (S > 0 and rho > 0 and planar > 0 and semi_axes[m].min() >= 0):
         return None

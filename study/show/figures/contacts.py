@@ -92,7 +92,7 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     place = f"station {number(1e3 * ds.station.values[0])} mm, {number(forces(ds)[-1])} N"
     axes[0, 1].set_title(f"pressure on its pad: {place}")
     pictures.colour_bar(drawn, mapped, axes[0, 1], "pressure [kPa]", beside=True)
-    off = 1e3 * np.linalg.norm(pad.own(pad.origin)[:2])
+    off = 1e3 * float(np.linalg.norm(pad.own(pad.origin)[:2]))
     return drawn, f"the contact's origin lies {number(off)} mm from the middle of the pad: pressure is not symmetric"
 
 
@@ -120,8 +120,8 @@ def outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
 def _front(axes: Any, pad: Pad, top: float) -> Any:
     """The pad's contact face in its own frame, with the contact frame and the pad's middle."""
     corners, loaded = 1e3 * pad.own(pad.quads().reshape(-1, 3)).reshape(-1, 4, 3)[..., :2], pad.loaded.ravel()
-    pale = {"cmap": "Greys", "limits": (0, 12), "edgecolor": "#d5dade"}
-    pictures.polygons(axes, corners[~loaded], np.zeros((~loaded).sum()), **pale).set_zorder(0)
+    pale = {"cmap": "Greys", "edgecolor": "#d5dade"}
+    pictures.polygons(axes, corners[~loaded], np.zeros((~loaded).sum()), (0, 12), **pale).set_zorder(0)
     pressure, colours = 1e-3 * pad.pressure.ravel()[loaded], pictures.COLOURS["pressure"]
     mapped = pictures.polygons(axes, corners[loaded], pressure, (0.0, top), cmap=colours)
     origin, frame = 1e3 * pad.own(pad.origin)[:2], pad.frame @ pad.rotation

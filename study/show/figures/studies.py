@@ -19,8 +19,8 @@ from softjaw.study.show.view.model import View, read_scene
 
 COMPONENTS = {"f_y": ("across, f_y", "-", "o"), "tau_z": ("torque, tau_z", "--", "s"), "f_x": ("along, f_x", ":", "^")}
 AGAINST = {"pcm": "against the PCM scaled by S, the paper's", "pcm_projected": "against the PCM scaled by F_N"}
-LOOKS = {"pcm": {"ms": 6, "mfc": "none", "lw": 1.0}, "pcm_projected": {"ms": 3.5, "lw": 1.3},
-         "ccm": {"ms": 3, "lw": 1.3}}  # fmt: skip
+LOOKS: dict[str, dict[str, Any]] = {"pcm": {"ms": 6, "mfc": "none", "lw": 1.0}, "pcm_projected": {"ms": 3.5, "lw": 1.3},
+                                    "ccm": {"ms": 3, "lw": 1.3}}  # fmt: skip
 QUANTITIES = {"e_n": ("e_n [mm]", 1e3), "quality": ("grasp quality [-]", 1.0)}
 
 

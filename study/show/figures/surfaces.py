@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -102,8 +103,8 @@ def fitted_surfaces(ds: xr.Dataset) -> tuple[Any, str]:
     drawn, axes = pictures.figure(WIDTH, 3.9, 1, 2)
     results = []
     for panel, (name, error), letter in zip(axes[0], errors.items(), "ab", strict=True):
-        image = solids.rendered(lambda plotter, n=name, e=error: _body(plotter, found, shapes[n], e, top),
-                                (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))  # fmt: skip
+        draw = partial(_body, found=found, shape=shapes[name], error=error, top=top)
+        image = solids.rendered(draw, (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))
         fit, mean, most = FITS[name][0], number(100 * at(ds, name, index), 2), number(error.max(), 2)
         pictures.placed(panel, image, f"({letter}) {fit}: {mean} % off on average")
         results.append(f"{fit}: mean {mean} % over motions, largest {most} %")
@@ -138,7 +139,7 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
 def fit_error_along(ds: xr.Dataset) -> tuple[Any, str]:
     """(c) Mean error of both fitted surfaces at every candidate along the object."""
     k, z = nearest(forces(ds), FORCE), 1e3 * ds.station.values
-    found = {name: 100 * field(ds, name) for name in FITS}
+    found: dict[str, Any] = {name: 100 * field(ds, name) for name in FITS}
     drawn, axes = pictures.figure(WIDTH, 2.9, 1, ds.sizes["angle"], gap=0.1, sharey=True)
     for j, panel in enumerate(axes[0]):
         for name, (label, colour, line, mark) in FITS.items():
@@ -147,9 +148,9 @@ def fit_error_along(ds: xr.Dataset) -> tuple[Any, str]:
         panel.set_title(f"{'(c) ' * (j == 0)}pressed at {axis_text(ds, 'angle', j)}, {number(forces(ds)[k])} N")
     axes[0, 0].set_ylabel("mean error of the radius [%]")
     axes[0, -1].legend(frameon=False, fontsize=8)
-    ellipsoid, quartic = found.values()
-    better = 100 * np.mean((quartic < ellipsoid)[np.isfinite(quartic)])
-    one, two = (np.nanmean(values[..., k]) for values in (ellipsoid, quartic))
+    ellipsoid, quartic = (found[name] for name in FITS)
+    better = 100 * float(np.mean((quartic < ellipsoid)[np.isfinite(quartic)]))
+    one, two = (float(np.nanmean(values[..., k])) for values in (ellipsoid, quartic))
     return drawn, (
         f"at {number(forces(ds)[k])} N on average {number(one, 2)} % for the ellipsoid, {number(two, 2)} % for the "
         f"quartic; the quartic fits better in {number(better)} % of the cases at all forces"

@@ -170,7 +170,7 @@ def abscissas(ds: xr.Dataset, scene: Any, position: int, index: Index) -> dict[s
 
 def _ellipse(ds: xr.Dataset, scene: Any, index: Index) -> tuple[float, float] | None:
     """Semi-axes along and across the approach [m] of an elliptic cylinder pressed along one of them."""
-    shape = getattr(scene_at(scene, index) if scene else None, "object", None)
+    shape: Any = getattr(scene_at(scene, index) if scene else None, "object", None)
     if getattr(shape, "shape", "") != "elliptic_cylinder" or ds.attrs["poses"]:
         return None
     turns = float(ds.angle.values[index[-2]]) / (0.5 * math.pi)
@@ -193,12 +193,12 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
                          showlegend=column == 1)  # fmt: skip
     made.update_xaxes(title_text=label(name)).update_yaxes(title_text="1 - CCM / PCM [%]")
     made.update_layout(legend={"y": -0.25})
-    bars = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
+    fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
     missing = int(np.sum(ds.status.values[..., index[-1]] != DONE))
     gaps = f" {missing} cases at this force have no value." if missing else ""
     caption = (
         f"At {number(forces(ds)[index[-1]])} N: the share of the planar model's claim that the curved contact cannot"
-        f" carry.{bars}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
+        f" carry.{fine}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
     )
     ends = {key: [number(100 * f(v), 2) for f in (np.nanmin, np.nanmax)] for key, (v, _) in lines.items()}
     summary = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
@@ -213,7 +213,7 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
     closing, indentation = field(ds, "closing"), field(ds, "indentation")
     if indentation is None or closing is None or len(forces(ds)) < 2:
         return None
-    cut = (*index[:-3], slice(None), index[-2], slice(None))
+    cut: Any = (*index[:-3], slice(None), index[-2], slice(None))
     snapped = (ds["flags"].values & Flag.SNAPPED > 0)[cut]
     made = plots.figure(1, 2, ("closing displacement of the pads [mm]", "indentation [mm]"), shared_yaxes=True)
     others = [i for i in range(len(snapped)) if i != index[-3]]
@@ -244,7 +244,7 @@ def wall_section(view: View, index: Index) -> Block | None:
     if found is None or origin is None:
         return None
     u, angle = found
-    before = undeformed(view.scene.object, angle)
+    before: Any = undeformed(view.scene.object, angle)
     out = np.array([math.cos(angle), math.sin(angle), 0.0])
     beside = np.array([-out[1], out[0], 0.0])
     j = int(np.abs(before[0, :, 2] - origin[index][0][2]).argmin())

@@ -24,6 +24,7 @@ from softjaw.study.show.grasps import (
     quantity,
     spoken,
     unit_of,
+    unravelled,
 )
 from softjaw.study.show.page import Block, label, plot
 from softjaw.study.show.report.tables import note
@@ -121,7 +122,8 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
         f"{f'At {where}. ' if where else ''}Choose the quantity at the upper left; point at a cell for its values and"
         " notes. Crosses: failed. Dots: not computed yet."
     )
-    alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, CCM and {models[1]}. {extremes(ds, index)}"
+    names = " and ".join(plots.MODELS[m][0] for m in models)
+    alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, {names}. {extremes(ds, index)}"
     return plot(made, caption, alt, total)
 
 
@@ -161,7 +163,7 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     (xl, xu), (yl, yu) = ((spoken(axis), unit_of(ds[axis].units)[0]) for axis in axes)
     hover = f"{xl} %{{x}} {xu}, {yl} %{{y}} {yu}<br>{label(title)}: %{{z:.4g}}<br>%{{customdata}}<extra></extra>"
     low, high = plots.span(np.concatenate([a.ravel() for a in z]))
-    rows = [None if not np.isfinite(a).any() else np.where(np.isfinite(a), a, None).tolist() for a in z]
+    rows = [None if not np.isfinite(a).any() else plots.with_gaps(a) for a in z]
     axis = {"colorscale": plots.colours(name), "cmin": low, "cmax": high, "colorbar": plots.bars(label(title))}
     return {"label": label(title), "method": "update",
             "args": [{"z": rows, "hovertemplate": [hover] * len(rows)}, {"coloraxis": axis}]}  # fmt: skip
@@ -184,14 +186,14 @@ def elsewhere(ds: xr.Dataset, index: Index, *drawn: int) -> str:
 
 
 def extremes(ds: xr.Dataset, index: Index) -> str:
-    """Ranges of the first maps at the force shown, in words."""
+    """Ranges of the first maps at the force shown, as text."""
     k, ranges = index[-1], []
     for name in FIRST:
         found = field(ds, name)
         if found is not None and np.isfinite(found[..., k]).any():
             text, unit, factor = quantity(ds, name)
             values = found[..., k] * factor
-            ends = [tuple(map(int, np.unravel_index(largest(s * values), values.shape))) for s in (-1, 1)]
+            ends = [unravelled(largest(sign * values), values.shape) for sign in (-1, 1)]
             (low, where), (high, there) = ((number(values[i]), place(ds, (*i, k))) for i in ends)
             ranges.append(f"{text} from {low} ({where}) to {high} {unit} ({there})")
     return f"At {number(forces(ds)[k])} N {'; '.join(ranges)}." if ranges else "No values."
@@ -243,8 +245,8 @@ def levels(ds: xr.Dataset, index: Index) -> Block | None:
     steps = [[(i + s) / 3, c] for i, c in enumerate(LEVEL_COLOURS) for s in (0, 1)]
     bar = {"tickvals": [0, 1, 2], "ticktext": list(EFFECTS["object"]), "thickness": 14}
     made = plots.figure()
-    z = np.where(np.isfinite(top), top, None).tolist()
-    made.add_heatmap(x=xv, y=yv, z=z, zmin=-0.5, zmax=2.5, colorscale=steps, colorbar=bar, customdata=depth,
+    made.add_heatmap(x=xv, y=yv, z=plots.with_gaps(top), zmin=-0.5, zmax=2.5, colorscale=steps, colorbar=bar,
+                     customdata=depth,
                      hovertemplate="%{x}, %{y}: level %{z}, indicator %{customdata:.3g}<extra></extra>")  # fmt: skip
     made.update_xaxes(**xs).update_yaxes(**ys).update_layout(plot_bgcolor=plots.EMPTY)
     counts = ", ".join(f"{name}: {int(np.sum(top == k))}" for k, name in enumerate(EFFECTS["object"]) if k in top)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import flags_in
-from softjaw.study.quantities import EFFECTS, PARTS, REASONS
+from softjaw.study.quantities import EFFECTS, MODEL_NAMES, PARTS, REASONS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.run.progress import duration
 from softjaw.study.show.grasps import (
@@ -29,6 +29,7 @@ from softjaw.study.show.grasps import (
     passes,
     place,
     spoken,
+    unravelled,
 )
 from softjaw.study.show.page import Block, bullets, details, table, text, verbatim
 from softjaw.study.show.report.verdict import VALUES, listed, safe_range, value
@@ -59,7 +60,7 @@ def best_grasps(ds: xr.Dataset) -> list[Block]:
     if not ranked:
         return []
     walled = "force_high" in ds
-    heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, PCM ({ds.attrs['planar']}) [mm]",
+    heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, {MODEL_NAMES[ds.attrs['planar']]} [mm]",
              "checks and notes"]  # fmt: skip
     shown: list[Index] = []
     merged: set[Index] = set()
@@ -164,7 +165,7 @@ def checks(ds: xr.Dataset) -> Block:
         found = field(ds, f"check_{name}")
         if found is None:
             continue
-        index = np.unravel_index(largest(-found if name in ABOVE else found), found.shape)
+        index = unravelled(largest(-found if name in ABOVE else found), found.shape)
         worst = float(found[index])
         limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
         state = "–" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
@@ -235,7 +236,7 @@ def time_split(ds: xr.Dataset) -> list[Block]:
     sums = {part: float(np.nansum(s)) for part in PARTS if (s := field(ds, f"work_seconds_{part}")) is not None}
     rows = [[part, duration(seconds), f"{seconds / whole:.0%}" if whole else "–"] for part, seconds in sums.items()]
     rows.append(["all", duration(whole), "100%"])
-    longest = np.unravel_index(np.nanargmax(total), total.shape)
+    longest = unravelled(int(np.nanargmax(total)), total.shape)
     slowest = f"Longest case: {number(total[longest])} s ({place(ds, longest, force=True)})."
     caption = f"Time of {int(np.sum(ds.status.values == DONE))} solved cases, summed over all ranks"
     return [table(caption, ["part", "time", "share"], rows, texts=(0,)), text(slowest, "note")]

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import BORNE
+from softjaw.study.quantities import MODEL_NAMES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.show.grasps import (
     Index,
@@ -207,7 +208,7 @@ def uncertainty(ds: xr.Dataset, name: str, index: Index) -> str:
 
 
 def value(ds: xr.Dataset, name: str, index: Index, digits: int = 4) -> str:
-    """A map's value in the unit people read, with its uncertainty where that is known."""
+    """A map's value in the displayed unit, with its uncertainty where that is known."""
     return number(at(ds, name, index) * quantity(ds, name)[2], digits) + uncertainty(ds, name, index)
 
 
@@ -219,7 +220,7 @@ def _planar(ds: xr.Dataset, index: Index) -> list[str]:
         if np.isfinite(change):
             more = f"{number(abs(change), 2)} % {'more' if change > 0 else 'less'}"
             claims.append(f"{more if abs(change) >= 0.05 else 'the same'} {name}")
-    return [f"A planar contact model (PCM, {planar}) would claim {' and '.join(claims)}."] if claims else []
+    return [f"A planar contact model ({MODEL_NAMES[planar]}) would claim {' and '.join(claims)}."] if claims else []
 
 
 def _other_force(ds: xr.Dataset, best: Index) -> list[str]:

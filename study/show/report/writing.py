@@ -185,8 +185,7 @@ def _maps(ds: xr.Dataset, index: Index) -> Any:
         for panel, j in zip(axes[:, column], rows, strict=True):
             here = (*index[:angle], j, index[-1])
             values, failed = (maps.plane(a, x, y, here) for a in (z, ds.status.values == FAILED))
-            look = {"cmap": pictures.COLOURS[name], "vmin": low, "vmax": high}
-            mapped = pictures.heat(panel, *borders, values, failed, **look)
+            mapped = pictures.heat(panel, *borders, values, failed, cmap=pictures.COLOURS[name], vmin=low, vmax=high)
             panel.set_yticks(range(len(forces(ds))), [number(f) for f in forces(ds)])
             panel.set_title(f"angle {axis_text(ds, 'angle', j)}" * (ds.sizes["angle"] > 1))
         pictures.colour_bar(drawn, mapped, list(axes[:, column]), label_of(ds, name))

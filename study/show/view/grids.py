@@ -22,7 +22,7 @@ def write_grids(view: View, index: Index, path: Path) -> list[Path]:
     forces, as steps of ParaView's time slider.
     """
     _write_object(view, index, path)
-    written, title = [path], f"{view.ds.attrs['title']}: {view.words(index, view.ds.attrs['score'])[0]}"
+    written, title = [path], f"{view.ds.attrs['title']}: {view.summary(index, view.ds.attrs['score'])[0]}"
     fronts = {k: found for k in range(len(forces(view.ds))) if (found := _fronts(view, (*index[:-1], k)))}
     if index[-1] in fronts:
         written.append(path.with_name(f"{path.stem}-pads{path.suffix}"))
@@ -60,8 +60,8 @@ def _fronts(view: View, index: Index) -> tuple[np.ndarray, np.ndarray, dict[str,
     both = view.pads(index)
     if not all(pad.pressure.size for pad in both) or not both:
         return None
-    faces = both[0].pressure.shape
+    i, j = both[0].pressure.shape
     values = {name: np.concatenate([getattr(pad, name).ravel() for pad in both]) for name in ("pressure", "area")}
     values["normal"] = np.concatenate([pad.normal.reshape(-1, 3) for pad in both])
-    values["finger"] = np.repeat([1, 2], np.prod(faces))
-    return np.concatenate([pad.front.reshape(-1, 3) for pad in both]), quads_of(faces, 0, 2), values
+    values["finger"] = np.repeat([1, 2], i * j)
+    return np.concatenate([pad.front.reshape(-1, 3) for pad in both]), quads_of((i, j), 0, 2), values

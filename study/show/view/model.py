@@ -20,7 +20,7 @@ from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undefo
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.scene import SceneError, parse_scene
-from softjaw.study.show.grasps import Index, candidate_of, field, forces, number, order, place, quantity
+from softjaw.study.show.grasps import Index, candidate_of, field, forces, number, order, place, quantity, unravelled
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.tables.ranking import nearest
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
@@ -49,7 +49,7 @@ class View:
     def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
         self.ds, self.point, self.note = ds, point, ""
         scene = read_scene(ds)
-        self.scene = None if scene is None else scene_at(scene, point)
+        self.scene: Any = None if scene is None else scene_at(scene, point)
         self._faces: dict[int, xr.Dataset] = {}
 
     @property
@@ -79,7 +79,7 @@ class View:
         return self.over_candidates(self.ds.status.values, force)
 
     def coloured(self, name: str) -> tuple[np.ndarray, tuple[float, float]]:
-        """A map in the unit people read, over all axes, and its smallest and largest value at this point."""
+        """A map in the displayed unit, over all axes, and its smallest and largest value at this point."""
         found = field(self.ds, name)
         values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
         return values, span(values[self.point])
@@ -182,7 +182,7 @@ class View:
         beside = np.cross(up, out)
         return 0.72 * out + 0.62 * beside / np.linalg.norm(beside) + 0.35 * up, up
 
-    def words(self, index: Index, name: str) -> list[str]:
+    def summary(self, index: Index, name: str) -> list[str]:
         """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""
         lines = [f"candidate {candidate_of(self.ds, index)}: {place(self.ds, index, force=True)}"]
         state = self.ds.status.values[index]
@@ -223,7 +223,7 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
         if not 0 <= candidate < count:
             text = f"--candidate: found {candidate}, expected 0 to {count - 1}, counted over stations and angles"
             raise StudyError(USAGE, text)
-        best = (*(int(i) for i in np.unravel_index(candidate, shape[:-1])), k)
+        best = (*unravelled(candidate, shape[:-1]), k)
     elif where != (None, None):
         if ds.attrs["poses"]:
             text = "--station, --angle: the candidates of this file are poses; choose with --candidate"
@@ -236,8 +236,9 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
 def _check_station(ds: xr.Dataset, station: float | None) -> None:
     """Refuse a station [m] that lies farther off the map than the map's stations lie apart: it has another unit."""
     places = np.sort(ds.station.values)
-    beyond = 0.0 if station is None else max(places[0] - station, station - places[-1])
-    if beyond > max(np.diff(places), default=0.0) + 1e-9:
+    if station is None:
+        return
+    if max(places[0] - station, station - places[-1]) > max(np.diff(places), default=0.0) + 1e-9:
         found, low, high = (f"{1e3 * value:.6g}" for value in (station, places[0], places[-1]))
         expected = f"{low} to {high} mm, the stations of this file" if low != high else f"{low} mm, the only station"
         raise StudyError(USAGE, f"--station: found {found} mm, expected {expected}")

@@ -58,7 +58,7 @@ def view_page(view: View, index: Index, quantity: str, motion: str) -> str:
     cases = [index, *(i for k in levels for i in order(view.ds, k) if i[:-3] == view.point)]
     block = object_block(view, index, quantity, motion, list(dict.fromkeys(cases)), whole=True)
     sections: list[Section] = [("object", "", [block or text(view.note[:1].upper() + view.note[1:] + ".", "warn")])]
-    return page(view.ds.attrs["title"], view.words(index, quantity)[0], sections)
+    return page(view.ds.attrs["title"], view.summary(index, quantity)[0], sections)
 
 
 def payload(
@@ -81,7 +81,7 @@ def payload(
         "forces": forces(ds).tolist(),
         "names": [label(place(ds, view.index(c, 0))) for c in range(view.candidates)],
         "states": [view.state(k).tolist() for k in levels],
-        "words": {key: view.words(i, quantity) for key, i in every.items()},
+        "words": {key: view.summary(i, quantity) for key, i in every.items()},
         "notes": {key: label(said) for key, i in every.items() if (said := note(ds, i))},
         "quantities": [_choice(view, n) for n in dict.fromkeys((*CHOICES, quantity)) if field(ds, n) is not None],
         "points": _packed(1e3 * surface.points, "<f4"),

@@ -54,7 +54,7 @@ def draw(plotter: Any, view: View, index: Index, quantity: str, motion: str) -> 
     _object(plotter, view, index, quantity)
     _pads(plotter, view, index, motion)
     plotter.subplot(0, 2)
-    lines = [view.ds.attrs["title"], *view.words(index, quantity), "", *view.legend(index, motion)]
+    lines = [view.ds.attrs["title"], *view.summary(index, quantity), "", *view.legend(index, motion)]
     _say(plotter, "\n".join(fill(line, 46) for line in lines), "values")
     plotter.subplot(1, 2)
     _limit(plotter, view, index)

@@ -209,11 +209,11 @@ def test_a_case_is_chosen_by_number_place_or_score(shown):
 
 def test_the_words_name_the_case_and_say_why_it_failed(shown):
     view, index = shown
-    words = view.words(index, "quality")
-    assert words[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
-    assert f"grasp quality: {quality(index):.3g}" in words
-    assert view.words(FAILED, "quality")[-1] == "failed: no </script> convergence"
-    assert view.words((0, 0, 1), "quality")[-1] == "not computed yet"
+    lines = view.summary(index, "quality")
+    assert lines[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
+    assert f"grasp quality: {quality(index):.3g}" in lines
+    assert view.summary(FAILED, "quality")[-1] == "failed: no </script> convergence"
+    assert view.summary((0, 0, 1), "quality")[-1] == "not computed yet"
 
 
 def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
