@@ -7,16 +7,23 @@ are crossed out. Nothing here needs a display.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.patheffects import withStroke
+
+from softjaw.study.quantities import MODEL_NAMES
 
 INK, SOFT, EMPTY = "#1d2429", "#6b747b", "#e7e9eb"
-MODEL_STYLE = {
-    "ccm": {"color": "#12436d", "linestyle": "-", "marker": "o"},
-    "pcm": {"color": "#c05a00", "linestyle": "--", "marker": "s"},
-    "pcm_projected": {"color": "#2a8c82", "linestyle": ":", "marker": "^"},
+MODEL_LOOKS = {  # name, colour, line, marker
+    "ccm": (MODEL_NAMES["ccm"], "#12436d", "-", "o"),
+    "pcm": (MODEL_NAMES["pcm"], "#c05a00", "--", "s"),
+    "pcm_projected": (MODEL_NAMES["pcm_projected"], "#2a8c82", ":", "^"),
 }
 COLOURS = {
     "quality": "viridis",
@@ -25,8 +32,7 @@ COLOURS = {
     "indentation": "plasma_r",
     "wall_stress": "inferno_r",
 }
-RASTER = 150  # polygons above which a map is stored as pixels: a page must stay small
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.titlesize": 9.5,
@@ -51,8 +57,6 @@ _STYLE = {
 
 def style() -> Any:
     """Context in which all pictures of a study are drawn and saved."""
-    import matplotlib as mpl
-
     return mpl.rc_context(_STYLE)
 
 
@@ -60,29 +64,31 @@ def figure(
     width: float, height: float, rows: int = 1, columns: int = 1, gap: float = 0.08, **layout: Any
 ) -> tuple[Any, Any]:
     """A figure of so many inches and its axes, ``(rows, columns)`` ``gap`` inches apart; it needs no window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    made = Figure(figsize=(width, height), layout="constrained")
+    made = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=gap))
     FigureCanvasAgg(made)
-    made.get_layout_engine().set(w_pad=gap)
     return made, made.subplots(rows, columns, squeeze=False, **layout)
-
-
-def _saved(drawn: Any, form: str, **options: Any) -> bytes:
-    store = io.BytesIO()
-    drawn.savefig(store, format=form, **options)
-    return store.getvalue()
 
 
 def as_svg(drawn: Any) -> bytes:
     """The figure as SVG, text as outlines, without a date."""
-    return _saved(drawn, "svg", dpi=200, metadata={"Date": None, "Creator": None})
+    return _saved(drawn, format="svg", dpi=200, metadata={"Date": None, "Creator": None})
 
 
-def as_png(drawn: Any) -> bytes:
+def as_png(drawn: Any, dpi: int = 160) -> bytes:
     """The figure as PNG for slides and mails."""
-    return _saved(drawn, "png", dpi=160, facecolor="white", metadata={"Software": None})
+    return _saved(drawn, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
+
+
+def _saved(drawn: Any, **options: Any) -> bytes:
+    store = io.BytesIO()
+    drawn.savefig(store, **options)
+    return store.getvalue()
+
+
+def model_look(model: str, **more: Any) -> dict[str, Any]:
+    """How the line of a friction model looks, with its name as label."""
+    name, colour, line, marker = MODEL_LOOKS[model]
+    return {"label": name, "color": colour, "linestyle": line, "marker": marker, **more}
 
 
 def span(values: Any) -> tuple[float, float]:
@@ -105,16 +111,13 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
     axes.set_facecolor(EMPTY)
     i, j = np.nonzero(failed)
     axes.plot(0.5 * (x[j] + x[j + 1]), 0.5 * (y[i] + y[i + 1]), "x", color=SOFT, ms=4)
-    return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), rasterized=True, **look)
+    return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), **look)
 
 
-def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any) -> Any:
+def polygons(axes: Any, corners: np.ndarray, values: np.ndarray, limits: tuple[float, float], **look: Any) -> Any:
     """Polygons in the colours of ``values``."""
-    from matplotlib.collections import PolyCollection
-
-    look = {"edgecolor": "face", "linewidth": 0.5, "rasterized": len(corners) > RASTER, **look}
-    limits = look.pop("vmin", None), look.pop("vmax", None)
-    drawn = PolyCollection(corners, array=np.ma.masked_invalid(values), **look)
+    look = {"edgecolor": "face", "linewidth": 0.5, **look}
+    drawn = PolyCollection(list(corners), array=np.ma.masked_invalid(values), **look)
     drawn.set_clim(*limits)
     axes.add_collection(drawn, autolim=False)
     return drawn
@@ -132,8 +135,6 @@ def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = 
 
 def arrow(axes: Any, tail: np.ndarray, tip: np.ndarray) -> None:
     """An arrow that shows on light and dark ground."""
-    from matplotlib.patheffects import withStroke
-
     style = {"arrowstyle": "-|>", "color": INK, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tip, tail, arrowprops={**style, "path_effects": [withStroke(linewidth=4, foreground="white")]})
 
@@ -145,9 +146,9 @@ def placed(axes: Any, image: np.ndarray, title: str) -> None:
     axes.set_axis_off()
 
 
-def scale(drawn: Any, axes: Any, label: str, colours: str, limits: tuple[float, float], where: str = "bottom") -> None:
-    """A colour bar of images, beside or below the axes that hold them."""
+def scale(drawn: Any, axes: Any, label: str, colours: str, limits: tuple[float, float]) -> None:
+    """A colour bar of images, below the axes that hold them."""
     some = np.ravel(axes)
     mapped = some[0].scatter([], [], c=[], cmap=colours, vmin=limits[0], vmax=limits[1])
-    bar = drawn.colorbar(mapped, ax=list(some), location=where, label=label, shrink=0.6, aspect=30, pad=0.02)
+    bar = drawn.colorbar(mapped, ax=list(some), location="bottom", label=label, shrink=0.6, aspect=30, pad=0.02)
     bar.outline.set_visible(False)

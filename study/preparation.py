@@ -70,12 +70,13 @@ def work(scene: Any, choice: Any = None) -> Any:
 
     def finalise(writer: Any) -> None:  # loads what one rank needs at the end
         from softjaw.study.result import derived
-        from softjaw.study.show.report.plain_report import plain_report
+        from softjaw.study.result.read import dataset
+        from softjaw.study.show.report.verdict import plain_report
 
         if choice is not None:
             choice.fill(writer)
         derived.finalise(writer, scene)
-        writer.write_report(plain_report(writer.result(), scene.friction.mu))
+        writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
 
     return Work(
         solve_unit=pipeline.solve_unit,

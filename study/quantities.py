@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from softjaw.study.flags import flag_definitions
 
 MODELS = ("ccm", "pcm", "pcm_projected")
+MODEL_NAMES = dict(zip(MODELS, ("CCM", "PCM", "PCM scaled by F_N"), strict=True))  # in legends and captions
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
 STATES = ("missing", "done", "failed")  # of a case, by these codes:

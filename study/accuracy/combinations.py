@@ -61,9 +61,7 @@ class Combination:
         return Level("; ".join(level.name for level in self.levels) or "as in the scene", values)
 
 
-def combinations(
-    tables: Sequence[ParameterErrors], base_seconds: float, given: Mapping[str, Any]
-) -> list[Combination]:
+def combinations(tables: Sequence[ParameterErrors], base_seconds: float, given: Mapping[str, Any]) -> list[Combination]:
     """Every combination of levels that a scene leaves open, one of each family, the cheapest first."""
     choices: list[list[tuple[Level, float, FloatArray]]] = []
     estimate: FloatArray | float = 0.0

@@ -336,9 +336,7 @@ def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: A
     factors = []
     for m in MODELS:
         # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
-        wrenches = [
-            c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]] for c, own in zip(contacts, fits, strict=True)
-        ]
+        wrenches = [c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]] for c, own in zip(contacts, fits, strict=True)]
         hulls = [PolytopeBody(np.vstack([wrench, -wrench])) for wrench in wrenches]
         factors.append(hold_task(soft(contacts, hulls), grip, weight).safety_factor)
     return factors

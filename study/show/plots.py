@@ -14,21 +14,26 @@ import plotly.graph_objects as go
 from plotly.colors import get_colorscale
 from plotly.subplots import make_subplots
 
-from softjaw.study.pictures import span as span  # one range for plotly and matplotlib
+from softjaw.study.pictures import COLOURS, EMPTY, INK, MODEL_LOOKS, SOFT, span
 
-INK, SOFT, GRID, EMPTY = "#1d2429", "#6b747b", "#e3e6e8", "#eceef0"
+__all__ = ["EMPTY", "INK", "SOFT", "span"]  # besides what is defined here
+GRID = "#e3e6e8"
+DASHES, SYMBOLS = {"-": "solid", "--": "dash", ":": "dot"}, {"o": "circle", "s": "square", "^": "triangle-up"}
 MODELS = {  # name, colour, line, marker
-    "ccm": ("CCM", "#12436d", "solid", "circle"),
-    "pcm": ("PCM", "#c05a00", "dash", "square"),
-    "pcm_projected": ("PCM scaled by F_N", "#2a8c82", "dot", "triangle-up"),
+    model: (name, colour, DASHES[line], SYMBOLS[mark]) for model, (name, colour, line, mark) in MODEL_LOOKS.items()
 }
-COLOURS = {"e_n": "Cividis", "pressure": "Magma_r", "indentation": "Plasma_r", "wall_stress": "Inferno_r"}
 MARGIN = {"l": 60, "r": 20, "t": 58, "b": 50}
+FLAT = {"lighting": {"ambient": 1, "diffuse": 0, "specular": 0}, "flatshading": True}  # colours are those of the bar
 
 
 def colours(quantity: str) -> list[list[Any]]:
     """Colour scale of a map as stops, which plotly's script needs for the names that it does not know."""
-    return [list(stop) for stop in get_colorscale(COLOURS.get(quantity, "Viridis"))]
+    return [list(stop) for stop in get_colorscale(COLOURS.get(quantity, "viridis"))]
+
+
+def bars(title: str, **more: Any) -> dict[str, Any]:
+    """A colour bar with its quantity beside it."""
+    return {"title": {"text": title, "side": "right"}, "thickness": 14, **more}
 
 
 def figure(rows: int = 1, columns: int = 1, titles: Sequence[str] = (), **layout: Any) -> go.Figure:
@@ -64,12 +69,19 @@ def lines(
         if not np.isfinite(y).any():
             continue
         name, colour, dash, symbol = MODELS[model]
-        bars = None if errors is None or model != "ccm" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
+        half = None if errors is None or model != "ccm" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
         made.add_scatter(
-            x=x, y=y, name=name, legendgroup=model, mode="lines+markers", error_y=bars, row=row, col=column,
+            x=x, y=y, name=name, legendgroup=model, mode="lines+markers", error_y=half, row=row, col=column,
             line={"color": colour, "dash": dash}, marker={"symbol": symbol, "size": 6},
             showlegend=not any(t.legendgroup == model for t in made.data),
         )  # fmt: skip
+
+
+def with_gaps(values: np.ndarray) -> list[Any]:
+    """Values as nested lists with None where they are not finite, as JSON has them."""
+    plain = values.astype(object)
+    plain[~np.isfinite(values)] = None
+    return list(plain.tolist())
 
 
 def triangles(quads: np.ndarray) -> np.ndarray:
@@ -92,7 +104,7 @@ def segments(ends: np.ndarray, **look: Any) -> go.Scatter3d:
 
 
 def points(places: np.ndarray, colour: str, size: float, text: Any = None) -> go.Scatter3d:
-    """Dots at places ``(n, 3)``, with words beside them if there are any."""
+    """Dots at places ``(n, 3)``, with names beside them if there are any."""
     x, y, z = places.astype(np.float32).T
     return go.Scatter3d(x=x, y=y, z=z, mode="markers+text" if text else "markers", text=text, hoverinfo="skip",
                         marker={"color": colour, "size": size}, showlegend=False)  # fmt: skip

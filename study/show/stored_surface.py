@@ -1,10 +1,12 @@
-"""Limit surfaces of a case from what its file holds: the exact one through the stored patch, and the fitted ones."""
+"""Limit surfaces of a case from what its file holds: the exact one through the stored faces, and the fitted ones."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
@@ -15,16 +17,22 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
-from softjaw.study.show.data import Data
+from softjaw.study.show.grasps import Index, field
+from softjaw.study.show.tables.ranking import largest
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface
+PLANES = ((0, 1), (0, 2), (1, 2))
+SHOWN = np.array([1.0, 1.0, 1e3])  # from SI to
+COMPONENTS = (("f_x", "N"), ("f_y", "N"), ("tau_z", "N mm"))
+NAMES = tuple(f"{name} [{unit}]" for name, unit in COMPONENTS)
+ROWS, COLUMNS = 25, 49  # directions from pole to pole, and round
 
 
 @dataclass(frozen=True)
 class StoredSurface:
     """One finger at one case and in one friction model; surfaces are in ``(f_x, f_y, tau_z / rho) / (mu S)``.
 
-    ``unit (3,)`` brings these to N, N, N m; ``patch`` is None where the file holds none, ``chosen`` where no surface
+    ``unit (3,)`` brings these to N, N, N mm; ``patch`` is None where the file holds none, ``chosen`` where no surface
     was fitted.
     """
 
@@ -33,29 +41,25 @@ class StoredSurface:
     ellipsoid: LimitSurface
     chosen: LimitSurface | None
     patch: ContactPatch | None
-    model: str
+    model: Any  # one of `softjaw.study.quantities.MODELS`
 
-    def wrenches(self, twist: np.ndarray) -> np.ndarray | None:
+    def wrenches(self, twist: np.ndarray) -> Any:
         """Exact wrenches ``(m, 3)`` [-] for motions ``(v_x, v_y, rho omega)``; None without a patch."""
         if self.patch is None:
             return None
-        return friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES] / self._force
+        S = float((self.patch.pressure * self.patch.area).sum())
+        found = friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES]
+        return found / (S * np.array([1.0, 1.0, self.rho]))
 
-    def samples(self, count: int) -> np.ndarray | None:
+    def samples(self, count: int) -> Any:
         """Exact wrenches of evenly spread motions and of their opposites ``(2 count, 3)`` [-]."""
         found = self.wrenches(fibonacci_twists(count, 1.0))
         return None if found is None else np.vstack([found, -found])
 
-    def outline(self, i: int, j: int, count: int = 90) -> np.ndarray | None:
+    def outline(self, i: int, j: int, count: int = 90) -> Any:
         """Exact outline of the body's shadow on the plane of two components ``(count, 2)`` [-]."""
         found = self.wrenches(circle(i, j, count))
         return None if found is None else found[:, [i, j]]
-
-    @property
-    def _force(self) -> np.ndarray:
-        assert self.patch is not None
-        S = float((self.patch.pressure * self.patch.area).sum())
-        return S * np.array([1.0, 1.0, self.rho])
 
 
 def circle(i: int, j: int, count: int) -> np.ndarray:
@@ -66,10 +70,16 @@ def circle(i: int, j: int, count: int) -> np.ndarray:
     return t
 
 
+def sphere(rows: int, columns: int) -> np.ndarray:
+    """Directions ``(rows, columns, 3)`` on latitudes from pole to pole, and longitudes."""
+    t, phi = np.meshgrid(np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, columns), indexing="ij")
+    return np.stack([np.sin(t) * np.cos(phi), np.sin(t) * np.sin(phi), np.cos(t)], axis=-1)
+
+
 def shadow_outline(surface: LimitSurface, i: int, j: int, count: int = 360) -> np.ndarray:
     """Outline of a body's shadow on the plane of two components ``(count, 2)``, from its support function.
 
-    Where the outward normal is ``(cos phi, sin phi)`` stands the point ``h (cos, sin) + h' (-sin, cos)``.
+    Where the outward normal is ``(cos phi, sin phi)`` lies the point ``h (cos, sin) + h' (-sin, cos)``.
     """
     t = circle(i, j, count)[:, [i, j]]
     h = surface.support(circle(i, j, count))
@@ -77,40 +87,55 @@ def shadow_outline(surface: LimitSurface, i: int, j: int, count: int = 360) -> n
     return h[:, None] * t + slope[:, None] * np.column_stack([-t[:, 1], t[:, 0]])
 
 
-def stored_surface(data: Data, index: tuple[int, ...], finger: int, model: str) -> StoredSurface | None:
-    """The limit surfaces of a case, or None where the file does not hold what is needed."""
+def body(surface: StoredSurface) -> np.ndarray | None:
+    """Points ``(ROWS, COLUMNS, 3)`` of a limit surface [N, N, N mm], row by latitude; None where it is unbounded."""
+    u = sphere(ROWS, COLUMNS)
+    radius = (surface.chosen or surface.ellipsoid).radius(u.reshape(-1, 3)).reshape(ROWS, COLUMNS, 1)
+    return u * radius * surface.unit if np.isfinite(radius).all() else None
+
+
+def weaker(ds: xr.Dataset, index: Index) -> int:
+    """The finger that carries the smaller torque."""
+    found = field(ds, "finger_tau_z_max")
+    return 0 if found is None else largest(-np.nan_to_num(found[index][:, 0]))
+
+
+def stored_surface(
+    ds: xr.Dataset, index: Index, finger: int, model: str, faces: dict[str, np.ndarray] | None = None
+) -> StoredSurface | None:
+    """The limit surfaces of a case, or None where the file does not hold what is needed.
+
+    ``faces`` are the stored contact faces of both fingers, from which the exact wrenches follow.
+    """
     m = MODELS.index(model)
-    names = ("limit_surface/semi_axes", "limit_surface/rho", "fingers/S", "fingers/f_x_max")
-    found = [data.values(name) for name in names]
-    if data.status[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in found):
+    names = ("limit_surface_semi_axes", "limit_surface_rho", "finger_S", "finger_f_x_max")
+    found = [field(ds, name) for name in names]
+    if ds.status.values[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in found):
         return None
-    semi_axes, rho, S, f_x = (f[index][finger] for f in found if f is not None)
-    if not (S > 0 and rho > 0 and f_x[MODELS.index("pcm")] > 0 and semi_axes[m].min() >= 0):
+    semi_axes, rho, S, f_x = (f[index][finger] for f in found)
+    planar = f_x[MODELS.index("pcm")]
+    if not (S > 0 and rho > 0 and planar > 0 and semi_axes[m].min() >= 0):
         return None
-    mu = float(f_x[MODELS.index("pcm")] / S)
-    unit = mu * S * np.array([1.0, 1.0, rho])
+    mu = float(planar / S)
     ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
-    chosen, patch = _chosen(data, index, finger, m), _patch(data, index, finger)
-    return StoredSurface(unit, float(rho), ellipsoid, chosen, patch, model)
+    unit = planar * np.array([1.0, 1.0, rho]) * SHOWN
+    patch = _patch(ds, index, finger, faces or {})
+    return StoredSurface(unit, float(rho), ellipsoid, _chosen(ds, index, finger, m), patch, model)
 
 
-def _chosen(data: Data, index: tuple[int, ...], finger: int, m: int) -> LimitSurface | None:
-    quartic, matrix = data.values("limit_surface/coefficients"), data.values("limit_surface/matrix")
-    if quartic is not None and np.isfinite(quartic[index][finger, m]).all():
-        return Quartic(quartic[index][finger, m], exponents(3, 4))
-    if matrix is not None and np.isfinite(matrix[index][finger, m]).all():
-        return TiltedEllipsoid(matrix[index][finger, m])
+def _chosen(ds: xr.Dataset, index: Index, finger: int, m: int) -> LimitSurface | None:
+    for name in ("coefficients", "matrix"):
+        found = field(ds, f"limit_surface_{name}")
+        if found is not None and np.isfinite(found[index][finger, m]).all():
+            known = found[index][finger, m]
+            return Quartic(known, exponents(3, 4)) if name == "coefficients" else TiltedEllipsoid(known)
     return None
 
 
-def _patch(data: Data, index: tuple[int, ...], finger: int) -> ContactPatch | None:
-    origin, axes = data.values("fingers/frame_origin"), data.values("fingers/frame_axes")
-    if not data.result.layout.patches or origin is None or axes is None:
+def _patch(ds: xr.Dataset, index: Index, finger: int, faces: dict[str, np.ndarray]) -> ContactPatch | None:
+    origin, axes = field(ds, "finger_frame_origin"), field(ds, "finger_frame_axes")
+    if not faces or origin is None or axes is None:
         return None
-    stored = {name: values[finger] for name, values in data.result.patch(data.result.row(*index)).items()}
-    if not all(np.isfinite(values).all() for values in stored.values()):
-        return None
-    R = axes[index][finger]
-    return ContactPatch(
-        (stored["centroid"] - origin[index][finger]) @ R.T, stored["area"], stored["normal"] @ R.T, stored["pressure"]
-    )
+    own, R = {name: values[finger] for name, values in faces.items()}, axes[index][finger]
+    centroid = (own["centroid"] - origin[index][finger]) @ R.T
+    return ContactPatch(centroid, own["area"], own["normal"] @ R.T, own["pressure"])

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import csv
-import http.client
 import io
 import os
 import shutil
 import signal
-import threading
 from contextlib import suppress
 
 import h5py
@@ -26,8 +24,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.result.trial import trouble
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.show.tables.columns import csv_text
-from softjaw.study.show.view.server import server
-from tests.fuzz.lies import EVIL, LIES
+from tests.fuzz.lies import LIES
 from tests.fuzz.readers import QUICK, SCENE, obj, ply, stl
 from tests.study.formula_results import make
 from tests.study.launching import ROOT
@@ -239,45 +236,6 @@ def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
     cells = ["=1+1", "+A1", "-A1", "@x", "\tx", "-3.5", "+2e-3", "at 0 mm", None]
     (row,) = csv.reader(io.StringIO(csv_text([cells])))
     assert row == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
-
-
-# --- the view's page ---
-
-
-@pytest.fixture
-def page():
-    with server("<p>page</p>") as running:
-        threading.Thread(target=running.serve_forever, daemon=True).start()
-        yield running.server_address
-        running.shutdown()
-
-
-def answer(address, method, path, host=None):
-    line = http.client.HTTPConnection(*address, timeout=5)
-    line.putrequest(method, path, skip_host=True)
-    line.putheader("Host", host or f"{address[0]}:{address[1]}")
-    line.endheaders()
-    found = line.getresponse()
-    return found.status, found.read().decode(), dict(found.getheaders())
-
-
-def test_the_server_has_one_page_for_this_machine_alone(page):
-    assert page[0] == "127.0.0.1"
-    status, text, headers = answer(page, "GET", "/")
-    assert (status, text) == (200, "<p>page</p>")
-    assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]  # what it may load the page says itself
-    assert "Access-Control-Allow-Origin" not in headers
-    assert "Python" not in headers["Server"]
-    outside = ("/..", "/../../etc/passwd", "/%2e%2e/etc/passwd", "//etc/passwd", "/etc/passwd", "/?a", f"/{EVIL[:4]!a}")
-    for path in (*outside, "http://127.0.0.1/", "/" + "a" * 60_000):
-        assert answer(page, "GET", path)[:2] == (404, "")
-    assert answer(page, "GET", "/" + "a" * 70_000)[0] == 414
-    for host in ("evil.example", f"evil.example:{page[1]}", f"127.0.0.1.evil.example:{page[1]}", ""):
-        assert answer(page, "GET", "/", host or ":")[:2] == (404, "")
-    for method in ("POST", "PUT", "DELETE", "OPTIONS", "HEAD", "<script>"):
-        status, text, _ = answer(page, method, "/")
-        assert status == 501
-        assert "<script>" not in text
 
 
 def test_limits_are_stated_where_users_look():

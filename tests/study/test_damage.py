@@ -17,11 +17,12 @@ from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import guarded
 from softjaw.study.result.derived import finalise
 from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.read import dataset
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
-from softjaw.study.show.report.plain_report import plain_report
+from softjaw.study.show.report.verdict import plain_report
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
@@ -66,7 +67,7 @@ def whole(tmp_path_factory):
                 writer.count_attempt(rows[k])
                 writer.write(rows[k], record(plan.layout, pipeline.image(result, unit, c)))
     finalise(writer, scene)
-    writer.write_report(plain_report(writer.result(), scene.friction.mu))
+    writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
     writer.update_session(stop="2024-01-01T00:01:00+00:00", reason="complete", done=4)
     writer.close()
     return path

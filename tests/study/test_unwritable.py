@@ -16,7 +16,7 @@ from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
 from softjaw.study.environment import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError
-from softjaw.study.show.figures import command as figures
+from softjaw.study.show.figures import drawing as figures
 from softjaw.study.show.report import writing as report
 from softjaw.study.writing import beside, make_folders, write_file
 from tests.study.launching import ROOT, launch

@@ -1,4 +1,4 @@
-"""The figures of the paper, redrawn from results of the shipped scenes; ``table`` lists them."""
+"""The figures of the paper, redrawn from results of the shipped scenes; `drawing` lists them."""
 
 from pathlib import Path
 

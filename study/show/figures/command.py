@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import io
 import os
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError, first_rank
 from softjaw.study.show.figures import JOBS
-from softjaw.study.writing import write_file
-
-if TYPE_CHECKING:
-    from softjaw.study.show.figures.table import Figure
 
 FOLDER = "results/figures"
-DPI = 140
 
 
 def add_options(parser: ArgumentParser) -> None:
     """The options of the command."""
     parser.add_argument("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
-    parser.add_argument("-o", metavar="PNG", dest="output",
+    parser.add_argument("-o", metavar="PNG", dest="output", default=FOLDER,
                         help=f"picture, or folder for several (default: {FOLDER})")  # fmt: skip
     parser.add_argument("--results", metavar="FOLDER", default="results",
                         help="where the scenes' results are or will be (default: results)")  # fmt: skip
@@ -36,8 +28,10 @@ def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
     ``run(scene, file)`` solves a scene into its file and returns the exit code.
     """
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported, as a run wants it
-    wanted = chosen(options.names)
-    paths = targets(wanted, options.output)
+    from softjaw.study.show.figures import drawing  # loads plotters, which the options above do not need
+
+    wanted = drawing.chosen(options.names)
+    paths = drawing.targets(wanted, Path(options.output))
     results, codes = {}, {DONE}
     for scene in dict.fromkeys(scene for one in wanted for scene in one.scenes):
         results[scene] = Path(options.results) / f"{scene}.hdf"
@@ -46,36 +40,8 @@ def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
             return failed.pop()
     if first_rank():
         for one, path in zip(wanted, paths, strict=True):
-            print(f"written: {path}\n  {draw(one, results, path)}", flush=True)
+            print(f"written: {path}\n  {drawing.draw(one, results, path)}", flush=True)
     return max(codes)
-
-
-def chosen(names: list[str]) -> list[Figure]:
-    """The figures of these names, each once.
-
-    Raises
-    ------
-    StudyError
-        For a name that no figure has.
-    """
-    from softjaw.study.show.figures.table import EVERY, FIGURES, find
-
-    found = {name: find(name) for name in names}
-    if strange := [name for name, figures in found.items() if not figures]:
-        known = ", ".join(one.name for one in FIGURES)
-        raise StudyError(USAGE, f"FIGURE: found '{strange[0]}', expected one of {known}, or {EVERY}")
-    return list(dict.fromkeys(one for figures in found.values() for one in figures))
-
-
-def targets(wanted: list[Figure], output: str | None) -> list[Path]:
-    """Where each picture goes: one PNG, or files in a folder."""
-    given = Path(output or FOLDER)
-    if given.suffix != ".png":
-        return [given / one.file for one in wanted]
-    if len(wanted) > 1:
-        names = ", ".join(one.name for one in wanted)
-        raise StudyError(USAGE, f"-o: found '{given}' for {len(wanted)} figures ({names}), expected a folder")
-    return [given]
 
 
 def _solved(scene: str, path: Path, run: Callable[[Path, Path], int]) -> int:
@@ -87,36 +53,3 @@ def _solved(scene: str, path: Path, run: Callable[[Path, Path], int]) -> int:
     if (code := run(source, path)) == OTHER_FILE:
         raise StudyError(OTHER_FILE, f"{path}: move it away, or choose another folder with --results")
     return code
-
-
-def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
-    """Write a figure as PNG; the sentence of what was measured.
-
-    Raises
-    ------
-    StudyError
-        If cases failed that the figure cannot do without, or the file cannot be written.
-    """
-    import numpy as np
-
-    from softjaw.study import pictures
-    from softjaw.study.result.layout import DONE as SOLVED
-    from softjaw.study.result.store import open_result
-    from softjaw.study.show.data import Data
-
-    with ExitStack() as stack, pictures.style():
-        opened = [stack.enter_context(open_result(results[scene])) for scene in one.scenes]
-        for result in opened:
-            if (failed := int(np.sum(result.status != SOLVED))) and not one.gaps:
-                text = f"figure {one.name} is not drawn: {failed} cases of {result.path} failed"
-                raise StudyError(SOME_FAILED, f"{text}; 'softjaw status {result.path}' says why")
-        drawn, said = one.draw(*(Data(result) for result in opened))
-        write_file(path, as_png(drawn), folders=True)
-    return said
-
-
-def as_png(drawn: Any) -> bytes:
-    """The figure in the resolution of a page."""
-    store = io.BytesIO()
-    drawn.savefig(store, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
-    return store.getvalue()

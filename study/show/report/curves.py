@@ -6,15 +6,26 @@ import math
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.study.flags import Flag
 from softjaw.study.page import Block, heading, label, plot
 from softjaw.study.quantities import MODELS
-from softjaw.study.result.grid_surface import undeformed
+from softjaw.study.result.grid_surface import scene_at, undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
-from softjaw.study.show.data import Data, number, shown
-from softjaw.study.show.outline import swept_object
+from softjaw.study.show.grasps import (
+    Index,
+    at,
+    axis_label,
+    axis_values,
+    compared,
+    field,
+    forces,
+    number,
+    place,
+    spoken,
+)
 from softjaw.study.show.view.model import View
 
 # map, title, factor from SI; "F" divides by the normal force
@@ -32,144 +43,144 @@ COMPONENTS = {
     "tau_z": ("torque, tau_z", "#2a8c82", "triangle-up"),
 }
 AGAINST = {"pcm": "against PCM, scaled by S", "pcm_projected": "against PCM, scaled by F_N"}
+HALF_AS_FINE = " Bars: difference to a mesh half as fine."
 MOST_LINES, FEWEST = 40, 4
 
 
-def along(position: int, index: tuple[int, ...]) -> tuple[Any, ...]:
+def along(position: int, index: Index) -> tuple[Any, ...]:
     """Cut through an array over all cases along one axis, the others at ``index``."""
     return tuple(slice(None) if i == position else k for i, k in enumerate(index))
 
 
-def models(data: Data, best: tuple[int, ...], mu: float | None) -> list[Block]:
+def models(ds: xr.Dataset, best: Index, mu: float | None) -> list[Block]:
     """Curves over the force for the best case and one other, and over every axis that is worth it for the best."""
-    force, (other, why) = len(best) - 1, data.other
+    other, why = compared(ds)
     found = []
     for index, role in [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]:
-        found += [heading(f"{role}, over the force: {data.place(index)}"), _models(data, force, index, mu)]
-    for position in worth_a_curve(data):
-        name = data.name(data.axes[position])
-        found += [heading(f"Over the {name}, all else as in the best case"), _models(data, position, best, mu)]
+        found += [heading(f"{role}, over the force: {place(ds, index)}"), _models(ds, len(best) - 1, index, mu)]
+    for position in worth_a_curve(ds):
+        name = spoken(str(ds.status.dims[position]))
+        found += [heading(f"Over the {name}, all else as in the best case"), _models(ds, position, best, mu)]
     return found
 
 
-def worth_a_curve(data: Data) -> list[int]:
+def worth_a_curve(ds: xr.Dataset) -> list[int]:
     """Axes of enough values to be drawn as curves: the sweeps, and stations that lie along an object."""
-    station = len(data.shape) - 3
-    stations = [station] if data.shape[station] >= FEWEST and not data.by_poses else []
-    return [p for p in range(station) if data.shape[p] > 1] + stations
+    *sweeps, stations, _, _ = ds.status.shape
+    own = [len(sweeps)] if stations >= FEWEST and not ds.attrs["poses"] else []
+    return [p for p, length in enumerate(sweeps) if length > 1] + own
 
 
-def _models(data: Data, position: int, index: tuple[int, ...], mu: float | None) -> Block:
+def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Block:
     """Six quantities in all friction models along one axis."""
     made = plots.figure(2, 3, [title for _, title, _ in PANELS], vertical_spacing=0.16, horizontal_spacing=0.07)
-    x, settings = abscissa(data, position)
-    cut = along(position, index)
-    forces = data.forces if position == len(index) - 1 else data.forces[index[-1]]
+    x, settings = abscissa(ds, position)
+    cut, over_force = along(position, index), position == len(index) - 1
     for k, (name, _, factor) in enumerate(PANELS):
         row, column = k // 3 + 1, k % 3 + 1
-        scale = 1 / forces if factor == "F" else factor
+        scale = factor if factor != "F" else 1 / (forces(ds) if over_force else forces(ds)[index[-1]])
         by_model = {m: found[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
-                    if (found := data.map(name, m)) is not None}  # fmt: skip
-        error = data.map(f"{name}_error")
-        bars = None if error is None or "ccm" not in by_model else by_model["ccm"] * error[cut]
-        plots.lines(made, x, by_model, row, column, bars)
+                    if (found := field(ds, name, m)) is not None}  # fmt: skip
+        error = field(ds, f"{name}_error")
+        plots.lines(made, x, by_model, row, column, None if error is None else by_model["ccm"] * error[cut])
         if factor == "F" and mu is not None:
             made.add_hline(mu, line={"color": plots.SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
     made.update_xaxes(**settings, row=2)
-    bars = " Bars: difference to a mesh half as fine." if data.map("e_n_error") is not None else ""
+    bars = HALF_AS_FINE if field(ds, "e_n_error") is not None else ""
     rule = f" Dashed grey: mu = {mu:g}." if mu is not None else ""
-    place = data.place(index, force=position != len(index) - 1)
-    caption = f"{place[:1].upper()}{place[1:]}; F is the normal force of one finger.{rule}{bars}"
-    alt = f"Six quantities over {data.name(data.axes[position])} for three friction models; {place}."
+    where = place(ds, index, force=not over_force)
+    caption = f"{where[:1].upper()}{where[1:]}; F is the normal force of one finger.{rule}{bars}"
+    alt = f"Six quantities over {spoken(str(ds.status.dims[position]))} for three friction models; {where}."
     return plot(made, caption, alt, 560)
 
 
-def abscissa(data: Data, position: int) -> tuple[Any, dict[str, Any]]:
+def abscissa(ds: xr.Dataset, position: int) -> tuple[Any, dict[str, Any]]:
     """Values of an axis, and its settings in a figure."""
-    axis = data.axes[position]
-    title = "normal force per finger [N]" if position == len(data.axes) - 1 else data.axis_label(axis)
-    if texts := data.texts(axis):
+    axis = str(ds.status.dims[position])
+    title = "normal force per finger [N]" if axis == "normal_force" else axis_label(ds, axis)
+    if texts := ds[axis].attrs.get("options", ()):
         return [label(t) for t in texts], {"title_text": title, "type": "category"}
-    return axis.values * shown(axis.units)[1], {"title_text": title}
+    return axis_values(ds, axis), {"title_text": title}
 
 
-def fit_error(data: Data, position: int, index: tuple[int, ...]) -> Block | None:
+def fit_error(ds: xr.Dataset, position: int, index: Index) -> Block | None:
     """Fit error of both limit surfaces along one axis; None where it is not stored."""
-    found = {"fitted surface": data.map("fit_error"), "ellipsoid from three motions": data.map("fit_error_ellipsoid")}
+    found = {"fitted surface": field(ds, "fit_error"), "ellipsoid from three motions": field(ds, "fit_error_ellipsoid")}
     lines = {name: 100 * values[along(position, index)] for name, values in found.items() if values is not None}
     if not any(np.isfinite(line).sum() > 1 for line in lines.values()):
         return None
     made = plots.figure()
-    x, settings = abscissa(data, position)
+    x, settings = abscissa(ds, position)
     for (name, line), dash in zip(lines.items(), ("solid", "dash"), strict=False):
         made.add_scatter(x=x, y=line, name=name, mode="lines+markers", line={"color": "#12436d", "dash": dash})
     made.update_xaxes(**settings).update_yaxes(title_text="fit error [%]", rangemode="tozero")
     caption = (
-        "Mean error of the limit surface's radius, CCM, weaker fit of both fingers, on motions that no surface was"
-        " fitted to."
+        "Mean error of the limit surface's radius, CCM, larger fit error of both fingers, on motions that no surface"
+        " was fitted to."
     )
-    return plot(made, caption, f"Fit error of the limit surfaces over {data.name(data.axes[position])}", 300)
+    return plot(made, caption, f"Fit error of the limit surfaces over {spoken(str(ds.status.dims[position]))}", 300)
 
 
 # --- what curvature costs --------------------------------------------------------------------------------------------
 
 
-def differences(data: Data, scene: Any, index: tuple[int, ...]) -> list[Block]:
+def differences(ds: xr.Dataset, scene: Any, index: Index) -> list[Block]:
     """Share of the planar models' claims that the curved contact cannot carry, along a sweep of the object's shape."""
-    position = shape_axis(data, scene)
-    lines = {} if position is None else overestimates(data, position, index)
+    position = shape_axis(ds, scene)
+    lines = {} if position is None else overestimates(ds, position, index)
     if position is None or not lines:
         return []
-    found = abscissas(data, scene, position, index)
-    return [_differences(data, name, x, lines, index) for name, x in found.items() if np.isfinite(x).any()]
+    found = abscissas(ds, scene, position, index)
+    return [_differences(ds, name, x, lines, index) for name, x in found.items() if np.isfinite(x).any()]
 
 
-def shape_axis(data: Data, scene: Any) -> int | None:
+def shape_axis(ds: xr.Dataset, scene: Any) -> int | None:
     """The longest axis that sweeps a number of the object; any numbered sweep where the scene cannot be read."""
     keys = list(scene.sweep) if scene else []
-    known = [p for p in range(len(data.shape) - 3) if data.shape[p] > 1]
-    known = [p for p in known if p >= len(keys) or (keys[p].startswith("object.") and data.axes[p].units)]
-    return max(known, key=lambda p: data.shape[p], default=None)
+    axes, lengths = ds.status.dims, ds.status.shape
+    known = [p for p in range(len(axes) - 3) if lengths[p] > 1]
+    known = [p for p in known if p >= len(keys) or (keys[p].startswith("object.") and ds[axes[p]].units)]
+    return max(known, key=lambda p: lengths[p], default=None)
 
 
-def overestimates(data: Data, position: int, index: tuple[int, ...]) -> dict[tuple[str, str], Any]:
+def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str, str], Any]:
     """Overestimate of each planar model and component along an axis [-], and its error or None."""
     found, cut = {}, along(position, index)
     for model, suffix in (("pcm", ""), ("pcm_projected", "_pcm_projected")):
         for key in COMPONENTS:
-            values, error = (data.map(f"{key}_overestimate{suffix}{end}") for end in ("", "_error"))
+            values, error = (field(ds, f"{key}_overestimate{suffix}{end}") for end in ("", "_error"))
             if values is not None and np.isfinite(values[cut]).any():
                 found[model, key] = (values[cut], None if error is None else error[cut])
     return found
 
 
-def abscissas(data: Data, scene: Any, position: int, index: tuple[int, ...]) -> dict[str, np.ndarray]:
+def abscissas(ds: xr.Dataset, scene: Any, position: int, index: Index) -> dict[str, np.ndarray]:
     """What differences are drawn over: shape and curvature of an ellipse, or else the swept value itself."""
-    points = [(*index[:position], i, *index[position + 1 :]) for i in range(data.shape[position])]
-    ellipses = [_ellipse(data, scene, point) for point in points]
+    points = [(*index[:position], i, *index[position + 1 :]) for i in range(ds.status.shape[position])]
+    ellipses = [_ellipse(ds, scene, point) for point in points]
     if all(ellipses):
         a, b = np.array(ellipses, float).T
         return {
             "a / b, semi-axis along the approach over that across it [-]": a / b,
             "curvature at the apex, a / b² [1/m]": a / b**2,
         }
-    axis = data.axes[position]
-    return {data.axis_label(axis): axis.values * shown(axis.units)[1]}
+    axis = str(ds.status.dims[position])
+    return {axis_label(ds, axis): axis_values(ds, axis)}
 
 
-def _ellipse(data: Data, scene: Any, index: tuple[int, ...]) -> tuple[float, float] | None:
+def _ellipse(ds: xr.Dataset, scene: Any, index: Index) -> tuple[float, float] | None:
     """Semi-axes along and across the approach [m] of an elliptic cylinder pressed along one of them."""
-    shape = swept_object(scene, index) if scene else None
-    if getattr(shape, "shape", "") != "elliptic_cylinder" or data.by_poses:
+    shape: Any = getattr(scene_at(scene, index) if scene else None, "object", None)
+    if getattr(shape, "shape", "") != "elliptic_cylinder" or ds.attrs["poses"]:
         return None
-    turns = float(data.axes[-2].values[index[-2]]) / (0.5 * math.pi)
+    turns = float(ds.angle.values[index[-2]]) / (0.5 * math.pi)
     if abs(turns - round(turns)) > 1e-6:
         return None
     both = (shape.semi_axis_a, shape.semi_axis_b)
     return both if round(turns) % 2 == 0 else both[::-1]
 
 
-def _differences(data: Data, name: str, x: np.ndarray, lines: dict[Any, Any], index: tuple[int, ...]) -> Block:
+def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any], index: Index) -> Block:
     shown_models = [m for m in AGAINST if any(model == m for model, _ in lines)]
     made = plots.figure(1, len(shown_models), [AGAINST[m] for m in shown_models])
     order = np.argsort(x)
@@ -182,76 +193,73 @@ def _differences(data: Data, name: str, x: np.ndarray, lines: dict[Any, Any], in
                          showlegend=column == 1)  # fmt: skip
     made.update_xaxes(title_text=label(name)).update_yaxes(title_text="1 - CCM / PCM [%]")
     made.update_layout(legend={"y": -0.25})
-    bars = " Bars: difference to a mesh half as fine." if any(e is not None for _, e in lines.values()) else ""
-    lost = int(np.sum(data.status[..., index[-1]] != DONE))
-    gaps = f" {lost} cases at this force have no value." if lost else ""
+    fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
+    missing = int(np.sum(ds.status.values[..., index[-1]] != DONE))
+    gaps = f" {missing} cases at this force have no value." if missing else ""
     caption = (
-        f"At {number(data.forces[index[-1]])} N: the share of the planar model's claim that the curved contact cannot"
-        f" carry.{bars}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
+        f"At {number(forces(ds)[index[-1]])} N: the share of the planar model's claim that the curved contact cannot"
+        f" carry.{fine}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
     )
     ends = {key: [number(100 * f(v), 2) for f in (np.nanmin, np.nanmax)] for key, (v, _) in lines.items()}
-    said = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
-    return plot(made, caption, f"Differences of PCM and CCM over {name}. {said}.", 400)
+    summary = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
+    return plot(made, caption, f"Differences of PCM and CCM over {name}. {summary}.", 400)
 
 
 # --- a thin wall -----------------------------------------------------------------------------------------------------
 
 
-def wall_curves(data: Data, index: tuple[int, ...], allowed: float | None) -> Block | None:
+def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | None:
     """Normal force over closing and over indentation of the stations; ``allowed``: what the scene allows [m]."""
-    closing, indentation = data.map("closing"), data.map("indentation")
-    if indentation is None or closing is None or len(data.forces) < 2:
+    closing, indentation = field(ds, "closing"), field(ds, "indentation")
+    if indentation is None or closing is None or len(forces(ds)) < 2:
         return None
-    cut = (*index[:-3], slice(None), index[-2], slice(None))
-    snapped = (data.flags & Flag.SNAPPED > 0)[cut]
+    cut: Any = (*index[:-3], slice(None), index[-2], slice(None))
+    snapped = (ds["flags"].values & Flag.SNAPPED > 0)[cut]
     made = plots.figure(1, 2, ("closing displacement of the pads [mm]", "indentation [mm]"), shared_yaxes=True)
-    others = [i for i in range(data.shape[-3]) if i != index[-3]]
+    others = [i for i in range(len(snapped)) if i != index[-3]]
     for i in (*others[:: -(-len(others) // MOST_LINES) or 1], index[-3]):
         own = i == index[-3]
-        place = data.place((*index[:-3], i, *index[-2:]))
+        name = label(place(ds, (*index[:-3], i, *index[-2:])))
         look = {"color": "#12436d" if own else "#aeb6bc", "width": 2.5 if own else 1}
         symbols = ["circle", *np.where(snapped[i], "diamond-open", "circle")]
         for column, found in enumerate((closing, indentation), start=1):
-            made.add_scatter(x=[0, *1e3 * found[cut][i]], y=[0, *data.forces], mode="lines+markers", line=look,
-                             marker={"symbol": symbols, "size": 6}, name=label(place), showlegend=False,
-                             connectgaps=False, row=1, col=column)  # fmt: skip
+            made.add_scatter(x=[0, *1e3 * found[cut][i]], y=[0, *forces(ds)], mode="lines+markers", line=look,
+                             marker={"symbol": symbols, "size": 6}, name=name, showlegend=False, connectgaps=False,
+                             row=1, col=column)  # fmt: skip
     if allowed is not None:
         made.add_vline(1e3 * allowed, line={"color": "#c05a00", "dash": "dash"}, row=1, col=2)
     made.update_yaxes(title_text="normal force [N]", col=1)
     rule = f" Dashed: the allowed indentation, {1e3 * allowed:g} mm." if allowed is not None else ""
     caption = (
-        f"Dark: {data.place(index)}; grey: other candidates. A wall that softens bends its line to the right; open"
-        f" diamonds: the wall has snapped in on the way there.{rule}"
+        f"Dark: {place(ds, index)}; grey: other candidates. A wall that softens bends its line to the right; open"
+        f" diamonds: the wall snapped in at a smaller force.{rule}"
     )
-    alt = (
-        f"Force over closing and indentation; {number(1e3 * indentation[index])} mm at {data.place(index, force=True)}."
-    )
-    return plot(made, caption, alt, 340)
+    here = f"{number(1e3 * indentation[index])} mm at {place(ds, index, force=True)}"
+    return plot(made, caption, f"Force over closing and indentation; {here}.", 340)
 
 
-def wall_section(data: Data, scene: Any, index: tuple[int, ...]) -> Block | None:
+def wall_section(view: View, index: Index) -> Block | None:
     """Sections through the outer face of a deformed wall beside the undeformed one; None where none is stored."""
-    found = View(data, index[:-3]).displacement(index)
-    if found is None:
+    found, origin = view.displacement(index), field(view.ds, "finger_pose_origin")
+    if found is None or origin is None:
         return None
     u, angle = found
-    before = undeformed(swept_object(scene, index), angle)
+    before: Any = undeformed(view.scene.object, angle)
     out = np.array([math.cos(angle), math.sin(angle), 0.0])
     beside = np.array([-out[1], out[0], 0.0])
-    height = data.values("fingers/pose_origin")[index][0][2]
-    j = int(np.abs(before[0, :, 2] - height).argmin())
+    j = int(np.abs(before[0, :, 2] - origin[index][0][2]).argmin())
     made = plots.figure(1, 2, ("along the axis, through both fingers", f"across it at {1e3 * before[0, j, 2]:.4g} mm"))
     half = len(before) // 2
-    for place, name, dash in ((before, "undeformed", "dash"), (before + u, "deformed", "solid")):
+    for points, name, dash in ((before, "undeformed", "dash"), (before + u, "deformed", "solid")):
         look = {"color": plots.SOFT if dash == "dash" else "#12436d", "dash": dash}
-        upright = np.concatenate([place[half, ::-1], place[0]])
-        ring = np.concatenate([place[:, j], place[:1, j]])
+        upright = np.concatenate([points[half, ::-1], points[0]])
+        ring = np.concatenate([points[:, j], points[:1, j]])
         for column, (x, y) in enumerate(((upright[:, 2], upright @ out), (ring @ beside, ring @ out)), start=1):
             made.add_scatter(x=1e3 * x, y=1e3 * y, mode="lines", line=look, name=name, showlegend=column == 1, row=1,
                              col=column)  # fmt: skip
     made.update_yaxes(title_text="along the approach [mm]", col=1)
     made.update_yaxes(scaleanchor="x", row=1, col=1).update_yaxes(scaleanchor="x2", row=1, col=2)
     made.update_xaxes(title_text="along the axis [mm]", col=1).update_xaxes(title_text="beside it [mm]", col=2)
-    indentation = number(1e3 * data.at("indentation", index))
-    caption = f"{data.place(index, force=True)}: indentation {indentation} mm. True to scale, nothing is exaggerated."
+    indentation = number(1e3 * at(view.ds, "indentation", index))
+    caption = f"{place(view.ds, index, force=True)}: indentation {indentation} mm. True to scale."
     return plot(made, caption, f"Sections through the deformed wall; indentation {indentation} mm.", 420)

@@ -5,14 +5,34 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.study.flags import flags_in
 from softjaw.study.page import Block, bullets, details, table, text, verbatim
-from softjaw.study.quantities import EFFECTS, PARTS, REASONS
+from softjaw.study.quantities import EFFECTS, MODEL_NAMES, PARTS, REASONS
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.run.progress import duration
-from softjaw.study.show.data import ABOVE, LIMITS, Data, number, passes
-from softjaw.study.show.report.verdict import VALUES, flags_of, listed, safe_range, value
+from softjaw.study.show.grasps import (
+    ABOVE,
+    LIMITS,
+    Index,
+    at,
+    check,
+    field,
+    flagged,
+    flags_of,
+    forces,
+    grouped,
+    images,
+    label_of,
+    number,
+    order,
+    passes,
+    place,
+    spoken,
+    unravelled,
+)
+from softjaw.study.show.report.verdict import VALUES, listed, safe_range, value
 from softjaw.study.show.tables.overview import RULE, wall_text
 from softjaw.study.show.tables.ranking import largest
 
@@ -34,85 +54,82 @@ STRESS = (
 )
 
 
-def best_grasps(data: Data) -> list[Block]:
+def best_grasps(ds: xr.Dataset) -> list[Block]:
     """The best grasps at the force shown, and the best one at each force."""
-    order = data.order(data.k)
-    if not order:
+    k, ranked = ds.attrs["level"], order(ds, ds.attrs["level"])
+    if not ranked:
         return []
-    walled = data.bound("force_high") is not None
-    heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, PCM ({data.planar}) [mm]",
+    walled = "force_high" in ds
+    heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, {MODEL_NAMES[ds.attrs['planar']]} [mm]",
              "checks and notes"]  # fmt: skip
-    chosen: list[tuple[int, ...]] = []
-    merged: set[tuple[int, ...]] = set()
-    for index in order:
-        if index not in merged and len(chosen) < BEST:
-            chosen.append(index)
-            merged |= set(_turned(data, index))
-    rows = [[_with_angles(data, index), *_row(data, index)] for index in chosen]
-    caption = f"Best grasps at {number(data.forces[data.k])} N per finger, candidates solved: {len(order)} (CCM)"
+    shown: list[Index] = []
+    merged: set[Index] = set()
+    for index in ranked:
+        if index not in merged and len(shown) < BEST:
+            shown.append(index)
+            merged |= set(_turned(ds, index))
+    rows = [[_with_angles(ds, index), *_row(ds, index)] for index in shown]
+    caption = f"Best grasps at {number(forces(ds)[k])} N per finger, candidates solved: {len(ranked)} (CCM)"
     found = [table(caption, heads, rows, texts=(0,), wide=(len(heads) - 1,), first=True)]
-    tops = [data.order(k)[:1] for k in range(len(data.forces))]
-    if len(data.forces) > 1:
-        none = ["–"] * (len(heads) - 2) + ["not solved"]
-        rows = [[number(force), *([data.place(top[0]), *_row(data, top[0])] if top else ["–", *none])]
-                for force, top in zip(data.forces, tops, strict=True)]  # fmt: skip
+    tops = [order(ds, level)[:1] for level in range(len(forces(ds)))]
+    if len(tops) > 1:
+        none = ["–"] * (len(heads) - 1) + ["not solved"]
+        rows = [[number(force), *([place(ds, top[0]), *_row(ds, top[0])] if top else none)]
+                for force, top in zip(forces(ds), tops, strict=True)]  # fmt: skip
         found.append(table("Best grasp at each force", ["force [N]", *heads], rows, wide=(1, len(heads))))
     if walled:
         found.append(text(SAFE, "note"))
-    listed_cases = (*chosen, *(index for top in tops for index in top))
-    words = {flag.word: flag.sentence for index in listed_cases for flag in flags_of(data, index)}
-    return found + [text(f"{word}: {meaning}.", "note") for word, meaning in words.items()]
+    flags = {flag for index in (*shown, *(index for top in tops for index in top)) for flag in flags_of(ds, index)}
+    return found + [text(f"{flag.word}: {flag.sentence}.", "note") for flag in sorted(flags)]
 
 
-def _turned(data: Data, index: tuple[int, ...]) -> list[tuple[int, ...]]:
+def _turned(ds: xr.Dataset, index: Index) -> list[Index]:
     """The same place under other angles, with the same score."""
-    return [i for i in data.images(index) if i[:-2] == index[:-2]]
+    return [i for i in images(ds, index) if i[:-2] == index[:-2]]
 
 
-def _with_angles(data: Data, index: tuple[int, ...]) -> str:
-    angles = [number(np.degrees(data.axes[-2].values[i[-2]]), 4) + "°" for i in _turned(data, index)]
-    return data.place(index) + (f" (and {listed(angles)})" if angles else "")
+def _with_angles(ds: xr.Dataset, index: Index) -> str:
+    angles = [number(np.degrees(ds.angle.values[i[-2]]), 4) + "°" for i in _turned(ds, index)]
+    return place(ds, index) + (f" (and {listed(angles)})" if angles else "")
 
 
-def _row(data: Data, index: tuple[int, ...]) -> list[str]:
-    known = any(np.isfinite(data.check(name, index)) for name in LIMITS)
-    checks = data.flagged(index) or ["passed" if known else "not stored"]
-    notes = ", ".join([*checks, *(flag.word for flag in flags_of(data, index))])
-    planar = number(data.at("e_n", index, data.planar) * 1e3, 4)
-    last = planar if data.bound("force_high") is None else safe_range(data, index)
-    return [*(value(data, name, index) for name in VALUES), last, notes]
+def _row(ds: xr.Dataset, index: Index) -> list[str]:
+    known = any(np.isfinite(check(ds, name, index)) for name in LIMITS)
+    checks = flagged(ds, index) or ["passed" if known else "not stored"]
+    notes = ", ".join([*checks, *(flag.word for flag in flags_of(ds, index))])
+    planar = number(at(ds, "e_n", index, ds.attrs["planar"]) * 1e3, 4)
+    last = safe_range(ds, index) if "force_high" in ds else planar
+    return [*(value(ds, name, index) for name in VALUES), last, notes]
 
 
-def note(data: Data, index: tuple[int, ...]) -> str:
+def note(ds: xr.Dataset, index: Index) -> str:
     """The reason of a failed case; the checks that a solved one misses, and its flags."""
-    if data.status[index] == FAILED:
-        return str(data.messages[index]) or "no reason was given"
-    if data.status[index] != DONE:
+    state = ds.variables["status"].values[index]
+    if state == FAILED:
+        return str(ds.variables["message"].values[index]) or "no reason was given"
+    if state != DONE:
         return ""
-    return ", ".join([*data.flagged(index), *(flag.word for flag in flags_of(data, index))])
+    return ", ".join([*flagged(ds, index), *(flag.word for flag in flags_of(ds, index))])
 
 
-def states(data: Data) -> list[Block]:
+def states(ds: xr.Dataset) -> list[Block]:
     """Counts of the cases by state and by flag, and notes on solved cases, alike messages together."""
-    counts = [[name, str(data.count(state))] for state, name in STATES.items()]
+    status = ds.status.values
+    counts = [[name, str(int(np.sum(status == state)))] for state, name in STATES.items()]
     found = [table("State of the cases", ["state", "cases"], counts, texts=(0,))]
-    flags = data.flags[data.status == DONE]
+    flags = ds["flags"].values[status == DONE]
     raised = flags_in(int(np.bitwise_or.reduce(flags))) if flags.size else []
     rows = [[f.word, str(int(np.sum(flags & f > 0))), f.sentence] for f in raised]
     if rows:
         found.append(table("Flags of solved cases", ["flag", "cases", "meaning"], rows, texts=(0,), wide=(2,)))
-    return found + _reasons(data, DONE)
+    return found + reasons(ds, DONE)
 
 
-def failures(data: Data) -> list[Block]:
-    """Why cases failed, alike reasons together; empty where none failed."""
-    return _reasons(data, FAILED)
-
-
-def _reasons(data: Data, state: int) -> list[Block]:
+def reasons(ds: xr.Dataset, state: int) -> list[Block]:
+    """Why cases failed, or notes on solved ones, alike messages together; empty where there are none."""
     caption = "Why cases failed" if state == FAILED else "Notes on solved cases"
-    groups = data.grouped(state)
-    rows = [[str(count), words, _places(data, where)] for count, words, where in groups[:MOST_REASONS]]
+    groups = grouped(ds, state)
+    rows = [[str(count), message, _places(ds, where)] for count, message, where in groups[:MOST_REASONS]]
     found = [table(caption, ["cases", "message (one example)", "where"], rows, wide=(1, 2))] if rows else []
     if len(groups) > MOST_REASONS:
         more = f"{len(groups) - MOST_REASONS} more kinds of messages are in status/message of the file."
@@ -120,81 +137,77 @@ def _reasons(data: Data, state: int) -> list[Block]:
     return found
 
 
-def _places(data: Data, where: list[tuple[int, ...]]) -> str:
-    words = [data.place(index, force=True) for index in where[:MOST_PLACES]]
-    return "; ".join([*words, *["…"] * (len(where) > MOST_PLACES)])
+def _places(ds: xr.Dataset, where: list[Index]) -> str:
+    return "; ".join([*(place(ds, index, force=True) for index in where[:MOST_PLACES]),
+                      *["…"] * (len(where) > MOST_PLACES)])  # fmt: skip
 
 
-def every_case(data: Data) -> list[Block]:
+def every_case(ds: xr.Dataset) -> list[Block]:
     """A folded table of all cases."""
-    if data.status.size == 1:
+    status = ds.status.values
+    if status.size == 1:
         return []
-    if data.status.size > MOST_CASES:
-        said = f"The {data.status.size} cases are too many to be listed here; softjaw export writes all of them."
-        return [text(said, "note")]
-    names = [name for name in (*VALUES, *MORE) if data.map(name) is not None]
-    rows = [[data.place(i, force=True), STATES.get(int(data.status[i]), "missing"),
-             *(value(data, name, i) for name in names), note(data, i)] for i in np.ndindex(data.shape)]  # fmt: skip
-    heads = ["case", "state", *(HEADS.get(name) or data.label(name) for name in names), "notes"]
-    caption = f"All {len(rows)} cases (CCM, weaker finger)"
-    return [details(f"All {len(rows)} cases as a table",
-                    [table(caption, heads, rows, texts=(0, 1), wide=(len(heads) - 1,))])]  # fmt: skip
+    if status.size > MOST_CASES:
+        summary = f"The {status.size} cases are too many to be listed here; softjaw export writes all of them."
+        return [text(summary, "note")]
+    names = [name for name in (*VALUES, *MORE) if field(ds, name) is not None]
+    rows = [[place(ds, i, force=True), STATES[int(status[i])], *(value(ds, name, i) for name in names), note(ds, i)]
+            for i in np.ndindex(status.shape)]  # fmt: skip
+    heads = ["case", "state", *(HEADS.get(name) or label_of(ds, name) for name in names), "notes"]
+    whole = table(f"All {len(rows)} cases (CCM, weaker finger)", heads, rows, texts=(0, 1), wide=(len(heads) - 1,))
+    return [details(f"All {len(rows)} cases as a table", [whole])]
 
 
-def checks(data: Data) -> Block:
+def checks(ds: xr.Dataset) -> Block:
     """The worst value of each check over all solved cases, and where it was found."""
     rows = []
     for name in (*LIMITS, "max_strain"):
-        found = data.values(f"checks/{name}")
+        found = field(ds, f"check_{name}")
         if found is None:
             continue
-        index = np.unravel_index(largest(-found if name in ABOVE else found), found.shape)
+        index = unravelled(largest(-found if name in ABOVE else found), found.shape)
         worst = float(found[index])
         limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
         state = "–" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
-        rows.append([name.replace("_", " "), number(worst), limit, state, data.place(index[:-1], force=True)])
+        rows.append([spoken(name), number(worst), limit, state, place(ds, index[:-1], force=True)])
     if not rows:
         return text("No checks are stored.", "note")
     heads = ["check", "worst value", "should be", "", "worst case"]
     return table("Checks of the contact solutions, worst of all solved cases and fingers", heads, rows, texts=(0, 3, 4))
 
 
-def wall(data: Data, shape: Any) -> list[Block]:
+def wall(ds: xr.Dataset, shape: Any) -> list[Block]:
     """Limits of a thin wall, and what it bears in the best grasps at the force shown."""
     limits = [f"The wall: {wall_text(shape)}."] if shape is not None else []
-    there = [name for name in WALL if data.map(name) is not None]
-    level, rows = data.values("effects/object_level"), []
-    for index in data.order(data.k)[:BEST]:
-        values = [value(data, name, index, 3) for name in there]
-        known = level is not None and np.isfinite(level[index])
+    there = [name for name in WALL if field(ds, name) is not None]
+    level, rows = field(ds, "effect_object_level"), []
+    for index in order(ds, ds.attrs["level"])[:BEST]:
+        values = [value(ds, name, index, 3) for name in there]
+        known = level is not None and level[index] >= 0
         simulated = EFFECTS["object"][int(level[index])] if known else "–"
-        rows.append([data.place(index), *values, safe_range(data, index), simulated])
-    names = [data.label(name) for name in there]
-    head = ["grasp", *names, "safe forces [N]", "wall simulated as"]
-    caption = f"The wall in the best grasps at {number(data.forces[data.k])} N per finger"
+        rows.append([place(ds, index), *values, safe_range(ds, index), simulated])
+    head = ["grasp", *(label_of(ds, name) for name in there), "safe forces [N]", "wall simulated as"]
+    caption = f"The wall in the best grasps at {number(forces(ds)[ds.attrs['level']])} N per finger"
     return [text(" ".join([*limits, STRESS])), table(caption, head, rows, texts=(0, len(head) - 1), first=True)]
 
 
-def effects(data: Data) -> list[Block]:
+def effects(ds: xr.Dataset) -> list[Block]:
     """Level, indicator and reason of every effect over the solved cases, and the rule for a thin wall."""
     rows = []
-    for name, names in EFFECTS.items():
-        parts = {part: data.values(f"effects/{name}_{part}") for part in ("level", "indicator", "reason")}
-        if parts["level"] is None or not (chosen := _counted(parts["level"], names)):
+    for name, levels in EFFECTS.items():
+        level, indicator, reason = (field(ds, f"effect_{name}_{part}") for part in ("level", "indicator", "reason"))
+        if level is None or not (shown := _counted(level, levels)):
             continue
-        indicator = parts["indicator"]
-        low, high = (np.nanmin(indicator), np.nanmax(indicator)) if indicator is not None else (np.nan, np.nan)
-        area = number(low) if number(low) == number(high) else f"{number(low)} to {number(high)}"
-        rows.append([name.replace("_", " "), chosen, area, _counted(parts["reason"], REASONS)])
+        low, high = (number(np.nan if indicator is None else f(indicator)) for f in (np.nanmin, np.nanmax))
+        span = low if low == high else f"{low} to {high}"
+        rows.append([spoken(name), shown, span, "" if reason is None else _counted(reason, REASONS)])
     if not rows:
         return [text("No effects are stored.", "note")]
     heads = ["effect", "level", "indicator", "reason"]
-    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3)), *_rule(data)]
+    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3)), *_rule(ds)]
 
 
-def _counted(codes: np.ndarray | None, meaning: tuple[str, ...]) -> str:
-    if codes is None:
-        return ""
+def _counted(codes: np.ndarray, meaning: tuple[str, ...]) -> str:
     known = codes[np.isfinite(codes)].astype(int)
     counts = {c: int(np.sum(known == c)) for c in sorted(set(known.tolist()) & set(range(len(meaning))))}
     if len(counts) == 1:
@@ -202,62 +215,59 @@ def _counted(codes: np.ndarray | None, meaning: tuple[str, ...]) -> str:
     return "; ".join(f"{meaning[c]} ({n} of {known.size} cases)" for c, n in counts.items())
 
 
-def _rule(data: Data) -> list[Block]:
-    """What the indicator of a thin wall is and how its level follows from it; empty without a wall."""
-    level, reason = data.values("effects/object_level"), data.values("effects/object_reason")
-    if not data.walled or level is None or reason is None:
+def _rule(ds: xr.Dataset) -> list[Block]:
+    """How the level of a thin wall is chosen; empty without a wall."""
+    level, reason = field(ds, "effect_object_level"), field(ds, "effect_object_reason")
+    if "wall" not in ds.attrs["has"] or level is None or reason is None:
         return []
-    said = f"The level of the object is chosen for each candidate, for all its forces, {RULE}. Its indicator is that"
-    said += " indentation over the wall's thickness."
     if np.nanmin(reason) == FORCED:
-        name = EFFECTS["object"][int(np.nanmax(level))]
-        said = f"The scene asks for one level of the object for every candidate: {name}."
-    return [text(said, "note")]
+        forced = EFFECTS["object"][int(np.nanmax(level))]
+        return [text(f"The scene asks for one level of the object for every candidate: {forced}.", "note")]
+    rule = f"The level of the object is chosen for each candidate, for all its forces, {RULE}. Its indicator is that"
+    return [text(f"{rule} indentation over the wall's thickness.", "note")]
 
 
-def time_split(data: Data) -> list[Block]:
+def time_split(ds: xr.Dataset) -> list[Block]:
     """Where the time of all cases went."""
-    total = data.values("work/seconds_total")
+    total = field(ds, "work_seconds_total")
     if total is None:
         return []
     whole = float(np.nansum(total))
-    found = {part: data.values(f"work/seconds_{part}") for part in PARTS}
-    sums = {part: float(np.nansum(seconds)) for part, seconds in found.items() if seconds is not None}
+    sums = {part: float(np.nansum(s)) for part in PARTS if (s := field(ds, f"work_seconds_{part}")) is not None}
     rows = [[part, duration(seconds), f"{seconds / whole:.0%}" if whole else "–"] for part, seconds in sums.items()]
     rows.append(["all", duration(whole), "100%"])
-    longest = np.unravel_index(np.nanargmax(total), total.shape)
-    note = f"Longest case: {number(total[longest])} s ({data.place(longest, force=True)})."
-    caption = f"Time of {data.count(DONE)} solved cases, summed over all ranks"
-    return [table(caption, ["part", "time", "share"], rows, texts=(0,)), text(note, "note")]
+    longest = unravelled(int(np.nanargmax(total)), total.shape)
+    slowest = f"Longest case: {number(total[longest])} s ({place(ds, longest, force=True)})."
+    caption = f"Time of {int(np.sum(ds.status.values == DONE))} solved cases, summed over all ranks"
+    return [table(caption, ["part", "time", "share"], rows, texts=(0,)), text(slowest, "note")]
 
 
-def definitions(data: Data) -> list[Block]:
+def definitions(ds: xr.Dataset) -> list[Block]:
     """The file's own definitions: its introduction, and one row for each quantity."""
-    intro = data.ds.attrs["definitions"].partition("\n\n")[0]
+    intro = ds.attrs["definitions"].partition("\n\n")[0]
     rows = [[str(name), v.attrs.get("units", ""), f"{v.attrs['long_name']}. {v.attrs['definition']}"]
-            for name, v in data.ds.data_vars.items() if v.attrs.get("definition")]  # fmt: skip
+            for name, v in ds.data_vars.items() if v.attrs.get("definition")]  # fmt: skip
     head = ["variable", "unit (SI)", "meaning"]
     listed_rows = details("All datasets", [table("What the numbers mean", head, rows, (0, 1), (2,))])
     return [text(" ".join(intro.split())), listed_rows]
 
 
-def scene(data: Data) -> list[Block]:
+def scene(ds: xr.Dataset) -> list[Block]:
     """The effective scene and where it came from."""
-    about = data.ds.attrs
+    about = ds.attrs
     named = {"file": about["scene_file"], "overrides": ", ".join(about["overrides"]), "digest": about["digest"],
              "petsc options": about["petsc_options"]}  # fmt: skip
-    items = [f"{name}: {words}" for name, words in named.items() if words]
-    return [bullets(items), verbatim(about["scene"])]
+    return [bullets(f"{name}: {given}" for name, given in named.items() if given), verbatim(about["scene"])]
 
 
-def provenance(data: Data) -> list[Block]:
+def provenance(ds: xr.Dataset) -> list[Block]:
     """Sessions, programs and machines."""
-    sessions = data.ds.attrs["provenance"]
+    sessions = ds.attrs["provenance"]
     if not sessions:
         return [text("No session is recorded.", "note")]
     rows = [
-        [str(i), s["start"], s["stop"] or "–", s["reason"] if s["stop"] else "running, or ended without a word",
-         str(s["ranks"]), str(s["done"]), str(s["failed"])]
+        [str(i), s["start"], s["stop"] or "–", s["reason"] if s["stop"] else "running, or killed", str(s["ranks"]),
+         str(s["done"]), str(s["failed"])]
         for i, s in enumerate(sessions, start=1)
     ]  # fmt: skip
     head = ["session", "start", "stop", "how it ended", "ranks", "solved", "failed"]
@@ -268,7 +278,7 @@ def provenance(data: Data) -> list[Block]:
         kinds.setdefault(key, []).append(str(i))
     names = ("program", "sources", "versions", "host", "processor", "command", "PETSc options")
     for key, which in kinds.items():
-        rows = [[name, words] for name, words in zip(names, key, strict=True) if words]
+        rows = [[name, given] for name, given in zip(names, key, strict=True) if given]
         caption = f"Program and machine of session {', '.join(which)}"
         found.append(table(caption, ["what", "value"], rows, texts=(0,), wide=(1,)))
     return found

@@ -1,22 +1,48 @@
-"""The answer of a report: where to grasp, how wide and how hard, how sure that is, and what stands against it."""
+"""The answer of a report: where to grasp, how wide and how hard, how sure that is, and what speaks against it."""
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
-from softjaw.study.flags import Flag, flags_in
+from softjaw.study.flags import BORNE
+from softjaw.study.quantities import MODEL_NAMES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.show.data import Data, number, shown
+from softjaw.study.show.grasps import (
+    Index,
+    at,
+    axis_values,
+    candidate_of,
+    flagged,
+    flags_of,
+    forces,
+    grouped,
+    images,
+    judge,
+    label_of,
+    lost,
+    number,
+    order,
+    place,
+    quantity,
+    spoken,
+    unit_of,
+)
 from softjaw.study.show.tables.certainty import sure
 from softjaw.study.show.tables.certainty import verdict as judgement
-from softjaw.study.show.tables.ranking import BORNE, largest, passed_over
+from softjaw.study.show.tables.ranking import largest, passed_over
+from softjaw.study.show.tables.show import best as best_table
+from softjaw.study.show.tables.show_text import as_text
 
 LEAST = 1e-4  # relative error below which only a bound is given
+NBSP = "\u00a0"
+ROUNDING = 1e-9  # of the largest force, by which a bound may miss it
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
-    "used here stand in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
+    "used here are in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
     "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
 )
 ESTIMATED = "± is the difference to a mesh half as fine, in per cent of the value; the error is usually smaller."
@@ -26,72 +52,83 @@ WITH_INTERVALS = (
     " parts that [uncertainty] in the scene asks for."
 )
 VALUES = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
+# of the plain text in the file
+TOP, MOST_REASONS, MOST_PLACES, WIDTH = 5, 10, 3, 120
+READING = """How to read the file
+All values are SI. Every dataset has its unit, its label and its definition as attributes; /study/definitions has all
+definitions in one text, with the friction models: ccm lets every face resist in its own plane (curved contact model),
+pcm and pcm_projected are planar models with the pressure sum S and with the normal force F_N. NaN: there is no value,
+and /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message say why. Candidates are counted over
+stations and angles, the angle running fastest. /study/scene is the scene with all settings, /study/provenance/sessions
+lists programs and machine. Plots: h5web, silx or NeXpy open at the map of quality; ParaView and pyvista open /VTKHDF,
+the object with its maps and the pads with their pressure, with the force as time."""
 
 
-def subtitle(data: Data) -> str:
+def subtitle(ds: xr.Dataset) -> str:
     """File and axes in one line."""
-    words, last = [], len(data.axes) - 3
-    for position, axis in enumerate(data.axes):
-        unit, factor = shown(axis.units)
-        n, low, high = len(axis.values), axis.values.min() * factor, axis.values.max() * factor
-        reach = number(low, 4) if n == 1 else f"{number(low, 4)} to {number(high, 4)}"
+    parts, axes = [], [str(axis) for axis in ds.status.dims]
+    for axis in axes:
+        values, unit = axis_values(ds, axis), unit_of(ds[axis].units)[0]
+        n, low = len(values), number(values.min(), 4)
+        reach = low if n == 1 else f"{low} to {number(values.max(), 4)}"
         space, plural = "" if unit in ("", "°") else " ", "s" * (n > 1)
-        name = f"{data.name(axis)}{plural}" if position >= last else f"value{plural} of {data.name(axis)}"
-        if position == last and data.by_poses:
-            words.append(f"{n} candidate{plural}")
-        elif not (position == last + 1 and data.by_poses):
-            words.append(f"{n} {name} ({reach}{space}{unit})")
-    return f"{Path(data.ds.attrs['file']).name}: {' × '.join(words)}"
+        name = f"{spoken(axis)}{plural}" if axis in axes[-3:] else f"value{plural} of {spoken(axis)}"
+        if axis == "station" and ds.attrs["poses"]:
+            parts.append(f"{n} candidate{plural}")
+        elif not (axis == "angle" and ds.attrs["poses"]):
+            parts.append(f"{n} {name} ({reach}{space}{unit})")
+    return f"{Path(ds.attrs['file']).name}: {' × '.join(parts)}"
 
 
-def verdict(data: Data, mu: float | None) -> list[str]:
+def verdict(ds: xr.Dataset, mu: float | None) -> list[str]:
     """The answer in sentences, and how many cases it rests on."""
-    done, failed, missing = (data.count(state) for state in (DONE, FAILED, MISSING))
-    total = data.status.size
+    done, failed, missing = (int(np.sum(ds.status.values == state)) for state in (DONE, FAILED, MISSING))
+    total, best = ds.status.size, ds.attrs["best"]
     cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing."
     if done == total:
         cases = f"All {total} cases are solved." if total > 1 else "It is the only case of this study."
-    if data.best is None:
+    if best is None:
         return [f"No grasp is solved. {cases}"]
-    best = data.best
-    first = [_best(data, best), *_apart(data, best), _carried(data, best, mu), *_weight(data, best)]
-    wall = [said] if (said := wall_sentence(data, best)) else []
-    return [*first, *wall, *_planar(data, best), *_passed_over(data, best), *_other_force(data, best), cases]
+    first = [_best(ds, best), *_apart(ds, best), _carried(ds, best, mu), *_weight(ds, best)]
+    wall = [text] if (text := wall_sentence(ds, best)) else []
+    return [*first, *wall, *_planar(ds, best), *_passed_over(ds, best), *_other_force(ds, best), cases]
 
 
-def key_values(data: Data) -> list[tuple[str, str]]:
+def key_values(ds: xr.Dataset) -> list[tuple[str, str]]:
     """What a reader wants at once: where, how wide, how hard, and how good that is."""
-    best = data.best
+    best = ds.attrs["best"]
     if best is None:
         return []
-    pairs = [("where", data.place(best)), ("how hard", f"{number(data.forces[best[-1]])}\u00a0N per finger")]
-    if np.isfinite(data.at("contact_distance", best)):
-        opening = 1e3 * data.at("contact_distance", best)
-        pairs.insert(1, ("how wide (opening at first touch)", f"{number(opening, 4)}\u00a0mm"))
-    if data.bound("force_high") is not None:
-        pairs.append(("safe forces [N]", safe_range(data, best)))
+    pairs = [("where", place(ds, best)), ("how hard", f"{_force(ds, best).replace(' ', NBSP)} per finger")]
+    if np.isfinite(opening := at(ds, "contact_distance", best)):
+        pairs.insert(1, ("how wide (opening at first touch)", f"{number(1e3 * opening, 4)}\u00a0mm"))
+    if "force_high" in ds:
+        pairs.append(("safe forces [N]", safe_range(ds, best)))
     names = {"quality": "grasp quality", "e_n": "e_n [mm]", "safety_factor": "safety factor"}
-    pairs += [(text, value(data, n, best, 3)) for n, text in names.items() if np.isfinite(data.at(n, best))]
-    return pairs
+    return pairs + [(text, value(ds, n, best, 3)) for n, text in names.items() if np.isfinite(at(ds, n, best))]
 
 
-def _best(data: Data, best: tuple[int, ...]) -> str:
-    what = f"quality {value(data, 'quality', best, 3)}"
-    if data.score != "quality":
+def _force(ds: xr.Dataset, index: Index) -> str:
+    return f"{number(forces(ds)[index[-1]])} N"
+
+
+def _best(ds: xr.Dataset, best: Index) -> str:
+    score, lengths = ds.attrs["score"], ds.status.shape
+    what = f"quality {value(ds, 'quality', best, 3)}"
+    if score != "quality":
         what = "ranked by e_n, for no quality is stored"
-    if not np.isfinite(data.at(data.score, best)):
+    if not np.isfinite(at(ds, score, best)):
         what = "which has no score"
-    alike = data.images(best)
-    same = f" The same score at {listed([data.place(i) for i in alike])}." if alike else ""
-    name = "Best grasp" if data.grasps > 1 else "Best point of the sweep" if data.sweeps else "The grasp"
-    return (
-        f"{name} at {number(data.forces[best[-1]])} N per finger: {data.place(best)}, {what}, "
-        f"e_n {value(data, 'e_n', best, 3)}{' mm' * bool(np.isfinite(data.at('e_n', best)))}.{same}"
-    )
+    alike = images(ds, best)
+    same = f" The same score at {listed([place(ds, i) for i in alike])}." if alike else ""
+    swept = "Best point of the sweep" if max(lengths[:-3], default=1) > 1 else "The grasp"
+    name = "Best grasp" if max(lengths[-3:-1]) > 1 else swept
+    e_n = f"e_n {value(ds, 'e_n', best, 3)}{' mm' * bool(np.isfinite(at(ds, 'e_n', best)))}"
+    return f"{name} at {_force(ds, best)} per finger: {place(ds, best)}, {what}, {e_n}.{same}"
 
 
-def _carried(data: Data, best: tuple[int, ...], mu: float | None) -> str:
-    f_x, f_y, tau = (value(data, name, best, 3) for name in ("f_x_max", "f_y_max", "tau_z_max"))
+def _carried(ds: xr.Dataset, best: Index, mu: float | None) -> str:
+    f_x, f_y, tau = (value(ds, name, best, 3) for name in ("f_x_max", "f_y_max", "tau_z_max"))
     friction = f", mu = {mu:g}" if mu is not None else ""
     return (
         f"There a contact carries up to f_x = {f_x} N along the pad, f_y = {f_y} N across it and tau_z = {tau} N mm of"
@@ -99,165 +136,193 @@ def _carried(data: Data, best: tuple[int, ...], mu: float | None) -> str:
     )
 
 
-def _apart(data: Data, best: tuple[int, ...]) -> list[str]:
+def _apart(ds: xr.Dataset, best: Index) -> list[str]:
     """Whether the best grasp is better than those that follow beyond the errors."""
-    order = [i[:-1] for i in data.order(best[-1]) if not data.lost[i] and np.isfinite(data.at(data.score, i))]
-    places = [tuple(np.delete(index, -1)) for index in np.ndindex(data.shape[:-1])]
-    flat = [int(np.ravel_multi_index(index, data.shape[:-1])) for index in order]
-    units = "m" * (data.score == "e_n")
-    said = judgement(sure(data.ds, data.score, best[-1]), flat, places, units).replace("+-", "±")
-    return [f"{said[0].upper()}{said[1:]}."] if said else []
+    score, shape = ds.attrs["score"], ds.status.shape[:-1]
+    usable = [candidate_of(ds, i) for i in order(ds, best[-1]) if not lost(ds, i) and np.isfinite(at(ds, score, i))]
+    places = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
+    text = judgement(sure(ds, score, best[-1]), usable, places, "m" * (score == "e_n")).replace("+-", "±")
+    return [f"{text[0].upper()}{text[1:]}."] if text else []
 
 
-def _weight(data: Data, index: tuple[int, ...]) -> list[str]:
+def _weight(ds: xr.Dataset, index: Index) -> list[str]:
     """How many times its own weight the object could have, where its mass is known."""
-    factor = data.at("safety_factor", index)
+    factor = at(ds, "safety_factor", index)
     if not np.isfinite(factor):
         return []
     what = f"The grasp holds {number(factor)} times the object's weight at this force (CCM)"
     return [f"{what}." if factor >= 1 else f"{what}: it would lose the object."]
 
 
-def wall_sentence(data: Data, index: tuple[int, ...]) -> str:
+def bounds(ds: xr.Dataset, index: Index) -> tuple[float | None, float]:
+    """Minimum holding force (None without a mass) and maximum force before damage (NaN if unknown) of a candidate."""
+    low, high = (float(ds[n].values[index[:-1]]) if n in ds else None for n in ("force_low", "force_high"))
+    return low, float("nan") if high is None else high
+
+
+def _open_above(ds: xr.Dataset, high: float) -> bool:
+    """Whether the wall bears the largest solved force."""
+    return bool(high >= forces(ds)[-1] * (1 - ROUNDING))
+
+
+def wall_sentence(ds: xr.Dataset, index: Index) -> str:
     """How a thin wall takes one case, and between which forces it would be safe; empty without a wall."""
-    if not np.isfinite(data.at("indentation", index)):
+    if not np.isfinite(at(ds, "indentation", index)):
         return ""
     indentation, stress = (
-        f"{value(data, name, index, 3)} {data.units(name)[1]}" for name in ("indentation", "wall_stress")
+        f"{value(ds, name, index, 3)} {quantity(ds, name)[1]}" for name in ("indentation", "wall_stress")
     )
-    said = f"The wall is dented by {indentation} and its stress reaches {stress}."
-    low, high = (data.bound(name) for name in ("force_low", "force_high"))
-    if high is None or not np.isfinite(high[index[:-1]]):
-        return said
-    top, bottom = float(high[index[:-1]]), None if low is None else float(low[index[:-1]])
-    if bottom is not None and not bottom <= top:
-        return f"{said} No solved force both holds the object and leaves the wall undamaged."
-    upper = f"at least {number(top)} N" if top >= data.forces[-1] * (1 - 1e-9) else f"{number(top)} N"
-    if bottom is None:
-        return f"{said} The wall bears {upper} per finger there."
-    return f"{said} Safe forces there: {number(bottom)} N, which holds the object, to {upper}, which its wall bears."
+    text = f"The wall is indented by {indentation} and its stress reaches {stress}."
+    low, high = bounds(ds, index)
+    if not np.isfinite(high):
+        return text
+    if low is not None and not low <= high:
+        return f"{text} No solved force both holds the object and leaves the wall undamaged."
+    upper = f"{'at least ' * _open_above(ds, high)}{number(high)} N"
+    if low is None:
+        return f"{text} The wall bears {upper} per finger there."
+    return f"{text} Safe forces there: {number(low)} N, which holds the object, to {upper}, which its wall bears."
 
 
-def safe_range(data: Data, index: tuple[int, ...]) -> str:
+def safe_range(ds: xr.Dataset, index: Index) -> str:
     """The safe force range of one candidate in few characters; a plus: the wall bears the largest solved force."""
-    low, high = (data.bound(name) for name in ("force_low", "force_high"))
-    top = float("nan") if high is None else float(high[index[:-1]])
-    bottom = 0.0 if low is None else float(low[index[:-1]])
-    if not np.isfinite(top):
+    low, high = bounds(ds, index)
+    if not np.isfinite(high):
         return "–"
-    more = "+" if top >= data.forces[-1] * (1 - 1e-9) else ""
-    if not bottom <= top:
+    if not (low or 0.0) <= high:
         return "none"
-    below = "≤ " if low is None and not more else "" if low is None else f"{number(bottom)}–"
-    return f"{below}{number(top)}{more}"
+    more = "+" * _open_above(ds, high)
+    below = "≤ " * (not more) if low is None else f"{number(low)}–"
+    return f"{below}{number(high)}{more}"
 
 
-def uncertainty(data: Data, name: str, index: tuple[int, ...]) -> str:
-    """How far off a value may be, where the file knows: the one place that says so in verdict, tables and maps."""
-    error, interval = data.at(f"{name}_error", index), data.values(f"derived/{name}_interval")
-    if interval is not None:
-        error = interval[tuple(index)] / abs(data.at(name, index))
+def uncertainty(ds: xr.Dataset, name: str, index: Index) -> str:
+    """How far off a value may be, where the file knows: the one place for it in verdict, tables and maps."""
+    error = at(ds, f"{name}_error", index)
+    if f"{name}_interval" in ds:
+        error = at(ds, f"{name}_interval", index) / abs(at(ds, name, index))
     if not np.isfinite(error):
         return ""
     share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)
     return f" ±\u00a0{share}\u00a0%"
 
 
-def value(data: Data, name: str, index: tuple[int, ...], digits: int = 4) -> str:
-    """A map's value in the unit people read, with its uncertainty where that is known."""
-    return number(data.at(name, index) * data.units(name)[2], digits) + uncertainty(data, name, index)
+def value(ds: xr.Dataset, name: str, index: Index, digits: int = 4) -> str:
+    """A map's value in the displayed unit, with its uncertainty where that is known."""
+    return number(at(ds, name, index) * quantity(ds, name)[2], digits) + uncertainty(ds, name, index)
 
 
-def _planar(data: Data, index: tuple[int, ...]) -> list[str]:
+def _planar(ds: xr.Dataset, index: Index) -> list[str]:
     """What the planar model that the scene prefers would claim."""
-    words = []
+    claims, planar = [], ds.attrs["planar"]
     for name in ("quality", "e_n"):
-        curved, planar = data.at(name, index), data.at(name, index, data.planar)
-        if np.isfinite(curved) and np.isfinite(planar) and curved:
-            change = 100 * (planar / curved - 1)
+        change = 100 * (at(ds, name, index, planar) / (at(ds, name, index) or np.nan) - 1)
+        if np.isfinite(change):
             more = f"{number(abs(change), 2)} % {'more' if change > 0 else 'less'}"
-            words.append(f"{more if abs(change) >= 0.05 else 'the same'} {name}")
-    return [f"A planar contact model (PCM, {data.planar}) would claim {' and '.join(words)}."] if words else []
+            claims.append(f"{more if abs(change) >= 0.05 else 'the same'} {name}")
+    return [f"A planar contact model ({MODEL_NAMES[planar]}) would claim {' and '.join(claims)}."] if claims else []
 
 
-def _other_force(data: Data, best: tuple[int, ...]) -> list[str]:
+def _other_force(ds: xr.Dataset, best: Index) -> list[str]:
     """Where the score per unit of normal force is largest, if that is at another force."""
-    tops = [i for k in range(len(data.forces)) for i in data.order(k)[:1] if not data.lost[i] or i == best]
-    top = tops[largest(np.array([data.at(data.score, i) for i in tops]))]
-    if top[-1] == best[-1] or not data.at(data.score, top) > data.at(data.score, best) * (1 + 1e-3):
+    score = ds.attrs["score"]
+    tops = [i for k in range(len(forces(ds))) for i in order(ds, k)[:1] if not lost(ds, i) or i == best]
+    top = tops[largest(np.array([at(ds, score, i) for i in tops]))]
+    if top[-1] == best[-1] or not at(ds, score, top) > at(ds, score, best) * (1 + 1e-3):
         return []
-    most = f"{number(data.at(data.score, top) * data.units(data.score)[2])} {data.units(data.score)[1]}".rstrip()
-    what = "quality, a score per unit of normal force," if data.score == "quality" else data.score
-    return [f"Over all forces {what} is largest at {data.place(top, force=True)}: {most}."]
+    _, unit, factor = quantity(ds, score)
+    what = "quality, a score per unit of normal force," if score == "quality" else score
+    most = f"{number(at(ds, score, top) * factor)} {unit}".rstrip()
+    return [f"Over all forces {what} is largest at {place(ds, top, force=True)}: {most}."]
 
 
-def _passed_over(data: Data, best: tuple[int, ...]) -> list[str]:
+def _passed_over(ds: xr.Dataset, best: Index) -> list[str]:
     """Why the brightest place of the map is not the best grasp: those that cannot be used come last."""
-    order = data.order(best[-1])
-    scores = np.array([data.at(data.score, i) for i in order])
-    better, why = passed_over(scores, np.array([data.flags[i] for i in order], int))
+    ranked, score = order(ds, best[-1]), ds.attrs["score"]
+    flags = np.array([ds["flags"].values[i] for i in ranked], int)
+    better, why = passed_over(np.array([at(ds, score, i) for i in ranked]), flags)
     if not better:
         return []
-    highest = order[better[0]]
-    place, top = data.place(highest), number(data.at(data.score, highest) * data.units(data.score)[2])
+    highest = ranked[better[0]]
+    top = number(at(ds, score, highest) * quantity(ds, score)[2])
     count = "One grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
-    return [f"{count} higher at this force (the highest {top}, {place}) but cannot be used: {why}."]
+    return [f"{count} higher at this force (the highest {top}, {place(ds, highest)}) but cannot be used: {why}."]
 
 
-def chosen(data: Data) -> str:
+def chosen(ds: xr.Dataset) -> str:
     """What there is to say of the candidate that was asked for; empty where none was."""
-    index = data.chosen
+    index = ds.attrs["chosen"]
     if index is None:
         return ""
-    which = f"Chosen candidate {np.ravel_multi_index(index[:-1], data.shape[:-1])}: {data.place(index, force=True)}"
-    if data.status[index] == FAILED:
-        return f"{which}, failed: {data.messages[index] or 'no reason was given'}"
-    if data.status[index] != DONE:
+    which = f"Chosen candidate {candidate_of(ds, index)}: {place(ds, index, force=True)}"
+    if ds.status.values[index] == FAILED:
+        return f"{which}, failed: {ds.message.values[index] or 'no reason was given'}"
+    if ds.status.values[index] != DONE:
         return f"{which}, is not solved yet."
-    order = data.order(index[-1])
-    said = ", ".join(f"{data.label(name)} {value(data, name, index, 3)}" for name in ("quality", "e_n"))
-    flags = "".join(f" {flag.word}: {flag.sentence}." for flag in flags_of(data, index))
-    text = f"{which}: {said}, place {order.index(index) + 1} of {len(order)} at this force.{flags}"
-    return text + (" It is the best one." if index == data.best else "")
+    ranked = order(ds, index[-1])
+    values = ", ".join(f"{label_of(ds, name)} {value(ds, name, index, 3)}" for name in ("quality", "e_n"))
+    flags = "".join(f" {flag.word}: {flag.sentence}." for flag in flags_of(ds, index))
+    text = f"{which}: {values}, place {ranked.index(index) + 1} of {len(ranked)} at this force.{flags}"
+    return text + (" It is the best one." if index == ds.attrs["best"] else "")
 
 
-def warnings(data: Data) -> list[str]:
-    """What stands against trusting the best grasp."""
-    best, found = data.best, []
-    if data.unfinished:
-        missing = data.count(MISSING)
+def warnings(ds: xr.Dataset) -> list[str]:
+    """What speaks against trusting the best grasp."""
+    best, status, found = ds.attrs["best"], ds.status.values, []
+    if missing := int(np.sum(status == MISSING)):
         found.append(f"This study is unfinished: {missing} cases are missing, so a better grasp may be found.")
     if best is None:
         return found
-    if best[-1] < len(data.forces) - 1:
-        above = "grasp is safe" if np.any(data.status[..., best[-1] + 1 :] == DONE) else "case is solved"
-        found.append(f"No {above} above {number(data.forces[best[-1]])} N; all comparisons are made there.")
-    if reasons := [flag.sentence for flag in flags_of(data, best) if flag & BORNE]:
+    if best[-1] < status.shape[-1] - 1:
+        above = "grasp is safe" if np.any(status[..., best[-1] + 1 :] == DONE) else "case is solved"
+        found.append(f"No {above} above {_force(ds, best)}; all comparisons are made there.")
+    if reasons := [flag.sentence for flag in flags_of(ds, best) if flag & BORNE]:
         found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
-    if flagged := data.flagged(best):
-        found.append(f"The best case does not pass its checks: {', '.join(flagged)}.")
-    if note := str(data.messages[best]):
+    if failed := flagged(ds, best):
+        found.append(f"The best case does not pass its checks: {', '.join(failed)}.")
+    if note := str(ds.message.values[best]):
         found.append(f"Note on the best case: {note}.")
-    stations = data.axes[-3].values
-    if len(stations) > 2 and not data.by_poses and best[-3] in (int(stations.argmin()), int(stations.argmax())):
+    stations = ds.station.values
+    if len(stations) > 2 and not ds.attrs["poses"] and best[-3] in (int(stations.argmin()), int(stations.argmax())):
         found.append("The best station is the first or last one that was tried; a better one may lie beyond.")
     return found
 
 
-def meaning(data: Data) -> str:
+def meaning(ds: xr.Dataset) -> str:
     """What the numbers behind ± are; empty where nothing is solved."""
-    if data.best is None:
+    if ds.attrs["best"] is None:
         return ""
-    if data.values("derived/quality_interval") is not None:
+    if "quality_interval" in ds:
         return WITH_INTERVALS
-    return ESTIMATED if any(uncertainty(data, name, data.best) for name in VALUES) else NOT_ESTIMATED
+    return ESTIMATED if any(uncertainty(ds, name, ds.attrs["best"]) for name in VALUES) else NOT_ESTIMATED
 
 
-def listed(words: list[str], most: int = 4) -> str:
-    """The first few words, and how many more there are."""
-    return "; ".join(words[:most]) + (f"; and {len(words) - most} more" if len(words) > most else "")
+def listed(texts: list[str], most: int = 4) -> str:
+    """The first few texts, and how many more there are."""
+    return "; ".join(texts[:most]) + (f"; and {len(texts) - most} more" if len(texts) > most else "")
 
 
-def flags_of(data: Data, index: tuple[int, ...]) -> list[Flag]:
-    """Flags of a case."""
-    return flags_in(int(data.flags[tuple(index)]))
+def plain_report(ds: xr.Dataset, mu: float | None) -> str:
+    """The report in the file itself, for whoever has only the file and a tool that prints HDF5.
+
+    What it is, the best grasps, failures with their reasons, and how to read the numbers.
+    """
+    named, ds = ds.attrs["title"], judge(ds)
+    size = subtitle(ds).partition(": ")[2]
+    table = [as_text(best_table(ds, top=TOP, whole_lines=True), WIDTH)] if ds.attrs["best"] else []
+    notes = "\n".join(line for state in (FAILED, DONE) for line in _notes(ds, state))
+    answer = "\n".join([*verdict(ds, mu), *warnings(ds), meaning(ds)]).strip()
+    parts = [f"{named}: {size}" if named else size, answer, *table, notes, READING,
+             CAVEAT.replace("the scene below", "/study/scene")]  # fmt: skip
+    lines = "\n\n".join(part for part in parts if part).replace("\xa0", " ").splitlines()
+    text = "\n".join(textwrap.fill(line, WIDTH) if len(line) > WIDTH else line for line in lines) + "\n"
+    return text.replace("\N{DEGREE SIGN}", " deg").replace("\N{MULTIPLICATION SIGN}", "x")  # h5dump escapes them
+
+
+def _notes(ds: xr.Dataset, state: int) -> list[str]:
+    """Why cases failed, or notes on solved ones: one line for messages that differ in numbers only."""
+    word, lines = "failed" if state == FAILED else "noted", []
+    for count, text, where in grouped(ds, state)[:MOST_REASONS]:
+        places = "; ".join(place(ds, index, force=True) for index in where[:MOST_PLACES])
+        lines.append(f"{word} {count} x {text} [{places}{'; ...' * (count > MOST_PLACES)}]")
+    return lines

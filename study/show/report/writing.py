@@ -6,25 +6,37 @@ object and its maps; what failed and why; the best case in detail; then how it w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.study import pictures
 from softjaw.study.messages import CANNOT_WRITE, StudyError
-from softjaw.study.page import Block, Section, box, heading, page, text
-from softjaw.study.page import answer as answer_block
+from softjaw.study.page import Block, Section, answer, box, heading, page, text
+from softjaw.study.quantities import FIRST
 from softjaw.study.result.grid_surface import edges
 from softjaw.study.result.layout import FAILED
-from softjaw.study.result.store import open_result
-from softjaw.study.show.data import Data, number, shown
-from softjaw.study.show.outline import read_scene, swept_object
-from softjaw.study.show.report import curves, maps, tables, verdict
+from softjaw.study.result.read import open
+from softjaw.study.show.grasps import (
+    Index,
+    axis_label,
+    axis_text,
+    axis_values,
+    compared,
+    field,
+    forces,
+    judge,
+    label_of,
+    number,
+    quantity,
+)
+from softjaw.study.show.report import contact, curves, maps, tables, verdict
+from softjaw.study.show.view.model import Place, View, read_scene, view_of
+from softjaw.study.show.view.object3d import object_block
 from softjaw.study.writing import write_file
-
-Place = tuple[float | None, float | None]
 
 
 def write_report(file: Path, out: Path, candidate: int | None = None, place: Place = (None, None)) -> list[Path]:
@@ -42,117 +54,107 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
     picture_path = out.with_suffix(".png")
     if file.resolve() in (out.resolve(), picture_path.resolve()) or out == picture_path:
         raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
-    with open_result(file) as result:
-        html, png = build(result, candidate, place)
+    html, png = build(open(file), candidate, place)
     return [write_file(out, html), write_file(picture_path, png)]
 
 
-def build(result: Any, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
-    """The page and the picture of an open result file."""
-    from softjaw.study.show.view.model import view_of
-
-    data, scene = Data(result), read_scene(result.scene)
+def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
+    """The page and the picture of a study, as `study.result.read.open` gives it."""
+    ds, scene = judge(ds), read_scene(ds)
     if candidate is not None or place != (None, None):
-        data.chosen = view_of(data, candidate, place, None)[1]
-    best = data.best or (*(0 for _ in data.shape[:-1]), data.k)
+        ds = judge(ds, view_of(ds, candidate, place, None)[1])
+    best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
+    view = View(ds, best[:-3])
     sections: list[Section] = [
-        ("verdict", "", answer(data, scene)),
-        ("object", "The object", the_object(data, best)),
-        ("maps", "Maps", (maps.maps(data, best) if data.status.size > 1 else []) + tables.failures(data)),
-        ("wall", "What the wall bears", wall(data, scene)),
-        ("curvature", "What curvature costs", curves.differences(data, scene, best)),
-        *(cases(data, scene, data.best) if data.best is not None else []),
+        ("verdict", "", the_answer(ds, scene)),
+        ("object", "The object", the_object(view, best)),
+        ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) + tables.reasons(ds, FAILED)),
+        ("wall", "What the wall bears", wall(view, best)),
+        ("curvature", "What curvature costs", curves.differences(ds, scene, best)),
+        *(cases(view, scene) if ds.attrs["best"] is not None else []),
         ("effects", "What was simulated",
-         [*tables.effects(data), *_there(maps.levels(data, best)), text(verdict.CAVEAT, "note")]),
+         [*tables.effects(ds), *_there(maps.levels(ds, best)), text(verdict.CAVEAT, "note")]),
         ("cost", "Convergence and cost",
-         [*tables.states(data), tables.checks(data), *_there(maps.effort(data, best)), *tables.time_split(data)]),
-        ("cases", "All cases", tables.every_case(data)),
-        ("definitions", "Definitions", tables.definitions(data)),
-        ("provenance", "Provenance", tables.provenance(data)),
-        ("scene", "Scene in effect", tables.scene(data)),
+         [*tables.states(ds), tables.checks(ds), *_there(maps.effort(ds, best)), *tables.time_split(ds)]),
+        ("cases", "All cases", tables.every_case(ds)),
+        ("definitions", "Definitions", tables.definitions(ds)),
+        ("provenance", "Provenance", tables.provenance(ds)),
+        ("scene", "Scene in effect", tables.scene(ds)),
     ]  # fmt: skip
-    title = f"{data.title}: where to grasp" if data.grasps > 1 else f"{data.title}: grasp study"
-    return page(title, verdict.subtitle(data), sections), picture(data, scene, best)
+    title = f"{ds.attrs['title']}: {'where to grasp' if view.candidates > 1 else 'grasp study'}"
+    return page(title, verdict.subtitle(ds), sections), picture(ds, scene, best)
 
 
-def _there(*blocks: Block | None) -> Iterable[Block]:
-    return (block for block in blocks if block is not None)
+def _there(*blocks: Block | None) -> list[Block]:
+    return [block for block in blocks if block is not None]
 
 
-def answer(data: Data, scene: Any) -> list[Block]:
-    """The best grasp at a glance, in sentences, what stands against it, and the tables of the best grasps."""
-    found = [answer_block(verdict.key_values(data))] if data.best is not None else []
-    found.append(box(verdict.verdict(data, scene.friction.mu if scene else None), "verdict"))
-    if warnings := verdict.warnings(data):
+def the_answer(ds: xr.Dataset, scene: Any) -> list[Block]:
+    """The best grasp at a glance, in sentences, what speaks against it, and the tables of the best grasps."""
+    found = [answer(verdict.key_values(ds))] if ds.attrs["best"] is not None else []
+    found.append(box(verdict.verdict(ds, scene.friction.mu if scene else None), "verdict"))
+    if warnings := verdict.warnings(ds):
         found.append(box(warnings, "warn"))
-    if said := verdict.chosen(data):
-        found.append(box([said], "verdict"))
-    if meaning := verdict.meaning(data):
+    if chosen := verdict.chosen(ds):
+        found.append(box([chosen], "verdict"))
+    if meaning := verdict.meaning(ds):
         found.append(text(meaning, "note"))
-    return found + tables.best_grasps(data)
+    return found + tables.best_grasps(ds)
 
 
-def the_object(data: Data, best: tuple[int, ...]) -> list[Block]:
+def the_object(view: View, best: Index) -> list[Block]:
     """The object in three dimensions with the pads of the best and of the chosen grasp at every force."""
-    from softjaw.study.show.view.model import View
-    from softjaw.study.show.view.object3d import object_block
-
-    view = View(data, best[:-3])
-    cases = [(*i[:-1], k) for i in (best, data.chosen) if i and i[:-3] == best[:-3] for k in range(len(data.forces))]
-    if block := object_block(view, best, data.score, "x", list(dict.fromkeys(cases))):
+    shown = [i for i in (best, view.ds.attrs["chosen"]) if i and i[:-3] == view.point]
+    cases = dict.fromkeys((*i[:-1], k) for i in shown for k in range(len(forces(view.ds))))
+    if block := object_block(view, best, view.ds.attrs["score"], "x", list(cases)):
         return [block]
     return [text(f"{view.note[:1].upper()}{view.note[1:]}.", "note")] * bool(view.note)
 
 
-def wall(data: Data, scene: Any) -> list[Block]:
+def wall(view: View, best: Index) -> list[Block]:
     """Limits, safe forces, shape and force curves of a thin wall; empty without one."""
-    best = data.best
-    if best is None or data.map("indentation") is None:
+    ds, shape = view.ds, getattr(view.scene, "object", None)
+    if field(ds, "indentation") is None:
         return []
-    shape = swept_object(scene, best) if scene else None
     allowed = getattr(shape, "allowed_dent", None)
-    shown_blocks = _there(maps.safe_forces(data, best), curves.wall_section(data, scene, best),
-                          curves.wall_curves(data, best, allowed))  # fmt: skip
-    return [*tables.wall(data, shape), *shown_blocks]
+    figures = maps.safe_forces(ds, best), curves.wall_section(view, best), curves.wall_curves(ds, best, allowed)
+    return [*tables.wall(ds, shape), *_there(*figures)]
 
 
-def cases(data: Data, scene: Any, best: tuple[int, ...]) -> list[Section]:
+def cases(view: View, scene: Any) -> list[Section]:
     """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
-    from softjaw.study.show.report import contact
-    from softjaw.study.show.view.model import View
-
-    roles = [("Best case", best)]
-    if data.chosen is not None and data.other[0] == data.chosen:
-        roles.append(("Chosen candidate", data.chosen))
+    ds, best, chosen = view.ds, view.ds.attrs["best"], view.ds.attrs["chosen"]
+    roles = {"Best case": best}
+    if chosen is not None and compared(ds)[0] == chosen:
+        roles["Chosen candidate"] = chosen
+    views = {index: view if index[:-3] == view.point else View(ds, index[:-3]) for index in roles.values()}
     which = "of the best case" if len(roles) == 1 else "of both cases"
-    mu = scene.friction.mu if scene else None
-    patches = [(role, contact.patch(data, View(data, index[:-3]).gripper, index)) for role, index in roles]
-    surfaces = [(role, contact.limit_surfaces(data, index)) for role, index in roles]
-    over = next((p for p in [*reversed(curves.worth_a_curve(data)), len(best) - 1] if data.shape[p] > 1), None)
-    fit = [] if over is None else _there(curves.fit_error(data, over, best))
+
+    def headed(draw: Callable[[View, Index], Block | None]) -> list[Block]:
+        drawn = {role: block for role, index in roles.items() if (block := draw(views[index], index)) is not None}
+        return [part for role, block in drawn.items() for part in ([heading(role)] * (len(roles) > 1) + [block])]
+
+    axes = [*reversed(curves.worth_a_curve(ds)), len(best) - 1]
+    over = next((p for p in axes if ds.status.shape[p] > 1), None)
+    fit = [] if over is None else _there(curves.fit_error(ds, over, best))
     return [
-        ("models", "Friction models compared", curves.models(data, best, mu)),
-        ("patch", f"Contact patch {which}", _headed(patches)),
-        ("surface", f"Limit surface {which}", [*_headed(surfaces), *fit]),
+        ("models", "Friction models compared", curves.models(ds, best, scene.friction.mu if scene else None)),
+        ("patch", f"Contact patch {which}", headed(contact.patch)),
+        ("surface", f"Limit surface {which}", [*headed(contact.limit_surfaces), *fit]),
     ]
 
 
-def _headed(found: list[tuple[str, Block | None]]) -> list[Block]:
-    known = [(role, block) for role, block in found if block is not None]
-    return [part for role, block in known for part in ([heading(role), block] if len(found) > 1 else [block])]
-
-
-def picture(data: Data, scene: Any, index: tuple[int, ...]) -> bytes:
+def picture(ds: xr.Dataset, scene: Any, index: Index) -> bytes:
     """PNG for mails and slides: maps of quality and e_n over the force, or differences over a sweep of the shape."""
     with pictures.style():
-        position = curves.shape_axis(data, scene)
-        lines = {} if position is None else curves.overestimates(data, position, index)
+        position = curves.shape_axis(ds, scene)
+        lines = {} if position is None else curves.overestimates(ds, position, index)
         if position is not None and lines:
-            name, x = next(iter(curves.abscissas(data, scene, position, index).items()))
+            name, x = next(iter(curves.abscissas(ds, scene, position, index).items()))
             drawn = _differences(name, x, lines)
         else:
-            drawn = _maps(data, index)
-        drawn.suptitle(f"{data.title}, {number(data.forces[index[-1]])} N", fontsize=10, x=0.01, ha="left")
+            drawn = _maps(ds, index)
+        drawn.suptitle(f"{ds.attrs['title']}, {number(forces(ds)[index[-1]])} N", fontsize=10, x=0.01, ha="left")
         return pictures.as_png(drawn)
 
 
@@ -170,27 +172,23 @@ def _differences(name: str, x: np.ndarray, lines: dict[Any, Any]) -> Any:
     return drawn
 
 
-def _maps(data: Data, index: tuple[int, ...]) -> Any:
+def _maps(ds: xr.Dataset, index: Index) -> Any:
     """Quality and e_n over the main axis and the force, one row for each angle."""
-    x, y, angle = maps.main_axis(data), len(data.shape) - 1, len(data.shape) - 2
-    rows = maps.some(maps.different_angles(data), index[angle])
+    x, y, angle = maps.main_axis(ds), len(index) - 1, len(index) - 2
+    rows, axis = maps.some(maps.different_angles(ds), index[angle]), str(ds.status.dims[maps.main_axis(ds)])
     drawn, axes = pictures.figure(10, 2.4 * len(rows) + 0.6, len(rows), 2, sharex=True, sharey=True)
-    factor = shown(data.axes[x].units)[1]
-    values = data.axes[x].values * factor
-    for column, name in enumerate(maps.FIRST):
-        words, unit, scale = data.units(name)
-        found = data.map(name)
-        z = np.full(data.shape, np.nan) if found is None else scale * found
+    borders = edges(axis_values(ds, axis)), np.arange(len(forces(ds)) + 1) - 0.5
+    for column, name in enumerate(FIRST):
+        found = field(ds, name)
+        z = np.full(ds.status.shape, np.nan) if found is None else quantity(ds, name)[2] * found
         low, high = pictures.span(z)
-        for row, j in enumerate(rows):
-            here, panel = (*index[:angle], j, index[-1]), axes[row, column]
-            failed = maps.plane(data.status == FAILED, x, y, here)
-            mapped = pictures.heat(panel, edges(values), np.arange(data.shape[y] + 1) - 0.5,
-                                   maps.plane(z, x, y, here), failed, cmap=pictures.COLOURS[name], vmin=low,
-                                   vmax=high)  # fmt: skip
-            panel.set_yticks(range(len(data.forces)), [number(f) for f in data.forces])
-            panel.set_title(f"angle {number(np.degrees(data.axes[angle].values[j]))}°" * (data.shape[angle] > 1))
-        pictures.colour_bar(drawn, mapped, list(axes[:, column]), f"{words} [{unit or '-'}]")
-        axes[-1, column].set_xlabel(data.axis_label(data.axes[x]))
+        for panel, j in zip(axes[:, column], rows, strict=True):
+            here = (*index[:angle], j, index[-1])
+            values, failed = (maps.plane(a, x, y, here) for a in (z, ds.status.values == FAILED))
+            mapped = pictures.heat(panel, *borders, values, failed, cmap=pictures.COLOURS[name], vmin=low, vmax=high)
+            panel.set_yticks(range(len(forces(ds))), [number(f) for f in forces(ds)])
+            panel.set_title(f"angle {axis_text(ds, 'angle', j)}" * (ds.sizes["angle"] > 1))
+        pictures.colour_bar(drawn, mapped, list(axes[:, column]), label_of(ds, name))
+        axes[-1, column].set_xlabel(axis_label(ds, axis))
     axes[0, 0].set_ylabel("force per finger [N]")
     return drawn

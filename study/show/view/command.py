@@ -7,13 +7,9 @@ import os
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.writing import beside, write_file
-
-if TYPE_CHECKING:
-    from softjaw.study.show.view.model import View
 
 ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm"), "vtkhdf": (".vtkhdf", ".hdf")}
 
@@ -27,9 +23,8 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("--motion", choices=("x", "y", "turn"), default="x",
                         help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
     parser.add_argument("--screenshot", metavar="PNG", help="write a picture; needs no screen")
-    parser.add_argument("--html", metavar="HTML", help="write the view as one page that needs nothing else")
+    parser.add_argument("--html", metavar="HTML", help="write the view as one self-contained HTML file")
     parser.add_argument("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
-    parser.add_argument("--port", type=int, metavar="PORT", help="show the page at this port of 127.0.0.1, no window")
 
 
 def add_choice(parser: ArgumentParser) -> None:
@@ -52,32 +47,37 @@ def _number(text: str) -> float:
 
 
 def view(options: Namespace) -> None:
-    """Write what was asked for; or else open a window, or without a screen show the page until Ctrl-C."""
+    """Write what was asked for, or else open a window.
+
+    Raises
+    ------
+    StudyError
+        If a file cannot be written, or there is neither a file to write nor a screen for a window.
+    """
     paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
-    from softjaw.study.result.store import open_result
-    from softjaw.study.show.data import Data
-    from softjaw.study.show.view.model import quantity_of, view_of
+    if not paths and not has_screen():
+        text = "no screen for a window: found none of --html, --screenshot and --vtkhdf, expected one of them"
+        raise StudyError(USAGE, text)
+    # here, for the command line reads the options above at every start
+    from softjaw.study.result.read import open
+    from softjaw.study.show.grasps import judge
+    from softjaw.study.show.view import grids, model, object3d, window
 
-    with open_result(options.file) as result:
-        data = Data(result)
-        found, index = view_of(data, *choice(options), options.force)
-        quantity = quantity_of(data, options.quantity)
-        for name, path in paths.items():
-            for made in _write(name, path, found, index, quantity, options.motion):
-                print(f"written: {made}")
-        if paths:
-            return
-        if options.port is None and has_screen():
-            from softjaw.study.show.view.window import show_window
-
-            show_window(found, index, quantity, options.motion)
-            return
-        from softjaw.study.show.view.object3d import view_page
-
-        html = view_page(found, index, quantity, options.motion)
-    from softjaw.study.show.view.server import serve
-
-    serve(html, options.port or 0)
+    found, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
+    quantity, written = model.quantity_of(found.ds, options.quantity), []
+    if "screenshot" in paths:
+        with beside(paths["screenshot"]) as part:
+            window.save_picture(found, index, part, quantity, options.motion)
+        written.append(paths["screenshot"])
+    if "html" in paths:
+        html = object3d.view_page(found, index, quantity, options.motion)
+        written.append(write_file(paths["html"], html))
+    if "vtkhdf" in paths:
+        written += grids.write_grids(found, index, paths["vtkhdf"])
+    for path in written:
+        print(f"written: {path}")
+    if not written:
+        window.show_window(found, index, quantity, options.motion)
 
 
 def has_screen() -> bool:
@@ -94,19 +94,3 @@ def _target(options: Namespace, name: str) -> Path:
     if not path.parent.is_dir():
         raise StudyError(CANNOT_WRITE, f"{path}: there is no folder {path.parent}; make it first")
     return path
-
-
-def _write(name: str, path: Path, found: View, index: tuple[int, ...], quantity: str, motion: str) -> list[Path]:
-    if name == "vtkhdf":
-        from softjaw.study.show.view.grids import write_grids
-
-        return write_grids(found, index, path)
-    if name == "screenshot":
-        from softjaw.study.show.view.window import save_picture
-
-        with beside(path) as part:
-            save_picture(found, index, part, quantity, motion)
-        return [path]
-    from softjaw.study.show.view.object3d import view_page
-
-    return [write_file(path, view_page(found, index, quantity, motion))]

@@ -1,4 +1,7 @@
-"""What a three-dimensional view shows of a result file: object, cells, cases; the same for windows, pages and files."""
+"""What a three-dimensional view shows of a study: object, cells, cases; the same for windows, pages, figures and files.
+
+Positions are in m in the object's frame unless a unit is named.
+"""
 
 from __future__ import annotations
 
@@ -6,44 +9,66 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.pictures import span
+from softjaw.study.quantities import ALONG, AROUND, TABLE
 from softjaw.study.result.grid import NOBODY, Surface
 from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.show.data import Data, number
-from softjaw.study.show.outline import read_scene
+from softjaw.study.result.read import axes_of, read_field, read_patch
+from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.show.grasps import Index, candidate_of, field, forces, number, order, place, quantity, unravelled
+from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.tables.ranking import nearest
+from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
+Place = tuple[float | None, float | None]
 NEUTRAL, OPEN, CROSSED = "#dfe3e6", "#b6bfc6", "#6d6570"  # no candidate, not computed, failed
 PAD, FORCE = "#8a9199", "#00a5bf"
+LONGEST = 6.0  # arrow [mm]
+SLIPS = {"x": "a slip along x of the contact", "y": "a slip along y of the contact", "turn": "a turn about its normal"}
+
+
+def read_scene(ds: xr.Dataset) -> Any:
+    """The scene kept in a result file; None if this version cannot read it."""
+    try:
+        return parse_scene(ds.attrs["scene"], check_files=False)
+    except SceneError:
+        return None
 
 
 class View:
-    """A result file at one point of its sweep; candidates are counted over stations and angles."""
+    """A study at one point of its sweep; candidates are counted over stations and angles.
 
-    def __init__(self, data: Data, point: tuple[int, ...]) -> None:
-        self.data, self.point = data, point
-        scene = read_scene(data.ds.attrs["scene"])
-        self.scene = None if scene is None else scene_at(scene, point)
-        self.gripper = getattr(self.scene, "gripper", None)
-        self.note = ""
+    ``scene`` is the scene there, None where this version cannot read it; ``note`` says why no object is drawn.
+    """
+
+    def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
+        self.ds, self.point, self.note = ds, point, ""
+        scene = read_scene(ds)
+        self.scene: Any = None if scene is None else scene_at(scene, point)
+        self._faces: dict[int, xr.Dataset] = {}
 
     @property
     def candidates(self) -> int:
         """Number of candidates at this point of the sweep."""
-        return self.data.grasps
+        return int(np.prod(self.ds.status.shape[-3:-1]))
 
-    def index(self, candidate: int, force: int) -> tuple[int, ...]:
+    @property
+    def walled(self) -> bool:
+        """Whether the object has a thin wall."""
+        return "wall" in self.ds.attrs["has"] and self.scene is not None
+
+    def index(self, candidate: int, force: int) -> Index:
         """Index over all axes of a candidate at a force level."""
-        i, j = divmod(candidate, self.data.shape[-2])
-        return (*self.point, i, j, force)
+        return (*self.point, *divmod(candidate, self.ds.status.shape[-2]), force)
 
-    def candidate(self, index: tuple[int, ...]) -> int:
+    def candidate(self, index: Index) -> int:
         """Number of the candidate of a case."""
-        return index[-3] * self.data.shape[-2] + index[-2]
+        return index[-3] * self.ds.status.shape[-2] + index[-2]
 
     def over_candidates(self, values: np.ndarray, force: int) -> np.ndarray:
         """Values over all axes at this point of the sweep and a force: one for each candidate ``(c,)``."""
@@ -51,7 +76,15 @@ class View:
 
     def state(self, force: int) -> np.ndarray:
         """State of every candidate at a force ``(c,)``."""
-        return self.over_candidates(self.data.status, force)
+        return self.over_candidates(self.ds.status.values, force)
+
+    def coloured(self, name: str) -> tuple[np.ndarray, tuple[float, float]]:
+        """A map in the displayed unit, over all axes, and its smallest and largest value at this point."""
+        found = field(self.ds, name)
+        values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
+        return values, span(values[self.point])
+
+    # --- the object ---
 
     @cached_property
     def surface(self) -> Surface:
@@ -61,7 +94,7 @@ class View:
             self.note = "the object is not drawn: this version cannot read the scene in the file"
             return nothing
         try:
-            points, corners, candidate = surface_of(self.scene, self.data.axes)
+            points, corners, candidate = surface_of(self.scene, axes_of(self.ds))
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
             return nothing
@@ -78,120 +111,164 @@ class View:
 
     @cached_property
     def marks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where the fingers of explicit poses first touch ``(k, 3)`` [m], and the candidate of each ``(k,)``."""
-        origin = self.data.values("fingers/pose_origin") if self.data.by_poses else None
-        found, of = [np.empty((0, 3))], []
-        for candidate in range(self.candidates if origin is not None else 0):
-            known = origin[self.index(candidate, 0)[:-1]]
-            solved = np.flatnonzero(np.isfinite(known).all(axis=(1, 2)))
-            if solved.size:
-                found.append(known[solved[0]])
-                of += [candidate] * len(known[solved[0]])
-        return np.concatenate(found), np.array(of, int)
+        """Where the fingers of explicit poses first touch ``(k, 3)``, and the candidate of each ``(k,)``."""
+        origin = field(self.ds, "finger_pose_origin") if self.ds.attrs["poses"] else None
+        if origin is None:
+            return np.empty((0, 3)), np.empty(0, int)
+        known = origin[self.point].reshape(self.candidates, -1, *origin.shape[-2:])
+        solved = np.isfinite(known).all(axis=(2, 3))
+        of = np.flatnonzero(solved.any(axis=1))
+        return known[of, solved[of].argmax(axis=1)].reshape(-1, 3), np.repeat(of, origin.shape[-2])
 
     @cached_property
     def wall(self) -> Wall | None:
         """Where the surface's points lie on the wall."""
-        return wall_of(self.scene.object, self.surface.points) if self.data.walled and self.scene else None
+        return wall_of(self.scene.object, self.surface.points) if self.walled else None
 
-    def displacement(self, index: tuple[int, ...]) -> tuple[np.ndarray, float] | None:
-        """Displacement of the wall's places ``(AROUND, ALONG, 3)`` [m] and the angle they begin at, if stored."""
-        rotation = self.data.values("fingers/pose_rotation")
-        places = self.data.values("wall/place") if self.data.walled and self.scene else None
-        if places is None or rotation is None or not np.isfinite(places[index]).all():
+    @cached_property
+    def _places(self) -> np.ndarray:
+        return read_field(self.ds.attrs["file"], "wall/place", **self._here(self.point)).values
+
+    def displacement(self, index: Index) -> tuple[np.ndarray, float] | None:
+        """Displacement of the wall's places ``(AROUND, ALONG, 3)`` and the angle they begin at, if stored."""
+        rotation = field(self.ds, "finger_pose_rotation") if self.walled else None
+        if rotation is None or not np.isfinite(self._places[index[-3:]]).all():
             return None
         approach = rotation[index][0][:, 2]
         angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
         before = undeformed(self.scene.object, angle)
-        return None if before is None else (places[index].reshape(AROUND, ALONG, 3) - before, angle)
+        return None if before is None else (self._places[index[-3:]].reshape(AROUND, ALONG, 3) - before, angle)
 
-    def moved(self, index: tuple[int, ...]) -> np.ndarray:
-        """The surface's points ``(n, 3)`` [m], moved with the wall of a case where the file has it."""
+    def moved(self, index: Index) -> np.ndarray:
+        """The surface's points ``(n, 3)``, moved with the wall of a case where the file has it."""
         found = self.displacement(index) if self.wall is not None else None
         x = self.surface.points
         return x if found is None or self.wall is None else x + self.wall.moved(*found)
 
-    def words(self, index: tuple[int, ...], quantity: str) -> list[str]:
-        """What there is to say of a case, line by line."""
-        data = self.data
-        number_ = int(np.ravel_multi_index(index[:-1], data.shape[:-1]))
-        lines = [f"candidate {number_}: {data.place(index, force=True)}"]
-        if data.status[index] == FAILED:
-            return [*lines, f"failed: {data.messages[index] or 'no reason was given'}"]
-        if data.status[index] != DONE:
+    # --- a case ---
+
+    def _here(self, index: Index) -> dict[str, int]:
+        return {str(axis): i for axis, i in zip(self.ds.status.dims, index, strict=False)}
+
+    def load(self) -> None:
+        """Read the contact faces of all cases at once; else those of a station are read when they are needed."""
+        if self.ds.attrs["patches"]:
+            found = read_patch(self.ds.attrs["file"], **self._here(self.point))
+            self._faces = {i: found.isel(station=i) for i in range(self.ds.sizes["station"])}
+
+    def faces(self, index: Index) -> Faces:
+        """Stored contact faces of both fingers at a case, by name; empty where there are none."""
+        if not self.ds.attrs["patches"]:
+            return {}
+        if index[-3] not in self._faces:
+            self._faces[index[-3]] = read_patch(self.ds.attrs["file"], **self._here(index[:-2]))
+        found = {str(name): v.values[index[-2:]] for name, v in self._faces[index[-3]].data_vars.items()}
+        return found if all(np.isfinite(values).all() for values in found.values()) else {}
+
+    def pads(self, index: Index) -> list[Pad]:
+        """Both pads of a case; empty where it is not solved."""
+        return pads_of(self.ds, getattr(self.scene, "gripper", None), index, self.faces(index))
+
+    def limit(self, index: Index) -> np.ndarray | None:
+        """Points ``(r, c, 3)`` of the weaker finger's limit surface (CCM) [N, N, N mm]; None where there is none."""
+        known = stored_surface(self.ds, index, weaker(self.ds, index), "ccm")
+        return None if known is None or known.ellipsoid.rank < 3 else body(known)
+
+    def eye(self, index: Index) -> tuple[np.ndarray, np.ndarray]:
+        """Where one sees finger 1 obliquely from behind and the object upright: direction of the eye, and up."""
+        found = self.pads(index)
+        out = -found[0].approach if found else np.array([1.0, 0.0, 0.0])
+        up = np.array([0.0, 0.0, 1.0]) if abs(out[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+        beside = np.cross(up, out)
+        return 0.72 * out + 0.62 * beside / np.linalg.norm(beside) + 0.35 * up, up
+
+    def summary(self, index: Index, name: str) -> list[str]:
+        """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""
+        lines = [f"candidate {candidate_of(self.ds, index)}: {place(self.ds, index, force=True)}"]
+        state = self.ds.status.values[index]
+        if state == FAILED:
+            return [*lines, f"failed: {self.ds.message.values[index] or 'no reason was given'}"]
+        if state != DONE:
             return [*lines, "not computed yet"]
-        names = dict.fromkeys((quantity, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation"))
-        for name in names:
-            if (found := data.map(name)) is not None:
-                label, unit, factor = data.units(name)
-                lines.append(f"{label}: {number(found[index] * factor)} {unit}".rstrip())
-        flags = flag_words(int(data.flags[index]))
+        for key in dict.fromkeys((name, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation")):
+            if (found := field(self.ds, key)) is not None:
+                text, unit, factor = quantity(self.ds, key)
+                lines.append(f"{text}: {number(found[index] * factor)} {unit}".rstrip())
+        flags = flag_words(int(self.ds["flags"].values[index]))
         return [*lines, f"flags: {flags}"] if flags else lines
 
+    def legend(self, index: Index, motion: str) -> list[str]:
+        """What colours and marks of the picture of a case mean."""
+        marks = "balls: where the fingers first touch" if self.ds.attrs["poses"] else "light grey: no candidate there"
+        wall = ["the wall is deformed as computed, not exaggerated"] * (self.displacement(index) is not None)
+        return [f"blue: friction of the pads' faces against {SLIPS[motion]}", marks, "dark grey: failed",
+                "grey: not computed", *wall, *[self.note] * bool(self.note)]  # fmt: skip
 
-def view_of(data: Data, candidate: int | None, place: tuple[float | None, float | None], force: float | None) -> Any:
+
+def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | None) -> tuple[View, Index]:
     """The view and the index of the case that was asked for; by default the best at the force that a report shows.
 
-    ``place`` is a station [m] and an angle [rad]; the nearest of the file are taken, as for the force [N].
+    ``where`` is a station [m] and an angle [rad]; the nearest of the file are taken, as for the force [N].
 
     Raises
     ------
     StudyError
         For a candidate that the file does not have, or a station far outside of the map.
     """
-    k = data.k if force is None else nearest(data.forces, force)
-    best = next(iter(data.order(k)), (*(0 for _ in data.shape[:-1]), k))
+    k = ds.attrs["level"] if force is None else nearest(forces(ds), force)
+    shape = ds.status.shape
+    best = next(iter(order(ds, k)), (*(0 for _ in shape[:-1]), k))
     if candidate is not None:
-        count = int(np.prod(data.shape[:-1]))
+        count = int(np.prod(shape[:-1]))
         if not 0 <= candidate < count:
             text = f"--candidate: found {candidate}, expected 0 to {count - 1}, counted over stations and angles"
             raise StudyError(USAGE, text)
-        best = (*(int(i) for i in np.unravel_index(candidate, data.shape[:-1])), k)
-    elif place != (None, None):
-        if data.by_poses:
-            raise StudyError(
-                USAGE, "--station, --angle: the candidates of this file are poses; choose with --candidate"
-            )
-        _check_station(data, place[0])
-        best = _nearest(data, best, place, k)
-    return View(data, best[:-3]), best
+        best = (*unravelled(candidate, shape[:-1]), k)
+    elif where != (None, None):
+        if ds.attrs["poses"]:
+            text = "--station, --angle: the candidates of this file are poses; choose with --candidate"
+            raise StudyError(USAGE, text)
+        _check_station(ds, where[0])
+        best = _nearest(ds, best, where, k)
+    return View(ds, best[:-3]), best
 
 
-def _check_station(data: Data, station: float | None) -> None:
+def _check_station(ds: xr.Dataset, station: float | None) -> None:
     """Refuse a station [m] that lies farther off the map than the map's stations lie apart: it has another unit."""
-    places = np.sort(data.axes[-3].values)
-    beyond = 0.0 if station is None else max(places[0] - station, station - places[-1])
-    if beyond > max(np.diff(places), default=0.0) + 1e-9:
+    places = np.sort(ds.station.values)
+    if station is None:
+        return
+    if max(places[0] - station, station - places[-1]) > max(np.diff(places), default=0.0) + 1e-9:
         found, low, high = (f"{1e3 * value:.6g}" for value in (station, places[0], places[-1]))
         expected = f"{low} to {high} mm, the stations of this file" if low != high else f"{low} mm, the only station"
         raise StudyError(USAGE, f"--station: found {found} mm, expected {expected}")
 
 
-def _nearest(data: Data, best: tuple[int, ...], place: tuple[float | None, float | None], k: int) -> tuple[int, ...]:
+def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:
     """The case at this force nearest to a station and an angle; the best one where only one of them is given."""
-    near = []
-    for axis, wanted in zip(data.axes[-3:-1], place, strict=True):
-        near.append(None if wanted is None else nearest(axis.values, wanted))
-    fits = [
-        i
-        for i in data.order(k)
-        if i[:-3] == best[:-3] and all(n in (None, m) for n, m in zip(near, i[-3:-1], strict=True))
-    ]
+    wanted = zip((ds.station.values, ds.angle.values), where, strict=True)
+    near = [None if value is None else nearest(values, value) for values, value in wanted]
+    here = (i for i in order(ds, k) if i[:-3] == best[:-3])
+    fits = (i for i in here if all(n in (None, m) for n, m in zip(near, i[-3:-1], strict=True)))
     given = tuple(b if n is None else n for n, b in zip(near, best[-3:-1], strict=True))
-    return fits[0] if fits else (*best[:-3], *given, k)
+    return next(fits, (*best[:-3], *given, k))
 
 
-def quantity_of(data: Data, name: str | None) -> str:
-    """A map of the file by its name; by default the one that grasps are ranked by.
+def maps_of(ds: xr.Dataset) -> list[str]:
+    """Names of the maps that have a value."""
+    return [q.name for q in TABLE if q.group == "maps" and field(ds, q.name) is not None]
+
+
+def quantity_of(ds: xr.Dataset, name: str | None) -> str:
+    """A map of the study by its name; by default the one that grasps are ranked by.
 
     Raises
     ------
     StudyError
-        If the file has no such map.
+        If there is no such map with a value.
     """
-    names = [q.name for q in data.result.layout.quantities if q.group == "maps" and data.map(q.name) is not None]
+    names = maps_of(ds)
     if name is None or name in names:
-        return name or data.score
-    raise StudyError(
-        USAGE, f"--quantity: found '{name}', expected one of {', '.join(names) or 'none: nothing is solved'}"
-    )
+        return name or str(ds.attrs["score"])
+    text = f"--quantity: found '{name}', expected one of {', '.join(names) or 'none: nothing is solved'}"
+    raise StudyError(USAGE, text)

@@ -1,4 +1,4 @@
-"""Both pads of a case in the object's frame: deformed fronts with their pressure, sides, and friction's directions."""
+"""Both pads of a case in the object's frame: deformed faces with their pressure, sides, and friction's directions."""
 
 from __future__ import annotations
 
@@ -6,24 +6,26 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from softjaw.study.case.contact import LOADED
 from softjaw.study.result.grid import corners_of
 from softjaw.study.result.layout import DONE
-from softjaw.study.show.data import Data
+from softjaw.study.show.grasps import Index, at
 
 LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]
-LOADED = 1e-9  # share of the largest pressure below which a face counts as free
 MOTIONS = ("x", "y", "turn")
 ARROWS = 14  # along the longer side of a pad, at most
+Faces = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Pad:
     """One finger's pad in the object's frame [m, Pa].
 
-    ``front (i + 1, j + 1, 3)`` are the corners of the front's faces, ``back (4, 3)`` those of the moved back in the
+    ``front (i + 1, j + 1, 3)`` are the corners of the contact faces, ``back (4, 3)`` those of the moved back in the
     order of the front's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
-    faces. The latter are None where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
+    faces; they are empty where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
     ``origin (3,)`` is its origin; ``rotation`` and ``position`` place the pad's own frame.
     Fronts overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
     """
@@ -34,32 +36,37 @@ class Pad:
     origin: np.ndarray
     rotation: np.ndarray
     position: np.ndarray
-    lift: float = LIFT
-    centroid: np.ndarray | None = None
-    normal: np.ndarray | None = None
-    pressure: np.ndarray | None = None
-    area: np.ndarray | None = None
+    lift: float
+    centroid: np.ndarray
+    normal: np.ndarray
+    pressure: np.ndarray
+    area: np.ndarray
 
     @property
     def approach(self) -> np.ndarray:
         """Direction in which the finger closes ``(3,)``."""
         return self.rotation[:, 2]
 
-    def own(self, x: np.ndarray) -> np.ndarray:
-        """Points of the object's frame in the pad's frame."""
-        return (x - self.position) @ self.rotation
-
     @property
     def loaded(self) -> np.ndarray:
         """Faces that carry pressure ``(i, j)``."""
-        if self.pressure is None:
-            return np.zeros((0, 0), bool)
-        return self.pressure > LOADED * max(float(self.pressure.max()), 1e-300)
+        return self.pressure > LOADED * self.pressure.max(initial=1e-300)
+
+    def own(self, x: np.ndarray) -> np.ndarray:
+        """Points of the object's frame in the pad's frame."""
+        return (x - self.position) @ self.rotation
 
     def quads(self) -> np.ndarray:
         """Corners of the faces, ``(i j, 4, 3)``, in the order of the faces."""
         f = self.front
         return np.stack([f[:-1, :-1], f[1:, :-1], f[1:, 1:], f[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+
+    def pressed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners ``(k, 4, 3)`` [mm] of the loaded faces as they are drawn, and their pressure ``(k,)`` [kPa]."""
+        loaded = self.loaded.ravel()
+        if not loaded.any():
+            return np.empty((0, 4, 3)), np.empty(0)
+        return 1e3 * (self.quads()[loaded] - self.lift * self.approach), 1e-3 * self.pressure.ravel()[loaded]
 
     def rim(self) -> np.ndarray:
         """The front's border, once round ``(n, 3)``."""
@@ -83,14 +90,14 @@ class Pad:
         pairs = [np.stack([p, np.roll(p, -1, axis=0)], axis=1) for p in (rim, b)]
         return np.concatenate([*pairs, np.stack([corners, b], axis=1)])
 
-    def arrows(self, motion: str) -> tuple[np.ndarray, np.ndarray]:
+    def friction(self, motion: str) -> tuple[np.ndarray, np.ndarray]:
         """Where loaded faces are ``(k, 3)`` [m], and the force that each carries over the friction coefficient [N].
 
         Every face resists in its own plane (curved contact model): the force ``(k, 3)`` acts along the face's share of
         the slip ``motion``, along x or y of the contact frame or a turn about its normal. Of dense meshes every
         second, third, ... face is taken.
         """
-        if self.centroid is None or self.normal is None or self.pressure is None or self.area is None:
+        if not self.pressure.size:
             return np.empty((0, 3)), np.empty((0, 3))
         step = -(-max(self.pressure.shape) // ARROWS)
         some = (slice(step // 2, None, step),) * 2
@@ -104,51 +111,45 @@ class Pad:
         size = np.linalg.norm(v, axis=1, keepdims=True)
         return c, load[:, None] * np.divide(v, size, out=np.zeros_like(v), where=size > 1e-12)
 
+    def arrows(self, motion: str, longest: float) -> np.ndarray:
+        """`friction` as segments ``(k, 2, 3)`` [mm] off the faces; the largest force is ``longest`` [mm] long."""
+        places, force = self.friction(motion)
+        most = np.linalg.norm(force, axis=1).max(initial=1e-300)
+        start = 1e3 * (places - (self.lift + 3 * LIFT) * self.approach)
+        return np.stack([start, start + longest * force / most], axis=1)
 
-def pads(data: Data, gripper: Any, index: tuple[int, ...]) -> list[Pad]:
-    """Both pads at a case; empty where it is not solved or the scene cannot be read."""
+
+def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
+    """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read."""
     names = ("pose_rotation", "pose_origin", "closing", "frame_axes", "frame_origin")
-    stored = [data.values(f"fingers/{name}") for name in names]
-    if data.status[index] != DONE or gripper is None or any(s is None for s in stored):
+    if at(ds, "status", index) != DONE or gripper is None or any(f"finger_{name}" not in ds for name in names):
         return []
-    if not all(np.isfinite(s[index]).all() for s in stored if s is not None):
+    stored = [ds.variables[f"finger_{name}"].values[index] for name in names]
+    if not all(np.isfinite(s).all() for s in stored):
         return []
-    patch = data.result.patch(data.result.row(*index)) if data.result.layout.patches else {}
-    if any(not np.isfinite(values).all() for values in patch.values()):
-        patch = {}
-    overlap = data.values("checks/penetration_depth")
-    deepest = np.zeros(2) if overlap is None else np.nan_to_num(overlap[index])
-    of_finger = [[s[index][finger] for s in stored if s is not None] for finger in (0, 1)]
-    found = [_pad(gripper, {n: v[finger] for n, v in patch.items()}, *of_finger[finger]) for finger in (0, 1)]
-    return [replace(pad, lift=LIFT + float(depth)) for pad, depth in zip(found, deepest, strict=True)]
+    deepest = ds.variables["check_penetration_depth"].values[index] if "check_penetration_depth" in ds else np.zeros(2)
+    found = [_pad(gripper, {n: v[k] for n, v in faces.items()}, *(s[k] for s in stored)) for k in (0, 1)]
+    return [replace(pad, lift=LIFT + float(d)) for pad, d in zip(found, np.nan_to_num(deepest), strict=True)]
 
 
-def faces_of(gripper: Any, count: int) -> tuple[int, int] | None:
-    """Faces of a patch along and across the pad; None if ``count`` is not that of this mesh."""
-    per_side = 3 if gripper.element == "hex27" else 2
-    i, j = (per_side * n for n in gripper.elements[:2])
-    return (i, j) if i * j == count else None
-
-
-def _pad(gripper: Any, patch: dict[str, np.ndarray], R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
+def _pad(gripper: Any, faces: Faces, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
     length, width, thickness = gripper.pad_size
     x, y = 0.5 * length * np.array([-1, 1, 1, -1]), 0.5 * width * np.array([-1, -1, 1, 1])
-
-    def placed(points: np.ndarray) -> np.ndarray:
-        return points @ R.T + o
-
-    back = placed(np.column_stack([x, y, np.full(4, closing - thickness)]))
-    grid = faces_of(gripper, len(patch["pressure"])) if patch else None
-    common = {"back": back, "frame": axes @ R.T, "origin": placed(origin), "rotation": R, "position": o}
-    if grid is None:  # only the block before it is pressed
-        flat = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
-        return Pad(front=placed(flat), **common)
-    front = corners_of(patch["centroid"].reshape(*grid, 3))
+    per_side = 3 if gripper.element == "hex27" else 2
+    grid = tuple(per_side * n for n in gripper.elements[:2])
+    if not faces or faces["pressure"].size != np.prod(grid):  # only the block before it is pressed
+        front = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
+        grid, faces = (0, 0), {name: np.empty(0) for name in ("centroid", "normal", "pressure", "area")}
+    else:
+        front = corners_of(faces["centroid"].reshape(*grid, 3))
+    placed = {
+        "front": front,
+        "back": np.column_stack([x, y, np.full(4, closing - thickness)]),
+        "origin": origin,
+        "centroid": faces["centroid"].reshape(*grid, 3),
+    }
     return Pad(
-        front=placed(front),
-        **common,
-        centroid=placed(patch["centroid"]).reshape(*grid, 3),
-        normal=(patch["normal"] @ R.T).reshape(*grid, 3),
-        pressure=patch["pressure"].reshape(grid),
-        area=patch["area"].reshape(grid),
-    )
+        **{name: points @ R.T + o for name, points in placed.items()}, frame=axes @ R.T, rotation=R, position=o,
+        lift=LIFT, normal=faces["normal"].reshape(*grid, 3) @ R.T, pressure=faces["pressure"].reshape(grid),
+        area=faces["area"].reshape(grid),
+    )  # fmt: skip

@@ -13,16 +13,14 @@ import pyvista as pv
 
 from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.show.view.model import FORCE, NEUTRAL, PAD
-from softjaw.study.show.view.pads import LIFT, Pad
+from softjaw.study.show.view.pads import Pad
 
 LIGHT = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}  # colours have to be those of the bar
 CREASE = 40  # degrees; normals are not averaged over sharper bends
 PAPER, MARGIN = 250, 6  # grey level from which a pixel is empty paper, and pixels that are kept round what is drawn
 
 
-def rendered(
-    draw: Callable[[Any], None], towards: Any, up: Any = (0, 0, 1), size: tuple[int, int] = (1500, 1500)
-) -> np.ndarray:
+def rendered(draw: Callable[[Any], None], towards: Any, up: Any, size: tuple[int, int]) -> np.ndarray:
     """Image ``(h, w, 3)`` of what ``draw`` puts on a plotter, seen from the direction ``towards``, without its margins.
 
     The projection is parallel: lengths in the picture can be compared.
@@ -35,12 +33,18 @@ def rendered(
             draw(plotter)
             for title in list(plotter.scalar_bars.keys()):  # the figure has its own
                 plotter.remove_scalar_bar(title)
-            plotter.view_vector(towards, viewup=up)
-            plotter.enable_parallel_projection()
-            plotter.reset_camera()
+            look(plotter, towards, up)
             return trimmed(plotter.screenshot(return_img=True))
         finally:
             plotter.close()
+
+
+def look(plotter: Any, towards: Any, up: Any, zoom: float = 1.0) -> None:
+    """See everything from a direction, without perspective."""
+    plotter.view_vector(towards, viewup=up)
+    plotter.enable_parallel_projection()
+    plotter.reset_camera()
+    plotter.camera.zoom(zoom)
 
 
 def trimmed(image: np.ndarray) -> np.ndarray:
@@ -80,19 +84,16 @@ def faces(plotter: Any, corners: np.ndarray, values: Any = None, **look: Any) ->
     plotter.add_mesh(mesh, **{"lighting": False, **look})
 
 
-def block(plotter: Any, pad: Pad, name: str = "") -> None:
+def block(plotter: Any, pad: Pad, name: str = "pad") -> None:
     """A pad's sides, which one sees through, and its edges."""
-    names = ({"name": f"{name} sides"}, {"name": f"{name} lines"}) if name else ({}, {})
-    faces(plotter, 1e3 * pad.sides(), color=PAD, opacity=0.22, **names[0])
-    lines(plotter, 1e3 * pad.lines(), PAD, **names[1])
+    faces(plotter, 1e3 * pad.sides(), color=PAD, opacity=0.22, name=f"{name} sides")
+    lines(plotter, 1e3 * pad.lines(), PAD, name=f"{name} lines")
 
 
 def pressures(plotter: Any, pad: Pad, top: float, **look: Any) -> None:
     """The loaded faces of a pad in the colours of their pressure, up to ``top`` [kPa]."""
-    loaded = pad.loaded.ravel()
-    corners = pad.quads()[loaded] - pad.lift * pad.approach
     look = {"cmap": COLOURS["pressure"], "clim": (0, top), "edge_color": SOFT, "line_width": 1, **look}
-    faces(plotter, 1e3 * corners, 1e-3 * pad.pressure.ravel()[loaded], **look)
+    faces(plotter, *pad.pressed(), **look)
 
 
 def lines(plotter: Any, ends: np.ndarray, colour: str, width: float = 2.0, **look: Any) -> None:
@@ -100,16 +101,14 @@ def lines(plotter: Any, ends: np.ndarray, colour: str, width: float = 2.0, **loo
     plotter.add_mesh(pv.line_segments_from_points(ends.reshape(-1, 3)), color=colour, line_width=width, **look)
 
 
-def friction(plotter: Any, pad: Pad, motion: str, longest: float, most: float = 0.0, **look: Any) -> None:
-    """Arrows of the friction that loaded faces carry; ``longest`` [mm] for the largest force, or for ``most`` [N]."""
-    places, forces = pad.arrows(motion)
-    size = np.linalg.norm(forces, axis=1)
-    if not size.any():
-        return
-    cloud = pv.PolyData(1e3 * (places - (pad.lift + 3 * LIFT) * pad.approach))
-    cloud["force"] = longest * forces / (most or size.max())
-    shape = pv.Arrow(tip_length=0.35, tip_radius=0.14, shaft_radius=0.06, tip_resolution=10, shaft_resolution=8)
-    plotter.add_mesh(cloud.glyph(orient="force", scale="force", geom=shape), color=FORCE, lighting=False, **look)
+def arrows(plotter: Any, ends: np.ndarray, **look: Any) -> None:
+    """Arrows along segments ``(k, 2, 3)``, such as those of `study.show.view.pads.Pad.arrows`."""
+    cloud = pv.PolyData(ends[:, 0])
+    cloud["vector"] = ends[:, 1] - ends[:, 0]
+    if cloud["vector"].any():
+        shape = pv.Arrow(tip_length=0.35, tip_radius=0.14, shaft_radius=0.06, tip_resolution=10, shaft_resolution=8)
+        glyphs = cloud.glyph(orient="vector", scale="vector", geom=shape)
+        plotter.add_mesh(glyphs, color=FORCE, lighting=False, **look)
 
 
 def dots(plotter: Any, places: np.ndarray, radius: float, values: Any = None, **look: Any) -> None:
@@ -123,7 +122,7 @@ def dots(plotter: Any, places: np.ndarray, radius: float, values: Any = None, **
 
 
 def labels(plotter: Any, places: np.ndarray, texts: list[str], size: int = 34, **look: Any) -> None:
-    """Words at places, on white ground."""
+    """Names at places, on white ground."""
     ground = {"shape": "rounded_rect", "shape_color": "white", "shape_opacity": 0.75, "margin": 4}
     plotter.add_point_labels(places, texts, font_size=size, text_color=INK, show_points=False, always_visible=True,
                              **{**ground, **look})  # fmt: skip

@@ -6,9 +6,6 @@ import base64
 import json
 import math
 import re
-import threading
-import urllib.error
-import urllib.request
 
 import matplotlib
 import numpy as np
@@ -19,15 +16,15 @@ from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import NOBODY
+from softjaw.study.result.grid import NOBODY, corners_of
 from softjaw.study.result.grid_surface import Cells, Wall, areas, between, coloured, cut
+from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.show.data import Data
+from softjaw.study.show.grasps import judge, order
 from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
-from softjaw.study.show.view.pads import corners_of, pads
-from softjaw.study.show.view.server import server
+from softjaw.study.show.view.pads import pads_of
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
 
@@ -44,7 +41,7 @@ def file(tmp_path_factory, comm):
 def shown(file):
     """The view of the file and its best case."""
     with open_result(file) as result:
-        yield view_of(Data(result), None, (None, None), None)
+        yield view_of(judge(dataset(result)), None, (None, None), None)
 
 
 def corners_on(body):
@@ -148,7 +145,7 @@ def test_corners_of_a_straight_grid_are_those_of_its_faces():
 def test_pads_stand_where_the_file_says(shown):
     view, index = shown
     assert index == (1, 0, 1)
-    one, two = pads(view.data, view.gripper, index)
+    one, two = view.pads(index)
     assert one.front[..., 0] == pytest.approx(np.full((5, 5), 0.025))
     assert two.front[..., 0] == pytest.approx(np.full((5, 5), -0.025))
     assert np.ptp(one.front.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
@@ -164,13 +161,13 @@ def test_pads_stand_where_the_file_says(shown):
 def test_arrows_add_up_to_the_friction_of_the_whole(shown):
     """Flat front, slip along x: every force along x, mu left out; a turn about the middle gives no net force."""
     view, index = shown
-    pad = pads(view.data, view.gripper, index)[0]
-    places, forces = pad.arrows("x")
+    pad = view.pads(index)[0]
+    places, forces = pad.friction("x")
     assert len(places) == pad.loaded.sum() == 4
     load = 5 * PRESSURE * SIZE[0] * SIZE[1] / 16
     assert forces == pytest.approx(np.broadcast_to(load * pad.frame[0], (4, 3)))
-    assert pad.arrows("y")[1].sum(axis=0) @ pad.frame[1] == pytest.approx(4 * load)
-    places, forces = pad.arrows("turn")
+    assert pad.friction("y")[1].sum(axis=0) @ pad.frame[1] == pytest.approx(4 * load)
+    places, forces = pad.friction("turn")
     assert np.abs(forces.sum(axis=0)).max() < 1e-12
     arms = np.linalg.norm(places - pad.origin, axis=1)
     assert (np.cross(places - pad.origin, forces) @ pad.frame[2]) == pytest.approx(arms * load)
@@ -178,22 +175,22 @@ def test_arrows_add_up_to_the_friction_of_the_whole(shown):
 
 def test_no_pads_are_invented(file, tmp_path, shown):
     view, _ = shown
-    assert pads(view.data, view.gripper, FAILED) == []
-    assert pads(view.data, view.gripper, (0, 0, 1)) == []
-    assert pads(view.data, None, (1, 0, 1)) == []
+    assert view.pads(FAILED) == []
+    assert view.pads((0, 0, 1)) == []
+    assert pads_of(view.ds, None, (1, 0, 1), {}) == []
     with open_result(make(tmp_path / "bare.hdf", patches=False)) as result:
-        bare, index = view_of(Data(result), 2, (None, None), 5)
-        one = pads(bare.data, bare.gripper, index)[0]
-        assert one.pressure is None
+        bare, index = view_of(judge(dataset(result)), 2, (None, None), 5)
+        one = bare.pads(index)[0]
+        assert one.pressure.size == 0
         assert one.front.shape == (2, 2, 3)
-        assert len(one.arrows("x")[0]) == 0
+        assert len(one.friction("x")[0]) == 0
 
 
 # --- choosing a case -------------------------------------------------------------------------------------------------
 
 
 def test_a_case_is_chosen_by_number_place_or_score(shown):
-    data = shown[0].data
+    data = shown[0].ds
     chosen = {
         (None, None, None, 1.0): (1, 0, 0),
         (4, None, None, 4.0): (2, 0, 1),
@@ -212,11 +209,11 @@ def test_a_case_is_chosen_by_number_place_or_score(shown):
 
 def test_the_words_name_the_case_and_say_why_it_failed(shown):
     view, index = shown
-    words = view.words(index, "quality")
-    assert words[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
-    assert f"grasp quality: {quality(index):.3g}" in words
-    assert view.words(FAILED, "quality")[-1] == "failed: no </script> convergence"
-    assert view.words((0, 0, 1), "quality")[-1] == "not computed yet"
+    lines = view.summary(index, "quality")
+    assert lines[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
+    assert f"grasp quality: {quality(index):.3g}" in lines
+    assert view.summary(FAILED, "quality")[-1] == "failed: no </script> convergence"
+    assert view.summary((0, 0, 1), "quality")[-1] == "not computed yet"
 
 
 def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
@@ -224,7 +221,7 @@ def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
         r"shape = .*?length_mm = 100", 'shape = "mesh"\nmesh = "/nowhere/thing.stl"\nunit = "mm"', SCENE, flags=re.S
     )
     with open_result(make(tmp_path / "m.hdf", scene=scene)) as result:
-        view, _ = view_of(Data(result), None, (None, None), None)
+        view, _ = view_of(judge(dataset(result)), None, (None, None), None)
         assert not len(view.surface.points)
         assert "thing.stl" in view.note
 
@@ -237,7 +234,7 @@ def unpacked(packed, kind="<f4"):
 
 
 def every(view):
-    return [i for k in (1, 0) for i in view.data.order(k)]
+    return [i for k in (1, 0) for i in order(view.ds, k)]
 
 
 def test_the_page_holds_every_solved_case(shown):
@@ -260,7 +257,7 @@ def test_the_page_holds_every_solved_case(shown):
 def test_pads_friction_and_limit_surface_of_a_case_are_where_the_file_says(shown):
     view, index = shown
     one = payload(view, index, "quality", [index], "x", whole=True)[0]["cases"]["1 2"]
-    both = pads(view.data, view.gripper, index)
+    both = view.pads(index)
     faces = (unpacked(one["faces"], "<i2") * one["step"]).reshape(-1, 4, 3)
     assert len(faces) == 8  # four loaded faces of each pad
     assert np.abs(faces[:4, :, 0]) == pytest.approx(np.full((4, 4), 25 + 1e3 * both[0].lift), abs=2 * one["step"])
@@ -292,22 +289,6 @@ def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeyp
     assert " 10 worst cases are left out" in object_block(view, index, "quality", "x", [index, *every(view)])["caption"]
 
 
-def test_the_page_is_served_on_loopback_to_its_own_name_only():
-    with server("<p>grün</p>") as running:
-        host, port = running.server_address
-        assert host == "127.0.0.1"
-        threading.Thread(target=running.serve_forever, args=(0.01,), daemon=True).start()
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5) as answer:
-            assert answer.read().decode() == "<p>grün</p>"
-        for path, name in (("/etc/passwd", f"127.0.0.1:{port}"), ("/", "elsewhere.example:80")):
-            asked = urllib.request.Request(f"http://127.0.0.1:{port}{path}", headers={"Host": name})
-            with pytest.raises(urllib.error.HTTPError, match="404"):
-                urllib.request.urlopen(asked, timeout=5)
-        with pytest.raises(StudyError, match=f"--port: {port} cannot be had"):
-            server("", port)
-        running.shutdown()
-
-
 # --- the command -----------------------------------------------------------------------------------------------------
 
 
@@ -337,19 +318,14 @@ def test_the_command_writes_the_page(file, tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["a.html"]
 
 
-@pytest.mark.parametrize(
-    ("display", "port", "shows"), [("", None, "page"), (":0", None, "window"), (":0", "0", "page")]
-)
-def test_without_a_screen_the_page_is_served(file, monkeypatch, display, port, shows):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.setenv(name, display)
-    if not display and command.sys.platform in ("darwin", "win32"):
-        pytest.skip("these always have a screen")
+def test_a_window_needs_a_screen(file, monkeypatch, capsys):
     used = []
-    monkeypatch.setattr("softjaw.study.show.view.server.serve", lambda html, port: used.append("page"))
     monkeypatch.setattr("softjaw.study.show.view.window.show_window", lambda *_: used.append("window"))
-    assert main(["view", str(file), *([] if port is None else ["--port", port])]) == 0
-    assert used == [shows]
+    for screen, code in ((False, USAGE), (True, 0)):
+        monkeypatch.setattr(command, "has_screen", lambda screen=screen: screen)
+        assert main(["view", str(file)]) == code
+    assert used == ["window"]
+    assert "--screenshot" in capsys.readouterr().err
 
 
 # --- what is seen -----------------------------------------------------------------------------------------------------

@@ -5,15 +5,16 @@ from __future__ import annotations
 import h5py
 
 from softjaw.study.result.layout import REPORT
+from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.show.report.plain_report import plain_report
+from softjaw.study.show.report.verdict import plain_report
 from tests.study.sealing import sealed
 from tests.study.view_files import make
 
 
 def test_it_says_what_it_is_the_best_grasps_the_failures_and_how_to_read_them(tmp_path):
     with open_result(make(tmp_path / "thing.hdf")) as result:
-        text = plain_report(result, 0.8)
+        text = plain_report(dataset(result), 0.8)
     assert text.startswith(
         "<b>thing</b>: 3 stations (-20 to 20 mm) x 2 angles (0 to 90 deg) x 2 normal forces (1 to 5 N)\n"
     )
@@ -31,6 +32,6 @@ def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
     with h5py.File(path, "r+") as file:
         file["study/status/code"][...] = 2
     with open_result(sealed(path)) as result:
-        text = plain_report(result, None)
+        text = plain_report(dataset(result), None)
     assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
     assert "failed 11 x no reason was given" in text

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import dataset, open
 from softjaw.study.result.store import open_result
-from softjaw.study.show.data import Data
-from softjaw.study.show.figures import JOBS, fig5, fig6, fig7, fig8
-from softjaw.study.show.figures.command import chosen, draw, targets
-from softjaw.study.show.figures.table import FIGURES, Figure, find
+from softjaw.study.show.figures import JOBS, studies, surfaces
+from softjaw.study.show.figures.drawing import FIGURES, Figure, chosen, draw, find, targets
+from softjaw.study.show.grasps import field, judge
 from softjaw.study.show.view import solids
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
@@ -30,7 +32,6 @@ def test_every_figure_has_scenes_something_that_draws_it_and_a_picture_for_the_r
     assert figure.scenes
     assert all((JOBS / f"{scene}.toml").is_file() for scene in figure.scenes)
     assert figure.draw.__doc__
-    assert figure.draw.__module__ == f"softjaw.study.show.figures.fig{figure.name[0]}"
     picture = ROOT / "docs" / figure.file
     assert picture.read_bytes().startswith(PNG)
     assert picture.stat().st_size <= MOST
@@ -52,8 +53,8 @@ def test_what_cannot_be_drawn_is_told(tmp_path, capsys):
     assert "found '9', expected one of 4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all" in capsys.readouterr().err
     assert main(["figure", "4", "-o", str(tmp_path / "both.png")]) == 2
     assert "for 2 figures (4ab, 4c), expected a folder" in capsys.readouterr().err
-    assert targets(find("4c"), "one.png")[0].name == "one.png"
-    assert [path.name for path in targets(find("4"), str(tmp_path))] == ["fig4ab.png", "fig4c.png"]
+    assert targets(find("4c"), Path("one.png"))[0].name == "one.png"
+    assert [path.name for path in targets(find("4"), tmp_path)] == ["fig4ab.png", "fig4c.png"]
 
 
 def force_file(path):
@@ -66,7 +67,7 @@ def force_file(path):
 def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     path = force_file(tmp_path / "force.hdf")
     with open_result(path) as result:
-        lines = fig7.quantities(Data(result))
+        lines = studies.over_force(judge(dataset(result)))
         e_n = 1e3 * result.map("e_n", "ccm")[0, 0]
     _, force = lines["force"]
     assert force["pcm"] == pytest.approx(np.full(4, 0.8))
@@ -74,15 +75,15 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     title, torque = lines["torque"]
     assert "50 mm" in title
     assert torque["ccm"] == pytest.approx(e_n / 50)  # tau_z / (F l) of a torque e_n F
-    said = draw(Figure("7", ("x",), fig7.force_study), {"x": path}, tmp_path / "7.png")
-    assert "force 0.7 to 0.7, below flat by 13 to 13 %" in said
+    said = draw(Figure("7", ("x",), studies.force_study), {"x": path}, tmp_path / "7.png")
+    assert "force 0.7 to 0.7, below the PCM by 13 to 13 %" in said
     assert (tmp_path / "7.png").read_bytes().startswith(PNG)
 
 
 def test_failed_cases_are_told_of_where_a_figure_needs_them(tmp_path):
     path = force_file(tmp_path / "force.hdf")
     lost = make(tmp_path / "lost.hdf", axes=grid_axes([0.0], [0.0], [1.0, 2.0]), status__code=[[[1, 2]]])
-    figure = Figure("7", ("x", "y"), fig7.force_study)
+    figure = Figure("7", ("x", "y"), studies.force_study)
     with pytest.raises(StudyError, match=r"figure 7 is not drawn: 1 cases of \S+lost.hdf failed; 'softjaw status"):
         draw(figure, {"x": path, "y": lost}, tmp_path / "7.png")
     assert not (tmp_path / "7.png").exists()
@@ -105,7 +106,7 @@ def test_the_exact_radius_is_that_of_an_ellipsoid_where_the_body_is_one(axes):
     A = np.array(axes)
     body = SimpleNamespace(wrenches=lambda t: A**2 * t / np.linalg.norm(A * t, axis=1, keepdims=True))
     u = np.random.default_rng(3).normal(size=(200, 3))
-    found, known = fig6.exact_radius(body, u), 1 / np.linalg.norm(u / A, axis=1)
+    found, known = surfaces.exact_radius(body, u), 1 / np.linalg.norm(u / A, axis=1)
     assert found == pytest.approx(known, rel=2e-3)
     assert (found >= known * (1 - 1e-12)).all()
 
@@ -147,16 +148,13 @@ def coarse(tmp_path_factory):
 @pytest.fixture
 def data(coarse):
     """Opens a result."""
-    opened = []
 
     def of(name):
-        opened.append(open_result(coarse[name]))
-        assert (opened[-1].status == DONE).all()
-        return Data(opened[-1])
+        found = judge(open(coarse[name]))
+        assert (found.status == DONE).all()
+        return found
 
-    yield of
-    for result in opened:
-        result.close()
+    return of
 
 
 @pytest.mark.long
@@ -185,11 +183,11 @@ def test_the_command_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_pat
 @pytest.mark.long
 @pytest.mark.launches
 def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, data, tmp_path):
-    off = data("fig5-candidate").result.fingers("frame_origin")[0, 0, 0, 0]
+    off = data("fig5-candidate").finger_frame_origin.values[0, 0, 0, 0]
     assert np.hypot(*off[:2]) > 0.015  # of pads that reach 25 mm to both sides
     for name, index in (("fig5-candidate", (0, 0, 0)), ("fig4-curvature", (0, 0, 0, 1))):
-        known = {m: fig5.stored_surface(data(name), index, 0, m) for m in fig5.MODELS}
-        t = fig6.fibonacci_twists(200, 1.0)
+        known = {m: surfaces.exact_surface(data(name), index, m) for m in surfaces.MODELS}
+        t = fibonacci_twists(200, 1.0)
         H = {m: np.einsum("ki,ki->k", found.wrenches(t), t) for m, found in known.items()}
         assert (H["ccm"] <= H["pcm"] * (1 + 1e-12)).all()
 
@@ -199,13 +197,13 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
 @pytest.mark.parametrize("name", ["bottle", "cup", "fig4-curvature", "fig5-candidate", "fig7-force-study"])
 def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
     found = data(name)
-    assert (found.map("fit_error") < found.map("fit_error_ellipsoid")).all()
+    assert (field(found, "fit_error") < field(found, "fit_error_ellipsoid")).all()
 
 
 @pytest.mark.long
 @pytest.mark.launches
 def test_fig7_torque_e_n_and_score_grow_with_the_force_and_so_does_what_the_planar_model_claims_too_much(data):
-    lines = {name: values for name, (_, values) in fig7.quantities(data("fig7-force-study")).items()}
+    lines = {name: values for name, (_, values) in studies.over_force(data("fig7-force-study")).items()}
     for name in ("torque", "e_n", "score"):
         assert (np.diff(lines[name]["ccm"]) > 0).all(), name
     assert lines["force"]["pcm"] == pytest.approx(np.full(4, 2.0))  # mu, at every force
@@ -221,15 +219,15 @@ def test_fig7_torque_e_n_and_score_grow_with_the_force_and_so_does_what_the_plan
 @pytest.mark.launches
 def test_fig8_a_indentation_lowers_the_quality_but_raises_e_n_and_the_best_place_is_not_the_widest(data):
     walled, rigid = data("bottle"), data("bottle, rigid")
-    ratio = {name: walled.map(name)[..., 1] / rigid.map(name)[..., 1] for name in ("e_n", "quality")}
+    ratio = {name: field(walled, name)[..., 1] / field(rigid, name)[..., 1] for name in ("e_n", "quality")}
     waist, upper = 1, 2
     assert (ratio["quality"] < 1.01).all()
     assert (ratio["quality"][waist] < 0.95).all()
     assert ratio["e_n"][upper, 1] > 1.1  # where the wall has given way at 13 N
-    wide = fig8.widest(walled)
+    wide = studies.widest(walled)
     assert wide.tolist() == [True, False, True, False]
     for name in ("e_n", "quality"):
-        assert walled.map(name)[waist].max() > walled.map(name)[wide].max(), name
+        assert field(walled, name)[waist].max() > field(walled, name)[wide].max(), name
     cup = data("cup")  # here it is the widest: nothing of the wall's indentation takes it away
-    assert cup.map("e_n")[..., 1].argmax() // 2 == 2
-    assert cup.map("indentation")[2].max() > cup.map("indentation")[0].max()
+    assert field(cup, "e_n")[..., 1].argmax() // 2 == 2
+    assert field(cup, "indentation")[2].max() > field(cup, "indentation")[0].max()

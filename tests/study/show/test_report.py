@@ -19,15 +19,15 @@ from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
 from softjaw.study.result.layout import Header, Layout
+from softjaw.study.result.read import dataset
 from softjaw.study.result.reading import StoredAxis
 from softjaw.study.result.record import record
 from softjaw.study.result.store import ResultWriter, create, open_result
-from softjaw.study.scene.objects import EllipticCylinderShape, SphereShape
-from softjaw.study.show.data import Data, number
-from softjaw.study.show.outline import read_scene, shape_outline
+from softjaw.study.show.grasps import at, compared, grouped, images, judge, number, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report
 from softjaw.study.show.tables.show import best
+from softjaw.study.show.view.model import read_scene
 
 ROOT = Path(__file__).parent.parent.parent
 FACES = (6, 4)
@@ -121,7 +121,7 @@ class Page(HTMLParser):
 
 def page_of(path):
     with open_result(path) as result:
-        return Page(build(result)[0])
+        return Page(build(dataset(result))[0])
 
 
 def figures(html):
@@ -202,10 +202,10 @@ def test_texts_of_the_file_are_escaped_in_the_page_and_in_its_figures(ordinary):
 def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinary):
     path, _, page = ordinary
     with open_result(path) as result:
-        data = Data(result)
-        first = best(data.ds).rows[0]
-        assert data.best == (2, 1, 1)
-        assert (first[1], first[2]) == (data.axes[0].values[2], data.axes[1].values[1])
+        data = judge(dataset(result))
+        first = best(data).rows[0]
+        assert data.attrs["best"] == (2, 1, 1)
+        assert (first[1], first[2]) == (data.station.values[2], data.angle.values[1])
         sentences, pairs = verdict.verdict(data, 0.8), dict(verdict.key_values(data))
     found = [pair.replace("\u00a0", " ") for pair in pairs.values()]
     assert found == ["station 20 mm, angle 28.65°", "40 mm", "5 N per finger", "5", "10"]
@@ -242,7 +242,7 @@ def test_values_are_told_with_their_error_where_the_file_has_it(tmp_path):
     layout = Layout(axes(), 0, meshes=2, patches=False)
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
-        data = Data(result)
+        data = judge(dataset(result))
         said = " ".join(verdict.verdict(data, 0.8)).replace("\u00a0", " ")
         (folded,) = tables.every_case(data)
         assert verdict.meaning(data) == verdict.ESTIMATED
@@ -261,27 +261,27 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
 
     path = make(tmp_path / "f.hdf", Layout(axes(), 24), state)
     with open_result(path) as result:
-        chosen, failed = Data(result, (3, 0, 1)), Data(result, (3, 2, 1))
+        chosen, failed = judge(dataset(result), (3, 0, 1)), judge(dataset(result), (3, 2, 1))
         said = verdict.chosen(chosen).replace("\u00a0", " ")
         for words in ("candidate 9: station 30 mm, angle 0°, 5 N", "1.25", "2.5", "place 9 of 11"):
             assert words in said
-        assert chosen.other == ((3, 0, 1), "the chosen candidate")
+        assert compared(chosen) == ((3, 0, 1), "the chosen candidate")
         assert verdict.chosen(failed).endswith("failed: it slipped away")
-        assert failed.other[0] != (3, 2, 1)
-        assert verdict.chosen(Data(result)) == ""
+        assert compared(failed)[0] != (3, 2, 1)
+        assert verdict.chosen(judge(dataset(result))) == ""
         with pytest.raises(StudyError, match="--candidate: found 12, expected 0 to 11"):
-            build(result, 12)
+            build(dataset(result), 12)
 
 
 def test_failures_that_differ_in_numbers_alone_are_one_kind(ordinary):
     path, _, page = ordinary
     with open_result(path) as result:
-        ((count, text, where),) = Data(result).grouped(2)
+        ((count, text, where),) = grouped(judge(dataset(result)), 2)
     assert count == 6 == len(where)
     assert "ConvergenceError" in text
     assert page.text.count("ConvergenceError: residual") == 1 + 6  # once as a kind, and in the table of all cases
     with open_result(path) as result:
-        assert "residual 2.5e-03" in tables.note(Data(result), (3, 2, 0))
+        assert "residual 2.5e-03" in tables.note(judge(dataset(result)), (3, 2, 0))
 
 
 def test_definitions_scene_checks_and_time_are_there(ordinary):
@@ -329,18 +329,19 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
 )
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
     with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
-        data = Data(result)
+        data = judge(dataset(result))
         assert expected in " ".join([*verdict.verdict(data, 0.8), *verdict.warnings(data)])
 
 
 def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
     with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0, patches=False))) as result:
-        data = Data(result)
-        worse, better = sorted(data.order(0), key=lambda i: data.at("quality", i))
+        data = judge(dataset(result))
+        worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
         assert "but cannot be used" not in " ".join(verdict.verdict(data, 0.8))
-        data = Data(result)
-        data.flags[better] = Flag.TOO_STRONG
-        assert data.best == worse
+        marked = dataset(result)
+        marked["flags"].values[better] = Flag.TOO_STRONG
+        data = judge(marked)
+        assert data.attrs["best"] == worse
         assert "but cannot be used: too strong." in " ".join(verdict.verdict(data, 0.8))
 
 
@@ -353,17 +354,17 @@ def test_the_same_file_gives_the_same_bytes(tmp_path):
 def test_a_score_that_fails_at_the_highest_force_is_looked_for_below(tmp_path):
     path = make(tmp_path / "f.hdf", Layout(axes(), 24), lambda i: "done" if i[-1] == 0 else "missing")
     with open_result(path) as result:
-        data = Data(result)
-        assert data.k == 0
-        assert data.best == (2, 1, 0)
+        data = judge(dataset(result))
+        assert data.attrs["level"] == 0
+        assert data.attrs["best"] == (2, 1, 0)
 
 
 def test_images_of_a_grasp_are_not_listed_twice(tmp_path):
     path = make(tmp_path / "f.hdf", Layout(axes(angles=(0.0, 1.0, 2.0)), 0, patches=False))
     with open_result(path) as result:
-        data = Data(result)
-        assert data.images((2, 0, 1)) == [(0, 1, 1), (2, 2, 1)]  # 1 / (1 + 2) in all of them
-        assert data.other == ((0, 2, 1), "the last in the ranking")
+        data = judge(dataset(result))
+        assert images(data, (2, 0, 1)) == [(0, 1, 1), (2, 2, 1)]  # 1 / (1 + 2) in all of them
+        assert compared(data) == ((0, 2, 1), "the last in the ranking")
 
 
 def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):
@@ -372,9 +373,9 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_
     layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0, patches=False)
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
     with open_result(path) as result:
-        data, scene = Data(result), read_scene(result.scene)
-        found = [block["figure"].data for block in curves.differences(data, scene, data.best)]
-        png = picture(data, scene, data.best)
+        data, scene = judge(dataset(result)), read_scene(dataset(result))
+        found = [block["figure"].data for block in curves.differences(data, scene, data.attrs["best"])]
+        png = picture(data, scene, data.attrs["best"])
     (ratio,), (curvature,) = found
     assert ratio.x == pytest.approx([0.5, 1, 2.5])
     assert curvature.x == pytest.approx([10, 40, 250])
@@ -395,15 +396,6 @@ def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
         write_report(tmp_path / "none.hdf", tmp_path / "r.html")
     assert error.value.code == OTHER_FILE
     assert [p.name for p in tmp_path.iterdir()] == ["study.hdf"]
-
-
-def test_outlines_are_those_of_the_shapes():
-    """Extent of an ellipse along a direction: sqrt((a cos)^2 + (b sin)^2)."""
-    tube = EllipticCylinderShape(shape="elliptic_cylinder", semi_axis_a_mm=30, semi_axis_b_mm=40, length_mm=100)
-    _, r = shape_outline(tube, np.pi / 4)
-    assert r == pytest.approx(np.hypot(0.03, 0.04) / np.sqrt(2))
-    z, r = shape_outline(SphereShape(shape="sphere", radius_mm=7.0), 0.3)
-    assert np.hypot(z, r) == pytest.approx(0.007)
 
 
 def test_a_page_escapes_every_kind_of_block():

@@ -10,12 +10,14 @@ from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.study.quantities import MONOMIALS
 from softjaw.study.result.layout import Layout
+from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.show.data import Data
+from softjaw.study.show.grasps import field, judge
 from softjaw.study.show.report.contact import limit_surfaces
 from softjaw.study.show.report.curves import fit_error
 from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
-from tests.study.test_report import axes, make, patch
+from softjaw.study.show.view.model import View
+from tests.study.show.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02
 SEMI = np.array([1.0, 0.9, 0.3])
@@ -69,9 +71,10 @@ def test_shadows_of_ellipsoids_are_ellipses(i, j):
 
 def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file(file):
     with open_result(file) as result:
-        data = Data(result)
-        flat, curved = (stored_surface(data, (1, 0, 0), 1, model) for model in ("pcm", "ccm"))
-    assert flat.unit == pytest.approx(MU * patch_S() * np.array([1.0, 1.0, RHO]))
+        data = judge(dataset(result))
+        faces = View(data).faces((1, 0, 0))
+        flat, curved = (stored_surface(data, (1, 0, 0), 1, model, faces) for model in ("pcm", "ccm"))
+    assert flat.unit == pytest.approx(MU * patch_S() * np.array([1.0, 1.0, 1e3 * RHO]))
     assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
     assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)
     # a plane contact slides alike in every direction, and turning it takes no more than all its load at the rim
@@ -89,8 +92,8 @@ def patch_S():
 
 def test_figures_show_both_models_with_their_exact_wrenches(file):
     with open_result(file) as result:
-        data = Data(result)
-        shown = limit_surfaces(data, (0, 0, 0))["figure"].data
+        data = judge(dataset(result))
+        shown = limit_surfaces(View(data), (0, 0, 0))["figure"].data
         curve = fit_error(data, 0, (0, 0, 0))["figure"].data
     surfaces = [trace for trace in shown if trace.type == "surface"]
     assert len(surfaces) == 2  # CCM and PCM
@@ -104,12 +107,12 @@ def test_figures_show_both_models_with_their_exact_wrenches(file):
 def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_figure(tmp_path, file):
     layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0, patches=False)
     with open_result(file) as result:
-        data = Data(result)
+        data = judge(dataset(result))
         names = ("semi_axes", "rho", "coefficients")
-        values = {f"limit_surface/{n}": data.values(f"limit_surface/{n}")[0, 0, 0] for n in names}
-        values |= {f"fingers/{n}": data.values(f"fingers/{n}")[0, 0, 0] for n in ("S", "f_x_max")}
+        values = {f"limit_surface/{n}": field(data, f"limit_surface_{n}")[0, 0, 0] for n in names}
+        values |= {f"fingers/{n}": field(data, f"finger_{n}")[0, 0, 0] for n in ("S", "f_x_max")}
     with open_result(make(tmp_path / "bare.hdf", layout, **values)) as result:
-        shown = limit_surfaces(Data(result), (0, 0, 0))["figure"].data
+        shown = limit_surfaces(View(judge(dataset(result))), (0, 0, 0))["figure"].data
         assert not any(trace.mode == "markers" for trace in shown if trace.type == "scatter")
     with open_result(make(tmp_path / "none.hdf", layout)) as result:
-        assert limit_surfaces(Data(result), (0, 0, 0)) is None
+        assert limit_surfaces(View(judge(dataset(result))), (0, 0, 0)) is None

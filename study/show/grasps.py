@@ -1,0 +1,234 @@
+"""What report, view and figures ask of the dataset of a study: its grasps in their order, and cases as text.
+
+Everything reads the dataset that `study.result.read.open` gives, after `judge` has decided which force level and which
+grasp are shown. A case is named by its index ``(..., station, angle, force)`` over the axes of ``status``.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from softjaw.study.case.margin import TIE
+from softjaw.study.flags import BORNE, LOST, Flag, flags_in
+from softjaw.study.quantities import MODELS
+from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.show.tables.ranking import borne_level, judged, ranking
+from softjaw.study.units import shown, shown_unit
+
+Index = tuple[int, ...]
+TYPESET = {"deg": "°", "mm^2": "mm²"}  # as pages write these units
+WIDE = 5e-3  # relative difference of widths that makes no place wider
+# What a check may be at most (or, for those of `ABOVE`, must exceed).
+LIMITS = {"force_balance": 1e-6, "adhesion": 1e-6, "penetration": 1e-6, "complementarity": 1e-6, "min_det_f": 0.0,
+          "ellipticity": 0.0}  # fmt: skip
+ABOVE = ("min_det_f", "ellipticity")
+
+
+def unit_of(units: str) -> tuple[str, float]:
+    """Displayed unit, and the factor from SI to it."""
+    unit = shown_unit(units)
+    return TYPESET.get(unit, unit), shown(1.0, units)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number as displayed; a dash where there is none.
+
+    >>> number(0.0123456), number(1.6e-9), number(float("nan")), number(120000.0)
+    ('0.0123', '1.6 × 10⁻⁹', '–', '120000')
+    """
+    value = float(value)
+    if not np.isfinite(value):
+        return "–"
+    if value and not 1e-4 <= abs(value) < 1e6:
+        mantissa, _, power = f"{value:.{max(digits - 2, 1)}e}".partition("e")
+        return f"{mantissa} × 10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e" in text else text
+
+
+def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
+    """The dataset with judged flags (`study.show.tables.ranking.judged`) and four decisions as attributes.
+
+    ``score``: the map that grasps are ranked by; ``level``: the highest force level with a solved case that its wall
+    bears, if there is one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for.
+    """
+    flags, status = judged(ds), ds.status.values
+    found = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
+    level = borne_level(status, flags) if (flags & BORNE).any() else None
+    if level is None:
+        solved = np.flatnonzero((status == DONE).reshape(-1, status.shape[-1]).any(axis=0))
+        level = int(solved[-1]) if solved.size else status.shape[-1] - 1
+    about = {"title": ds.attrs["title"] or Path(ds.attrs["file"]).stem, "level": level, "chosen": chosen}
+    found = found.assign_attrs(about, score="e_n" if field(ds, "quality") is None else "quality")
+    return found.assign_attrs(best=next(iter(order(found, level)), None))
+
+
+def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
+    """Array of a variable over all cases, a map of several friction models in one; None where it has no value.
+
+    Cases that are not done have NaN.
+    """
+    if name not in ds.variables:
+        return None
+    found = ds.variables[name]
+    values = found.values
+    if found.dims[-1:] == ("model",) and "finger" not in found.dims:
+        values = values[..., MODELS.index(model)]
+    if values.dtype.kind != "f":  # codes have integers also where nothing is done
+        done = ds.variables["status"].values == DONE
+        values = np.where(done.reshape(done.shape + (1,) * (values.ndim - done.ndim)), values.astype(float), np.nan)
+    return values if np.isfinite(values).any() else None
+
+
+def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:
+    """A map's value at one case, NaN if there is none."""
+    if name not in ds.variables:
+        return float("nan")
+    found = ds.variables[name]
+    return float(found.values[(*index, MODELS.index(model))] if "model" in found.dims else found.values[index])
+
+
+def quantity(ds: xr.Dataset, name: str) -> tuple[str, str, float]:
+    """A variable's long name without its unit, the displayed unit, and the factor from SI."""
+    found = ds.variables[name].attrs if name in ds.variables else {}
+    return found.get("long_name", name), *unit_of(found.get("units", ""))
+
+
+def label_of(ds: xr.Dataset, name: str) -> str:
+    """A variable's name and unit for an axis or a column."""
+    text, unit, _ = quantity(ds, name)
+    return f"{text} [{unit}]" if unit else text
+
+
+def axis_label(ds: xr.Dataset, axis: str) -> str:
+    """An axis of the cases with the displayed unit."""
+    if axis == "station" and ds.attrs["poses"]:
+        return "candidate"
+    unit = unit_of(ds.variables[axis].attrs["units"])[0]
+    return f"{spoken(axis)} [{unit}]" if unit else spoken(axis)
+
+
+def spoken(name: str) -> str:
+    """A name with spaces."""
+    return name.replace("_", " ")
+
+
+def axis_values(ds: xr.Dataset, axis: str) -> np.ndarray:
+    """Values of an axis in the displayed unit."""
+    return ds.variables[axis].values * unit_of(ds.variables[axis].attrs["units"])[1]
+
+
+def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
+    """One value of an axis with its unit; the text of a sweep over texts."""
+    about = ds.variables[axis].attrs
+    if options := about.get("options", ()):
+        return str(options[i])
+    unit, factor = unit_of(about["units"])
+    text = number(ds.variables[axis].values[i] * factor, 4)
+    return text + (unit if unit == "°" else f"\u00a0{unit}" if unit else "")
+
+
+def place(ds: xr.Dataset, index: Index, force: bool = False) -> str:
+    """A case as text, without axes that have only one value; poses by their names."""
+    status, parts = ds.variables["status"], []
+    for axis, i, length in zip(map(str, status.dims[:-1]), index, status.shape, strict=False):
+        if axis == "station" and ds.attrs["poses"]:
+            parts.append(str(ds.variables["label"].values[index[-3], index[-2]]) or f"pose {i}")
+        elif length > 1 or axis == "station":
+            gap = " " if ds.variables[axis].attrs.get("options") else "\u00a0"
+            parts.append(f"{spoken(axis)}{gap}{axis_text(ds, axis, i)}")
+    return ", ".join([*parts, *[axis_text(ds, "normal_force", index[-1])] * force])
+
+
+def forces(ds: xr.Dataset) -> np.ndarray:
+    """Normal forces per finger ``(k,)`` [N]."""
+    return np.asarray(ds.variables["normal_force"].values)
+
+
+def candidate_of(ds: xr.Dataset, index: Index) -> int:
+    """Number of a case's candidate, counted over sweeps, stations and angles."""
+    return int(np.ravel_multi_index(index[:-1], ds.status.shape[:-1]))
+
+
+def unravelled(position: int, shape: tuple[int, ...]) -> Index:
+    """Index of a position in the flattened array."""
+    return tuple(int(i) for i in np.unravel_index(position, shape))
+
+
+def order(ds: xr.Dataset, k: int) -> list[Index]:
+    """Indices of the solved cases at a force level, the best first."""
+    found, states = field(ds, ds.attrs["score"]), ds.status.values[..., k]
+    done = np.flatnonzero(states.ravel() == DONE)
+    score = np.full(done.shape, -np.inf) if found is None else found[..., k].ravel()[done]
+    ranked = done[ranking(score, ds["flags"].values[..., k].ravel()[done])]
+    return [(*unravelled(int(c), states.shape), k) for c in ranked]
+
+
+def images(ds: xr.Dataset, index: Index) -> list[Index]:
+    """Other cases at the same force with the same score: images by symmetry, or equal as far as can be told."""
+    score = ds.attrs["score"]
+    best = at(ds, score, index)
+    return [i for i in order(ds, index[-1]) if i != index and abs(at(ds, score, i) - best) <= TIE * abs(best)]
+
+
+def compared(ds: xr.Dataset) -> tuple[Index | None, str]:
+    """A case to compare the best with, and why: the one asked for, the widest place, or else the worst one."""
+    best, chosen = ds.attrs["best"], ds.attrs["chosen"]
+    if chosen is not None and chosen != best and ds.status.values[chosen] == DONE:
+        return chosen, "the chosen candidate"
+    ranked = order(ds, ds.attrs["level"])
+    if best is None or len(ranked) < 2:
+        return None, ""
+    same, width = {best, *images(ds, best)}, field(ds, "contact_distance")
+    if width is not None:  # the best of the widest places, on the same object
+        here = [i for i in ranked if i[:-3] == best[:-3] and np.isfinite(width[i])]
+        widest = next(i for i in here if width[i] >= (1 - WIDE) * max(width[j] for j in here))
+        if widest not in same and width[widest] > (1 + WIDE) * width[best]:
+            return widest, "the widest place"
+    return (ranked[-1], "the last in the ranking") if ranked[-1] not in same else (None, "")
+
+
+def lost(ds: xr.Dataset, index: Index) -> bool:
+    """Whether a case slips, slides out, harms the object or does not hold it."""
+    return bool(ds.variables["flags"].values[index] & LOST)
+
+
+def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:
+    """Flags of a case."""
+    return flags_in(int(ds.variables["flags"].values[index]))
+
+
+def check(ds: xr.Dataset, name: str, index: Index) -> float:
+    """A check of the worse finger, NaN if there is none."""
+    name = f"check_{name}"
+    found = ds.variables[name].values[index] if name in ds.variables else np.array([np.nan])
+    worst = np.min if name.removeprefix("check_") in ABOVE else np.max
+    return float(worst(found[np.isfinite(found)])) if np.isfinite(found).any() else float("nan")
+
+
+def passes(name: str, value: float) -> bool:
+    """Whether a check holds."""
+    return value > LIMITS[name] if name in ABOVE else value <= LIMITS[name]
+
+
+def flagged(ds: xr.Dataset, index: Index) -> list[str]:
+    """Checks that a case does not pass, with their values."""
+    values = {name: check(ds, name, index) for name in LIMITS}
+    return [f"{spoken(n)} {number(v)}" for n, v in values.items() if np.isfinite(v) and not passes(n, v)]
+
+
+def grouped(ds: xr.Dataset, state: int) -> list[tuple[int, str, list[Index]]]:
+    """Messages of the cases in a state: how many, an example, where; alike but for their numbers is one kind."""
+    messages, kinds = ds["message"].values, dict[str, tuple[str, list[Index]]]()
+    for row in np.argwhere(ds.status.values == state):
+        index = tuple(int(i) for i in row)
+        text = str(messages[index])
+        if text or state == FAILED:
+            kind = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
+            kinds.setdefault(kind, (text or "no reason was given", []))[1].append(index)
+    return sorted(((len(where), text, where) for text, where in kinds.values()), key=lambda g: -g[0])
