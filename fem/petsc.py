@@ -23,16 +23,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.pattern import Pattern, add_up
+from softjaw.fem.assembly import Pattern
 from softjaw.fem.errors import ConvergenceError
 
 FloatArray = NDArray[np.float64]
+Result = TypeVar("Result")
 ROOM = 160 * 2**20  # bytes that are free before a library is let loose: the largest work memory and what goes with it
 
 
@@ -94,28 +95,24 @@ PRINTING = re.compile("monitor|view|converged_reason")
 class Problem(Protocol):
     """What a nonlinear problem tells the solver.
 
-    A problem whose couplings change has an attribute ``pattern`` instead of ``rows`` and ``columns``; its ``tangent``
-    fills ``pattern.values``, after it has let the pattern grow where that is needed. A problem with a method ``keep(x,
-    first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it says whether the step from ``x``
-    may. ``first``: the factors are from the end of the solve before, whose solution is ``x``.
+    A problem with a method ``keep(x, first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it
+    says whether the step from ``x`` may. ``first``: the factors are from the end of the solve before, whose solution is
+    ``x``. Unknowns with the index ``non_negative`` are bounded by zero where the solver treats complementarity itself.
     """
 
     size: int
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    pattern: Pattern
+    non_negative: slice
     complementarity: bool
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual ``(size,)``."""
 
-    def tangent(self, x: FloatArray) -> FloatArray:
-        """Values of the entries ``(rows, columns)``; entries that coincide are added."""
+    def tangent(self, x: FloatArray) -> None:
+        """Fill ``pattern.values``; the pattern may grow before."""
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the unknowns; infinite where there are none."""
 
 
 @dataclass
@@ -163,12 +160,10 @@ class NonlinearSolver:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
         self.seconds, self.thrifty = Seconds(), True
-        self._pattern, self._slots = getattr(self.problem, "pattern", None), None
-        if self._pattern is None:
-            self._pattern = Pattern(n, self.problem.rows, self.problem.columns)
-            self._slots = self._pattern.slots(self.problem.rows, self.problem.columns)
+        self._pattern = self.problem.pattern
         self._stored = self._pattern.start
-        self._norms, self._end = [], None  # residual norm of every step of this solve; solution of the one before
+        self._norms: list[float] = []  # of the residual, at every step of this solve
+        self._end: FloatArray | None = None  # solution of the solve before
         self._matrix = PETSc.Mat().createAIJ(
             (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
         )
@@ -186,7 +181,8 @@ class NonlinearSolver:
             snes.setFromOptions()
         self.problem.complementarity = snes.getType().startswith("vi")
         if self.problem.complementarity:
-            lower, upper = (np.where(np.isinf(b), np.sign(b) * PETSc.INFINITY, b) for b in self.problem.bounds())
+            lower, upper = np.full(n, -PETSc.INFINITY), np.full(n, PETSc.INFINITY)
+            lower[self.problem.non_negative] = 0.0
             snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in (lower, upper)))
         snes.setLineSearchPreCheck(self._on_step)
 
@@ -261,13 +257,11 @@ class NonlinearSolver:
         """Whether the last solve ended at ``x``, so that the factors at hand are those of a tangent close to it."""
         return self._end is not None and np.array_equal(x, self._end)
 
-    def negative_eigenvalues(self, entries: FloatArray) -> int:
-        """Their number for the symmetric matrix of ``entries`` in the tangent's order: negative pivots of LDL^T.
+    def negative_eigenvalues(self, values: FloatArray) -> int:
+        """Their number for the symmetric matrix of ``values`` in the tangent's pattern: negative pivots of LDL^T.
 
         An eigenvalue within rounding of zero may count as either; all of them count where MUMPS gives up.
         """
-        values = np.zeros_like(self._pattern.values)
-        add_up(self._slots, entries, values)
         matrix = PETSc.Mat().createAIJ(
             self._matrix.size, csr=(self._pattern.start, self._pattern.column, values), comm=PETSc.COMM_SELF
         )
@@ -288,17 +282,17 @@ class NonlinearSolver:
         b, y = self._f.duplicate(), self._f.duplicate()
         b.array[:] = right
         self._snes.getKSP().solve(b, y)
-        found = y.array.copy()
+        solution = y.array.copy()
         b.destroy()
         y.destroy()
-        return found
+        return solution
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
         for thing in (self._snes, self._matrix, self._x, self._f):
             thing.destroy()
 
-    def _timed(self, work: Callable[[], FloatArray]) -> FloatArray:
+    def _timed(self, work: Callable[[], Result]) -> Result:
         start = time.perf_counter()
         result = work()
         self.seconds.assembly += time.perf_counter() - start
@@ -313,10 +307,7 @@ class NonlinearSolver:
             return  # a matrix that nobody touches is not factorised again
 
         def fill() -> None:
-            values = self.problem.tangent(x.array_r)
-            if self._slots is not None:
-                self._pattern.values[:] = 0.0
-                add_up(self._slots, values, self._pattern.values)
+            self.problem.tangent(x.array_r)
             if self._pattern.start is not self._stored:
                 self._grow()
             _set_values(matrix, self._pattern.values)
@@ -417,23 +408,22 @@ class Factors:
 class _OneUnknown:
     """The equation ``x = 1``: enough for PETSc to read every option of a solve."""
 
-    size, rows, columns, complementarity = 1, np.zeros(1, np.int32), np.zeros(1, np.int32), False
+    size, complementarity, non_negative = 1, False, slice(0)
+
+    def __init__(self) -> None:
+        self.pattern = Pattern(1, np.zeros(1, np.int32), np.zeros(1, np.int32))
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `Problem`."""
         return x - 1.0
 
-    def tangent(self, x: FloatArray) -> FloatArray:
+    def tangent(self, x: FloatArray) -> None:
         """See `Problem`."""
-        return np.ones(1)
+        self.pattern.values[:] = 1.0
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """See `Problem`."""
         return 1.0
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """See `Problem`."""
-        return np.full(1, -np.inf), np.full(1, np.inf)
 
 
 def unknown_options(options: dict[str, Any]) -> list[str]:
@@ -444,7 +434,7 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
     asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
     solver = NonlinearSolver(_OneUnknown(), judged)
-    found = []
+    unknown = []
     with solver._options_in_effect():
         solver._snes.setFromOptions()
         solver._snes.solve(None, solver._x)  # MUMPS reads its options here
@@ -452,6 +442,6 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
             used = ctypes.c_int(0)
             asked(None, name.encode(), ctypes.byref(used))
             if not used.value:
-                found.append(name)
+                unknown.append(name)
     solver.destroy()
-    return found
+    return unknown

@@ -1,4 +1,4 @@
-"""Laws that a converged state must obey, whatever the solver said, and why a ladder of forces ends."""
+"""Laws that a converged state must obey, whatever the solver said, and why a load path ends."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Checks:
 
     ``force_balance`` is relative to the force, ``adhesion`` to the largest pressure, ``penetration`` and
     ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
-    ``penetration_depth`` is the deepest point of the front inside the object [m]: weighted gaps hold on average, so it
-    shows how well the mesh follows the object; ``ellipticity`` is the smallest eigenvalue of the acoustic tensor
+    ``penetration_depth`` is the deepest point of the contact face inside the object [m]: weighted gaps hold on average,
+    so it shows how well the mesh follows the object; ``ellipticity`` is the smallest eigenvalue of the acoustic tensor
     over the shear modulus: not positive means that the foam has lost ellipticity and that strains may localise.
     """
 
@@ -51,7 +51,7 @@ def check(
     x : (size,) array
         Unknowns of the pad.
     state : tuple
-        Nodal pressures, mean gaps and points of the front, as ``contact_state`` gives them.
+        Nodal pressures, mean gaps and points of the contact face, as ``contact_state`` gives them.
     left_over : float
         Largest force out of balance at a node, of the whole pad [N].
     force, residual : float
@@ -116,7 +116,7 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
         return error
     if ellipticity > BARELY_ELLIPTIC:
         return ConvergenceError(
-            f"the pad is squeezed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
+            f"the pad is compressed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
             f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
         )
     return ConvergenceError(

@@ -1,6 +1,6 @@
-"""The contact patch of a pressed pad: the deformed front in small faces, with pressures, unfolded to the whole pad.
+"""The contact patch of a pressed pad: small faces of the deformed contact face, unfolded to the whole pad.
 
-Every hexahedron of the front gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
+Every hexahedron of the contact face gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
 triquadratic ones).  A face takes point, normal and load from its quadrature point, so that sums over the patch are
 the integrals of the solution: the loads add up to ``S``, their components along the approach to the normal force.
 """
@@ -26,7 +26,7 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     """
     points = pressed.points
     load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
-    nodes = pressed.front.reshape(*pad.front_grid, 3)
+    nodes = pressed.contact_face.reshape(*pad.contact_grid, 3)
     for axis in range(2):
         nodes = _subdivide(nodes, axis, pad.side_weights)
     nodes = _unfold(pad, nodes, shared=True)
@@ -77,7 +77,7 @@ def _non_negative(load: FloatArray) -> FloatArray:
 
 
 def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
-    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed front ``(i, j, c)``."""
+    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed contact face ``(i, j, c)``."""
     nx, ny = (n // 2 if half else n for n, half in zip(pad.shape.elements, pad.symmetry, strict=False))
     k = pad.shape.per_side
     return values.reshape(nx, ny, k, k, -1).transpose(0, 2, 1, 3, 4).reshape(nx * k, ny * k, -1)

@@ -16,11 +16,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.fem import materials
+from softjaw.fem.assembly import gather, pairs
 from softjaw.fem.materials import stress
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
-SMALLEST_DET = 0.05  # a Newton step is shortened before an element is squeezed further than this
+SMALLEST_DET = 0.05  # a Newton step is shortened before an element is compressed further than this
 
 
 @njit(cache=True)
@@ -253,15 +254,14 @@ class Foam:
     rows, columns : (entries,) arrays
         Where the entries of `stiffness` belong; negative means fixed.
     closing_entries : (k,) array
-        Those of them in the row of the sheet's closing displacement.
+        Those of them in the row of the backing plate's closing displacement.
     """
 
     def __init__(self, pad: Pad) -> None:
         self.pad = pad
         n, nodes = pad.element_nodes.shape
         dofs = pad.dofs[pad.element_nodes].transpose(0, 2, 1)  # (n, 3, nodes)
-        pair = np.broadcast_arrays(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
-        rows, columns = (index.ravel().astype(np.int32) for index in pair)
+        rows, columns = pairs(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
         self._elements, behind = len(rows), pad.back_dofs if pad.back else pad.back_dofs[:0]
         self.rows = np.concatenate([rows, np.repeat(behind, len(behind))])
         self.columns = np.concatenate([columns, np.tile(behind, len(behind))])
@@ -272,7 +272,7 @@ class Foam:
         self._none = np.empty((0, 0, 0, 0, 0))
 
     def force(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """Internal force on every unknown ``(size,)`` [N], the sheet's in its closing, and the smallest ``det F``."""
+        """Internal force on every unknown ``(size,)`` [N], the plate's in its closing, and the smallest ``det F``."""
         smallest = self._evaluate(x, self._none)
         R = gather(self._dofs, self._r, self.pad.size)
         if self.pad.back:
@@ -285,12 +285,12 @@ class Foam:
         if self.pad.back:
             out[self._elements :] = self.pad.back.K.ravel()
 
-    def sheet_force(self, x: FloatArray) -> float:
-        """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
+    def normal_force(self, x: FloatArray) -> float:
+        """Normal force on the whole pad that the backing plate must exert at ``x`` [N]."""
         return float(self.force(x)[0][self.pad.closing_dof]) / self.pad.share
 
     def shorten(self, x: FloatArray, step: FloatArray, longest: float) -> float:
-        """Factor that keeps the change of closing below ``longest`` [m] and the squeezing of elements within reason."""
+        """Factor that keeps the change of closing below ``longest`` [m] and ``det F`` above `SMALLEST_DET`."""
         factor = min(1.0, longest / max(abs(step[self.pad.closing_dof]), 1e-300))
         for _ in range(12):
             if smallest_det(self._displacements(x - factor * step), self.pad.dN) > SMALLEST_DET:
@@ -310,8 +310,3 @@ class Foam:
 
     def _displacements(self, x: FloatArray) -> FloatArray:
         return np.ascontiguousarray(self.pad.displacement(x)[self.pad.element_nodes].transpose(0, 2, 1))
-
-
-def gather(dofs: NDArray[np.int32], values: FloatArray, size: int) -> FloatArray:
-    """Sum element values into a vector; fixed unknowns (index -1) fall off the front."""
-    return np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:]

@@ -19,7 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
 
+from softjaw.fem.assembly import Pattern, pairs
 from softjaw.fem.shell import element_kernel as kernel
 from softjaw.fem.shell.element_kernel import A_0, A_G, B_0, B_G, GAUSS, N_G, STRAINS, FloatArray
 
@@ -247,22 +249,18 @@ class Shell:
     def _build_pattern(self) -> None:
         """Blocks of 6 x 6 between nodes that share an element."""
         nodes, n = self.elements.nodes, len(self.mesh.X)
-        keys = (nodes[:, :, None].astype(np.int64) * n + nodes[:, None, :]).ravel()
-        loose = np.arange(n, dtype=np.int64) * (n + 1)
-        blocks, position = np.unique(np.concatenate([keys, loose]), return_inverse=True)
-        row, neighbour = blocks // n, blocks % n
-        first = np.searchsorted(row, np.arange(n + 1))
-        count = np.diff(first)
+        rows, columns = pairs(nodes[:, :, None], nodes[:, None, :])
+        graph = Pattern(n, rows, columns)
+        count = np.diff(graph.start)
+        row = np.repeat(np.arange(n), count)
+        # the kernel adds whole blocks: where each begins, and how far apart its six rows are
+        place = 36 * graph.start[row] + 6 * (np.arange(len(row)) - graph.start[row])
+        self._place = place[graph.slots(rows, columns)].reshape(-1, 4, 4).astype(np.int32)
         self._width = (6 * count).astype(np.int32)
-        place = 36 * first[row] + 6 * (np.arange(len(blocks)) - first[row])
-        self._place = place[position[: keys.size]].reshape(-1, 4, 4).astype(np.int32)
-        self.start = np.concatenate([[0], np.cumsum(np.repeat(6 * count, 6))]).astype(np.int32)
-        self.column = np.empty(self.start[-1], dtype=np.int32)
-        for k in range(6):
-            for m in range(6):
-                self.column[place + k * 6 * count[row] + m] = 6 * neighbour + m
-        where = np.repeat(np.arange(self.size), np.diff(self.start)) == self.column
-        self._diagonal = np.flatnonzero(where)
+        blocks = np.zeros((len(row), 6, 6))
+        matrix = bsr_matrix((blocks, graph.column, graph.start), shape=(self.size, self.size)).tocsr()
+        self.start, self.column = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+        self._diagonal = np.flatnonzero(np.repeat(np.arange(self.size), np.diff(self.start)) == self.column)
 
     @property
     def nodes(self) -> int:

@@ -25,7 +25,7 @@ def shape(xi: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray, Floa
 GAUSS = CORNERS / np.sqrt(3.0)
 SIDES = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])  # 2 E13 on the first two, 2 E23 on the others
 N_G, A_G, B_G = shape(*GAUSS.T)
-N_0, A_0, B_0 = (value[0] for value in shape(np.zeros(1), np.zeros(1)))
+_, A_0, B_0 = (value[0] for value in shape(np.zeros(1), np.zeros(1)))
 N_S, A_S, B_S = shape(*SIDES.T)
 S_S = np.concatenate([A_S[:2], B_S[2:]])  # derivative along xi on the first two sides, along eta on the others
 

@@ -39,29 +39,10 @@ class Supported:
         Has the weak springs in ``shell.springs``.
     fixed : (6 k,) array of bool
         Numbers that are zero: by the planes of symmetry and by the support.
-    held : (6 k,) array of bool
-        Those of them that the support fixes.
-    symmetry : (bool, bool)
-        As the mesh's.
     """
 
     shell: Shell
     fixed: FloatArray
-    held: FloatArray
-    symmetry: tuple[bool, bool]
-
-    def reaction(self, q: FloatArray, load: FloatArray | None = None) -> FloatArray:
-        """Force ``(3,)`` [N] of the whole body's support and weak springs on it in the equilibrium ``q (6 k,)``.
-
-        ``load (6 k,)`` are the outer forces on the held numbers, none by default. In a frictionless grasp of a slope
-        this is what the pads fail to hold: more than friction could carry means that the body slides out.
-        """
-        force = -self.shell.springs * q
-        at = self.held
-        force[at] = self.shell.residual(q)[at] - (0.0 if load is None else load[at])
-        total = force.reshape(-1, 6)[:, :3].sum(axis=0) * 2.0 ** sum(self.symmetry)
-        total[:2][list(self.symmetry)] = 0.0  # the other side's cancel
-        return total
 
 
 def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = WEAK) -> Supported:
@@ -89,8 +70,7 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
     shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
     held = np.zeros((shell.nodes, 6), dtype=bool)
     SUPPORTS[support](mesh, held)
-    held = held.ravel() & ~mesh.symmetric
-    return Supported(shell, held | mesh.symmetric, held, mesh.symmetry)
+    return Supported(shell, held.ravel() | mesh.symmetric)
 
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:

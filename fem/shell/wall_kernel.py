@@ -1,9 +1,9 @@
 """Compiled loop over the points of a pad that press on a deformable wall.
 
 At a point with the pressure ``p = sum N_i lam_i`` the pad's node ``b`` gets ``-p dA N_b n`` and the wall's node ``a``
-gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Points that face no wall are left out
-of both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``facing``. Pad quantities are
-in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
+gets ``p dA N_a n``; the weighted gap of a contact node is ``int N_i g dA``. Points that face no wall are left out of
+both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``facing``. Pad quantities are in the
+pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
 
 A node of the wall has unknowns ``first``, the displacement of the middle, and ``second``, the change of the director:
 both move the outer face, and so the same force works on both.

@@ -120,12 +120,3 @@ def faces(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
         strain = np.dstack([membrane + zeta * bending, shear])
         states.append(FaceState(strain, strain @ C))
     return states[0], states[1]
-
-
-def largest(shell: Shell, q: FloatArray) -> dict[str, float]:
-    """Largest equivalent stress [Pa] and principal strain (by size) of each face: what a wall has to bear."""
-    result = {}
-    for name, face in zip(("outer", "inner"), faces(shell, q), strict=True):
-        result[f"{name}_von_mises"] = float(face.von_mises.max())
-        result[f"{name}_strain"] = float(np.abs(face.principal_strain).max())
-    return result

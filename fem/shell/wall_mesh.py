@@ -79,13 +79,11 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
 
 
 def along(
-    surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, hole: float, marks: Sequence[float] = ()
+    surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, marks: Sequence[float] = ()
 ) -> FloatArray:
     """Grid lines along the outline, with one on the edge of each flat lid and at each of the places ``marks``."""
-    begin = surface.wall[0] if open_bottom else hole
+    begin = surface.wall[0] if open_bottom else 0.0
     end = surface.wall[1] if open_top else surface.end
-    if hole > 0 and not (hole < surface.flat[0] and not open_bottom):
-        raise ValueError(f"a hole of radius {hole:g} m needs a flat bottom that is larger")
     low, high = (surface.station(z) for z in size.heights)
     x = np.linspace(begin, end, SAMPLES)
     off = np.maximum(np.maximum(low - x, x - high), 0.0)
@@ -156,14 +154,10 @@ class BodyMesh(ShellMesh):
         """Part of the body that is meshed: 1, 1/2 or 1/4."""
         return 0.5 ** sum(self.symmetry)
 
-    def ring(self, s: float) -> IntArray:
-        """Nodes of the grid line nearest to the place s on the outline."""
-        return np.unique(self.number[:, np.abs(self.s - s).argmin()])
-
     @property
     def foot(self) -> IntArray:
         """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
-        return self.ring(self.surface.flat[0])
+        return np.unique(self.number[:, np.abs(self.s - self.surface.flat[0]).argmin()])
 
     def locate(self, theta: ArrayLike, s: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
         """Nodes ``(n, 4)``, shape functions ``N (n, 4)`` and their derivatives by theta and s ``(n, 2, 4)`` at points.
@@ -195,7 +189,6 @@ def body_mesh(
     open_top: bool = True,
     open_bottom: bool = False,
     base_thickness: float | None = None,
-    hole: float = 0.0,
 ) -> BodyMesh:
     """Mesh of the wall inside a surface; its outer face lies on the surface.
 
@@ -211,8 +204,6 @@ def body_mesh(
         Whether the mesh ends at the last or begins at the first given section instead of on the axis.
     base_thickness : float, optional
         Thickness of the flat bottom [m]; the rim above it changes over to the wall's.
-    hole : float
-        Radius of a hole left open in the middle of a flat bottom [m]; without one the elements there are triangles.
 
     Raises
     ------
@@ -222,7 +213,7 @@ def body_mesh(
     for plane, wanted, found in zip("xy", symmetry, surface.symmetric, strict=True):
         if wanted and not found:
             raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
-    s = along(surface, size, open_bottom, open_top, hole, _steps(surface, thickness))
+    s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
     number, first = _numbers(surface, theta, s, whole=not any(symmetry))
     t, p = theta[first[0]], s[first[1]]

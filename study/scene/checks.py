@@ -95,8 +95,8 @@ def _element_edges(gripper: Gripper) -> list[tuple[float, float]]:
     return edges
 
 
-def _sheet(gripper: Gripper, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
-    """The finger holds the sheet by at least one node of every mesh; with even counts one is in the middle."""
+def _backing_plate(gripper: Gripper, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
+    """The finger holds the backing plate by at least one node of every mesh; with even counts one is in the middle."""
     if effects.sheet == "rigid":
         return
     counts = [gripper.elements[:2], [-(-n // 2) for n in gripper.elements[:2]]][: accuracy.meshes]
@@ -199,7 +199,7 @@ def _uncertain(own: Uncertainty, shape: Any, friction: Friction, sweep: Mapping[
 CHECKS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Finding]]], ...] = (
     (("object",), grasps.object_findings), (("object", "effects"), grasps.wall_findings),
     (("object", "effects"), _coupling), (("gripper", "effects"), _pad_mesh), (("gripper",), _pad_material),
-    (("gripper", "effects", "accuracy"), _sheet), (("candidates",), grasps.candidate_findings),
+    (("gripper", "effects", "accuracy"), _backing_plate), (("candidates",), grasps.candidate_findings),
     (("object", "candidates"), grasps.station_findings),
     (("object", "candidates", "gripper"), grasps.pose_findings),
     (("load",), lambda load: grasps.twice(("load", "normal_force_n"), load.normal_force_n)),

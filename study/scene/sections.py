@@ -46,12 +46,12 @@ class Gripper(Section):
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
     grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
-    grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its front")
-    sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the sheet behind the pad")
-    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the sheet; steel has 200")
-    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the sheet")
+    grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
+    sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
+    sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel has 200")
+    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
     sheet_support_mm: Annotated[tuple[Extent, Extent], Field(strict=False)] = Field(
-        (20.0, 10.0), description="length and width of the patch in the sheet's middle that the finger holds"
+        (20.0, 10.0), description="length and width of the patch in the plate's middle that the finger holds"
     )
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
@@ -230,7 +230,7 @@ class Effects(Section):
         "auto", description="the object's compliance; the shells need object.wall_mm"
     )
     sheet: Literal["auto", "rigid", "elastic"] = Field(
-        "auto", description="the sheet behind the pad: rigid, or a plate that bends"
+        "auto", description="the pad's backing plate: rigid, or a plate that bends"
     )
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
     fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")

@@ -31,7 +31,7 @@ MU = 0.8
 def pressed_states(ratio, elements, forces, symmetry=(True, True), contact="weighted", element="hex8"):
     pad = Pad(PadShape(SIZE, elements, element=element), FOAM, symmetry, contact)
     gap = reference.placed(EllipticCylinder(A, ratio * A, 0.2), reference.facing(A))
-    return pad, list(Press(pad, gap).ladder(forces))
+    return pad, list(Press(pad, gap).load_path(forces))
 
 
 def figures(ratio, elements, element="hex8"):

@@ -24,7 +24,7 @@ FINE = WallMesh(0.00085, 0.0025, 0.005)
 def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, support="standing", theta=0.0):
     """Ladder over FORCES."""
     body = thin(thickness, support=support)
-    return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).ladder(FORCES))
+    return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).load_path(FORCES))
 
 
 def e_n(finger):
@@ -101,10 +101,10 @@ def test_fingers_object_and_support_are_in_balance(support):
 
 def test_a_very_stiff_wall_is_a_rigid_object():
     stiff = thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")
-    soft = list(grip(stiff).ladder(FORCES))
+    soft = list(grip(stiff).load_path(FORCES))
     pad = soft[0].fingers[0].pad
     press = Press(pad, _gap(pose(0.0, 0.075)))
-    for a, b in zip(soft, press.ladder(FORCES), strict=True):
+    for a, b in zip(soft, press.load_path(FORCES), strict=True):
         assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
         np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
@@ -143,7 +143,7 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
         x = step.solve(x, Control(closing=closing), work)
         expected = PROTOTYPE[thickness].get(round(closing * 1e3, 6))
         if expected:
-            F = held.problem.sheet_force(x)
+            F = held.problem.normal_force(x)
             assert F == pytest.approx(expected[0], rel=0.035)
             finger = held._gripped(x, F, False, work, held.solver.seconds).fingers[0]
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)

@@ -204,7 +204,7 @@ def traced_can(facet=0.0015):
 
 def test_a_traced_can_between_two_fingers_is_the_can():
     """Force 1 N and 3 N; the facets' sagitta is 8 um, the travels are about 1 mm."""
-    exact, found = (list(grip(body).ladder((1.0, 3.0))) for body in (thin(), traced_can()))
+    exact, found = (list(grip(body).load_path((1.0, 3.0))) for body in (thin(), traced_can()))
     for a, b in zip(exact, found, strict=True):
         assert b.fingers[0].closing == pytest.approx(a.fingers[0].closing, rel=0.01)
         assert e_n(b.fingers[0]) == pytest.approx(e_n(a.fingers[0]), rel=0.01)

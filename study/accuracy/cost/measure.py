@@ -167,7 +167,7 @@ def calibration_seconds() -> float:
 
     Runs on two machines compare by their seconds over this one.
     """
-    from softjaw.fem.contact.pattern import Pattern
+    from softjaw.fem.assembly import Pattern
     from softjaw.fem.petsc import Factors
 
     n = CALIBRATION
