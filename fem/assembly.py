@@ -28,6 +28,7 @@ class Pattern:
 
     def __init__(self, size: int, rows: IntArray, columns: IntArray) -> None:
         self.size = size
+# MUMPS and the bounded solver expect a diagonal entry in every row, also where it is zero
         diagonal = np.arange(size, dtype=np.int64) * (size + 1)
         self._set(np.unique(np.concatenate([self._keys(rows, columns), diagonal])))
 
@@ -41,6 +42,7 @@ class Pattern:
         """Store these entries too; returns where each old entry has moved to, or None if nothing was new."""
         wanted = np.unique(self._keys(rows, columns))
         place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+# `searchsorted` may point behind the last key, hence the minimum above; such a key is new anyway
         new = wanted[self.keys[place] != wanted]
         if not len(new):
             return None
@@ -63,6 +65,7 @@ class Pattern:
 @njit(cache=True)
 def add_up(slots, values, out):
     """Add every value to its slot of the compressed rows."""
+# entries that share a slot add up, which indexing with `slots` would not do
     for k in range(slots.size):
         if slots[k] >= 0:
             out[slots[k]] += values[k]
@@ -81,4 +84,4 @@ def shifted(index: IntArray, offset: int) -> IntArray:
 
 def gather(dofs: IntArray, values: FloatArray, size: int) -> FloatArray:
     """Sum element values into a vector ``(size,)``; those of fixed unknowns (index -1) fall into a slot that is cut."""
-    return np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:]
+    return np.asarray(np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:], dtype=float)

@@ -46,6 +46,7 @@ def take_buffers(*others: Callable[[], object]) -> None:
         Where addresses are too few for one of them.
     """
     one = np.eye(2)
+# the addresses are only reserved, not touched: the look costs no memory
     for operation in (lambda: np.linalg.solve(one, one), lambda: scipy.linalg.lu_factor(one), *others):
         try:
             mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
@@ -84,6 +85,7 @@ def _dense_factors() -> None:
 
 
 take_buffers(_dense_factors)
+# without the log PETSc keeps no times of its own
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
@@ -174,6 +176,7 @@ class NonlinearSolver:
         snes.setFunction(self._on_residual, self._f)
         snes.setJacobian(self._on_tangent, self._matrix)
         ksp = snes.getKSP()
+# direct factors: contact makes the matrix indefinite or not symmetric, and thin walls make it ill-conditioned
         ksp.setType("preonly")
         ksp.getPC().setType("lu")
         ksp.getPC().setFactorSolverType("mumps")
@@ -221,6 +224,7 @@ class NonlinearSolver:
         """
         snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
         _, _, _, limit = snes.getTolerances()
+# relative and step tolerances are off, so a solve ends by the force out of balance alone
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
         self._norms, self._goal, self._limit = [], tolerance, iterations or limit
@@ -228,6 +232,7 @@ class NonlinearSolver:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
         except PETSc.Error as error:
+# factors that failed half way must not be taken for those of the next solve
             snes.getKSP().getPC().reset()
             raise ConvergenceError(
                 f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something moves without force"
@@ -238,6 +243,7 @@ class NonlinearSolver:
             self.seconds.total += time.perf_counter() - start
             self.seconds.factorisation += factorisation_seconds() - factor
         reason, done = snes.getConvergedReason(), snes.getIterationNumber()
+# too little memory looks like a singular matrix to PETSc, but shorter load steps would not help
         if reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE and self._out_of_memory():
             snes.getKSP().getPC().reset()
             raise MemoryError(f"for the factors of {self.problem.size} unknowns")
@@ -265,6 +271,7 @@ class NonlinearSolver:
         matrix = PETSc.Mat().createAIJ(
             self._matrix.size, csr=(self._pattern.start, self._pattern.column, values), comm=PETSc.COMM_SELF
         )
+# MUMPS counts negative pivots only in a symmetric factorisation; by Sylvester's law they are the eigenvalues'
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         factors = PETSc.PC().create(PETSc.COMM_SELF)
         factors.setType("cholesky")
@@ -319,8 +326,10 @@ class NonlinearSolver:
         keep, norms = getattr(self.problem, "keep", None), self._norms
         if keep is None or self.problem.complementarity:
             return False
+# the first step of a solve: exact enough if it starts where the last solve ended
         if len(norms) == 1:
             return self.is_at(x) and keep(x, True)
+# near the limit of iterations Newton's quadratic end is worth its factorisation
         if not self.thrifty or len(norms) > self._limit - RESERVED:
             return False
         return norms[-1] <= min(FAST * norms[-2], NEAR * self._goal) and keep(x, False)
@@ -328,6 +337,7 @@ class NonlinearSolver:
     def _grow(self) -> None:
         """Give the matrix the pattern's new rows; its factors are analysed anew."""
         self._stored = self._pattern.start
+# the old symbolic analysis belongs to the old pattern
         self._matrix.setPreallocationCSR((self._pattern.start, self._pattern.column, self._pattern.values))
         self._snes.getKSP().getPC().reset()
 
@@ -343,6 +353,7 @@ def _set_values(matrix: PETSc.Mat, values: FloatArray) -> None:
 
     petsc4py goes through ``MatSetValues``, which looks for the place of every single one.
     """
+# the array of a sequential AIJ matrix is the values in the order of its rows, as in `Pattern`
     lib, stored = ctypes.CDLL(PETSc.__file__), ctypes.POINTER(ctypes.c_double)()
     handle = ctypes.c_void_p(matrix.handle)
     lib.MatSeqAIJGetArray(handle, ctypes.byref(stored))
@@ -389,6 +400,7 @@ class Factors:
         X = np.empty(columns.shape, order="F")
         for k in range(0, columns.shape[1], self.COLUMNS):
             part = np.asfortranarray(columns[:, k : k + self.COLUMNS])
+# dense PETSc matrices take over the memory they are given, so each gets an array of its own
             right, left = (
                 PETSc.Mat().createDense(part.shape, array=a, comm=PETSc.COMM_SELF)
                 for a in (part.copy(order="F"), np.zeros_like(part, order="F"))

@@ -192,6 +192,7 @@ class Stepping:
             try:
                 x = self.solve(x, Control(force=target), work, self.most)
             except ConvergenceError:
+# halves only: the length that worked last is kept, because the rest of the way is not easier
                 fraction *= 0.5
                 if fraction < self.settings.min_step:
                     if not by_displacement:
@@ -231,6 +232,7 @@ class Stepping:
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
         """State at ``force`` between two on the path; Newton's method may jump to one further on, which is refused."""
+# a linear start between two neighbouring states is nearer than either of them
         share = (force - low[1]) / (high[1] - low[1])
         x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work, self.most)
         ends = self.problem.closing(low[0]), self.problem.closing(high[0])
@@ -253,6 +255,7 @@ class Stepping:
                 closing, failure = 0.6 * closing, str(error)
                 continue
             reached = self.problem.normal_force(x)
+# too little force is a state of a few nodes at the rim, a bad place to start the path from
             if reached > FIRMLY * force:
                 return x, reached
             best = (x, reached) if reached > BARELY * force else best
@@ -314,6 +317,7 @@ class Following(Stepping):
                 continue
             ahead = self._place(x, target, None)
             leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
+# a state may have converged and still belong to another branch: it is judged before it is passed on
             if leaves or forks or ahead.strain - here.strain > FOLD:
                 if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
@@ -368,6 +372,7 @@ class Following(Stepping):
             off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.thickness:
                 return True
+# strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
         grown = ahead.strain - here.strain
         return grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
 

@@ -139,7 +139,7 @@ class Press(LoadPath):
             except ConvergenceError:
                 if self.fallback is None:
                     raise
-                x = self._from_first_contact(force, work)
+                x = self._from_first_contact(self.fallback, force, work)
             if below is not None:
                 refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
@@ -150,12 +150,12 @@ class Press(LoadPath):
                 self._stepping.jumped,
             )  # fmt: skip
 
-    def _from_first_contact(self, force: float, work: Work) -> FloatArray:
-        """State at ``force`` of the fallback pad, else of the pad itself beyond a jump; both from first contact on.
+    def _from_first_contact(self, nodal: Pad, force: float, work: Work) -> FloatArray:
+        """State at ``force`` of the pad with nodal gaps, else of the pad itself beyond a jump, from first contact on.
 
         All forces that follow keep to the pad that was found to serve.
         """
-        pads, self.fallback, errors = (self.fallback, self.pad), None, []
+        pads, self.fallback, errors = (nodal, self.pad), None, []
         for pad in pads:
             self.pad = pad
             self._start_again()

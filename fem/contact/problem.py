@@ -123,7 +123,7 @@ class PressedPad:
 
     def nodal(self, values: FloatArray) -> FloatArray:
         """Sums ``(n,)`` over the facets of values ``(facets, k)`` at their nodes."""
-        return np.bincount(self.nodes.ravel(), values.ravel(), len(self.area))
+        return np.asarray(np.bincount(self.nodes.ravel(), values.ravel(), len(self.area)), dtype=float)
 
     def active(self, length: FloatArray, weighted_gap: FloatArray) -> NDArray[np.bool_]:
         """Active set ``(n,)`` of the unknowns ``length = p / kappa`` [m] and the weighted gaps [m^3]."""
@@ -205,6 +205,7 @@ class ContactProblem(PressedPad):
             R[self.closing_dof] = self.closing_stiffness * (x[self.closing_dof] - self.control.closing)
         else:
             R[self.closing_dof] -= self.control.force * self.pad.share
+# vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
         if self.complementarity:
             R[self.pressures] = self.kappa * weighted_gap
         else:
@@ -250,6 +251,7 @@ class ContactProblem(PressedPad):
         load = np.zeros(self.size)
         load[self.closing_dof] = 1.0
         change = answer(load)
+# beyond a limit point the closing grows while the force falls: nothing can be foretold by force
         if not change[self.closing_dof] > 0.0:
             return None
         if self._by_force:
@@ -323,6 +325,7 @@ class SpringBed:
     def height(self) -> FloatArray:
         """Distance along the approach from the undeformed contact nodes to the object, roughly ``(n,)`` [m]."""
         gap, normal, _ = self.gap(self.pad.nodes[self.pad.contact_nodes])
+# along the approach, not along the normal; 0.2 bounds it where the object turns away from the pad
         return np.maximum(gap, 0.0) / np.maximum(-normal[:, 2], 0.2)
 
     def force(self, closing: float) -> float:
@@ -340,6 +343,7 @@ class SpringBed:
         low, high = 0.0, 1e-3 * self.pad.shape.size[2]
         while self.force(high) < force and high < 10 * self.pad.shape.size[2]:
             high *= 2.0
+# bisection: the bed's force is monotonous but has kinks wherever a column touches
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.force(middle) < force else (low, middle)

@@ -38,6 +38,7 @@ class BackStiffness:
     K: FloatArray
 
 
+# both fingers and all candidates share few plates: one per mesh and symmetry
 @lru_cache(maxsize=8)
 def back_stiffness(
     x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate
@@ -59,8 +60,10 @@ def back_stiffness(
     moving = free.reshape(-1, 3)[nodes].ravel()
     C = C[np.ix_(moving, moving)]
     approach = np.tile([0.0, 0.0, 1.0], len(nodes))[moving]
+# the compliance is symmetric but for rounding; Cholesky needs it exactly, and so does a symmetric tangent
     S = cho_solve(cho_factor(0.5 * (C + C.T)), np.eye(len(C)))
     S = 0.5 * (S + S.T)
+# a rigid motion along the approach needs no force: the finger's row and column follow from equilibrium
     Se = S @ approach
     return BackStiffness(free, np.block([[S, -Se[:, None]], [-Se[None], np.atleast_2d(approach @ Se)]]))
 
@@ -87,6 +90,7 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     """Shell of the plate, its fixed numbers ``(6 k,)`` and the free displacements of its face (rows, columns, 3)."""
     X = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
     shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), plate.thickness), plate.young_modulus, plate.poisson_ratio)
+# nodes on the rim count as held, whatever rounding makes of their place
     rim = 0.5 * np.array(plate.support) + CLOSE * (np.ptp(x) + np.ptp(y))
     held = (np.abs(X[..., :2]) <= rim).all(axis=-1)
     if not held.any():

@@ -23,6 +23,7 @@ from softjaw.fem.pad.shape import BackingPlate, PadShape
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+# these orders give 2 x 2 x 2 and 3 x 3 x 3 Gauss points
 BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
 SIDES = {2: (ElementLineP1(), [0, 1]), 3: (ElementLineP2(), [0, 2, 1])}  # element along a side, its nodes in order
 
@@ -79,6 +80,7 @@ class Pad:
         basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
         self.nodes = np.ascontiguousarray(basis.doflocs.T)
         self.element_nodes = np.ascontiguousarray(basis.element_dofs.T.astype(np.int32))
+# scikit-fem broadcasts gradients that do not change from element to element; the kernel needs them all
         gradients = np.stack([np.broadcast_to(b[0].grad, (3, *basis.dx.shape)) for b in basis.basis])
         self.dN = np.ascontiguousarray(gradients.transpose(2, 3, 1, 0))
         self.volume = np.ascontiguousarray(basis.dx)
@@ -87,6 +89,7 @@ class Pad:
 
     def _number_unknowns(self, basis: Basis) -> None:
         """Number free displacements, then the closing displacement, then one pressure per node of the contact face."""
+# node positions come out of scikit-fem's map with rounding; mesh lines lie much further apart
         tol, count = 1e-9 * max(self.shape.size), len(self.nodes)
 
         def on_plane(axis: int, place: float) -> NDArray[np.int64]:
@@ -97,6 +100,7 @@ class Pad:
         back_nodes, _ = _as_grid(self.nodes, on_plane(2, -self.shape.size[2]), tol)
         free = np.ones((count, 3), dtype=bool)
         self.back = self._on_plate(back_nodes)
+# an elastic plate leaves all of the back free that neither the finger nor a plane of symmetry holds
         free[back_nodes] = self.back.free.reshape(-1, 3) if self.back else False
         for axis in range(2):
             if self.symmetry[axis]:
@@ -171,6 +175,7 @@ def _as_grid(nodes: FloatArray, chosen: NDArray[np.int64], tol: float) -> tuple[
 
 def _lines(x: FloatArray, tol: float) -> IntArray:
     """Number ``(n,)`` of the mesh line of every coordinate; nodes inside elements are off it by rounding."""
+# consecutive coordinates that differ by more than rounding begin another line
     order = np.argsort(x)
     number = np.empty(len(x), dtype=np.int32)
     number[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > tol)])
@@ -182,6 +187,7 @@ def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     if contact == "weighted":
         (points,), weights = get_quadrature(RefLine, 2 * per_side - 1)
     elif contact == "nodal":
+# Lobatto points are the nodes: the shape functions become the identity, and each node has a gap of its own
         points = np.linspace(0.0, 1.0, per_side)
         weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
     else:

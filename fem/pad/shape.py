@@ -53,7 +53,8 @@ class PadShape:
 
     def halved(self) -> PadShape:
         """The same pad with half as many elements in every direction, rounded up."""
-        return PadShape(self.size, tuple(-(-n // 2) for n in self.elements), self.grading, self.element)
+        length, width, depth = (-(-n // 2) for n in self.elements)
+        return PadShape(self.size, (length, width, depth), self.grading, self.element)
 
     def lines(self, axis: int, half: bool) -> FloatArray:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""

@@ -60,18 +60,17 @@ class Opening:
         self._across = None if mesh.symmetry[0] else back
         if self._across is not None:
             self._across = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]]
-        self._whole = 1.0
-        self._whole = self._distances(np.zeros(mesh.X.size * 2))
+        self._whole = self._apart(np.zeros(mesh.X.size * 2))
         self.last = 1.0, 0.0
 
     def __call__(self, q: FloatArray) -> float:
         """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
-        return float(self._distances(q).min())
+        return float((self._apart(q) / self._whole).min())
 
-    def _distances(self, q: FloatArray) -> FloatArray:
+    def _apart(self, q: FloatArray) -> FloatArray:
         parts = q.reshape(-1, 6)
         x = self._inner[:, 0] + parts[:, 0] - parts[:, 3]
-        return (x[self._near] - (-x[self._near] if self._across is None else x[self._across])) / self._whole
+        return x[self._near] - (-x[self._near] if self._across is None else x[self._across])
 
     def watch(self, q: FloatArray, force: float) -> None:
         """Note the state at a force [N] of the fingers.
@@ -199,6 +198,7 @@ class Grip(LoadPath):
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found, or that it may have."""
         left, force = self.opening.last
+# the opening tells a wall that has collapsed from a solve that failed for another reason
         if left < limit:
             closer = f"its opposite sides have come {1 - left:.0%} of their distance closer"
             if left < FOLDED:
@@ -219,6 +219,7 @@ class Grip(LoadPath):
             x, reached = self._stepping.first(closing, force, work)
             compliance = self.problem.closing(x) / reached  # foam gets stiffer, so this is more than what comes
         ahead, fell = self._step_to(x, reached, force, compliance, work)
+# the first contact may have more force than the first level asks for: no slope yet
         if not force > reached:
             return ahead, np.inf, fell
         slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
@@ -286,5 +287,6 @@ class Grip(LoadPath):
 
     def _reaction(self, load: FloatArray) -> FloatArray:
         """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""
+# forces across a plane of symmetry cancel with those of the other half; the others add up
         mirrored = np.array([*self.mirrors, False])
         return np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()

@@ -102,7 +102,8 @@ class GripProblem:
 
     @control.setter
     def control(self, control: Control) -> None:
-        self._control, self._before = control, None
+        self._control = control
+        self._before: FloatArray | None = None
 
     def _build_pattern(self) -> None:
         """Everything but the couplings between pads and wall, which come as pads touch."""
@@ -149,6 +150,7 @@ class GripProblem:
         R, wall_force = np.zeros(self.size), self._no_force()
         try:
             contacts = self._contact(x, wall_force)
+# a point without a place on the wall: refuse the step, a shorter one will find it
         except ArithmeticError:
             return np.full(self.size, np.nan)
         self._active_set = np.concatenate([c.active for c in contacts])
@@ -183,6 +185,7 @@ class GripProblem:
         self._tangent_set = np.concatenate([c.active for c in contacts])
         for f, values in zip(self.fingers, self._values, strict=True):
             f.foam.stiffness(x[f.own], values)
+# adding the contact may find entries without a place; the pattern grows and all is filled once more
         while True:
             self._fill(wall, contacts)
             if all([self._add_contact(f, c) for f, c in zip(self.fingers, contacts, strict=True)]):
@@ -235,6 +238,7 @@ class GripProblem:
         rows, columns = [], []
         for f, c in zip(self.fingers, contacts, strict=True):
             points = f.pad.face_N.shape[0]
+# facets that already press, or that the next iteration may close
             near = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
             faces = np.repeat(np.arange(len(f.nodes)), points)
             pick = near[faces] & (c.facing.gap < FAR)

@@ -87,6 +87,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
     for f in range(area.shape[0]):
         engaged = False
         for i in range(k):
+# facets that neither press nor are about to have no couplings, and most have none
             engaged = engaged or active[f, i] or lam[f, i] != 0.0
         if not engaged:
             continue
@@ -139,6 +140,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
                 for j in range(t + 24 + (0 if gap_row else k)):
                     if column_dof[j] < 0:
                         continue
+# columns ascend within a row, so bisection finds the slot; a missing one makes the caller grow the pattern
                     place = low + np.searchsorted(column[low:high], column_dof[j])
                     if place == high or column[place] != column_dof[j]:
                         complete = False

@@ -13,6 +13,7 @@ from softjaw.fem.assembly import Pattern, add_up
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.petsc import Factors
 from softjaw.fem.shell.element import FloatArray, IntArray, Shell
+from softjaw.fem.shell.wall_mesh import BodyMesh
 
 AT_ONCE = 192  # right-hand sides; bounds the memory
 LOOSE = 1e15  # ratio of the largest to the smallest stiffness from which on a shell counts as loose
@@ -45,6 +46,7 @@ class LinearShell:
     def _refuse_loose(self, stiffest: float) -> None:
         """Rounding keeps a loose body's pivots from being exactly zero; its displacements are beyond all bounds."""
         load = np.zeros(self.shell.size)
+# any load with a share of every motion will do; the seed keeps a run the same to the bit
         load[self.free] = np.random.default_rng(0).normal(size=len(self.free))
         ratio = stiffest * np.abs(self.solve(load)).max() / np.abs(load).max()
         if not ratio < LOOSE:
@@ -69,6 +71,7 @@ class LinearShell:
         """
         u = (6 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()
         C, W = np.empty((len(u), len(u))), np.empty((len(u), len(u)))
+# the whole load matrix of a fine wall would not fit into memory
         for k in range(0, len(u), AT_ONCE):
             part = u[k : k + AT_ONCE]
             load = np.zeros((self.shell.size, len(part)))
@@ -100,7 +103,7 @@ class NonlinearWall:
         Of `tangent`'s values.
     """
 
-    def __init__(self, shell: Shell, fixed: FloatArray) -> None:
+    def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
         self.shell = shell
         unknown, self.free = free_numbers(fixed)
         self.size = len(self.free)
@@ -136,7 +139,7 @@ class LinearWall(NonlinearWall):
     does not pay: its compliance is dense, and dearer to factorise than the whole sparse stiffness.
     """
 
-    def __init__(self, shell: Shell, fixed: FloatArray) -> None:
+    def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
         super().__init__(shell, fixed)
         self._values = shell.tangent(np.zeros(shell.size))
         pattern = _matrix(self.size, self.entries, self._values)
