@@ -18,8 +18,7 @@ from softjaw.fem.shell.thin_walled import ThinWalled, supported
 from softjaw.fem.shell.wall_material import wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell
-from tests.fem.grips import can, grip, thin
-from tests.fem.test_grip import e_n
+from tests.fem.grips import can, e_n, grip, thin
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 PET = wall_material("pet")

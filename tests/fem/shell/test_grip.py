@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial
-from softjaw.friction.frame import contact_frame, in_frame
-from softjaw.friction.wrench import friction_limits
-from tests.fem.grips import _gap, grip, pose, thin
+from tests.fem.grips import _gap, e_n, grip, pose, thin
 
 FORCES = (0.5, 2.0)
 FINE = WallMesh(0.00085, 0.0025, 0.005)
@@ -25,13 +22,6 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
     """Ladder over FORCES."""
     body = thin(thickness, support=support)
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).load_path(FORCES))
-
-
-def e_n(finger):
-    """Eccentricity parameter of one finger's patch, planar reading [m]."""
-    patch = extract(finger.pad, finger)
-    local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
-    return friction_limits(local, 1.0, "pcm").e_n
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from softjaw.fem.shell.wall_model import LinearShell
-from tests.fem import shell_problems
-from tests.fem.shell_path import ShellProblem, follow, load_steps
+from tests.fem.shell import shell_problems
+from tests.fem.shell.shell_path import ShellProblem, follow, load_steps
 
-TABLES = json.loads((Path(__file__).parents[1] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
+TABLES = json.loads((Path(__file__).parents[2] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
 NONLINEAR = {
     "cantilever_end_shear": shell_problems.cantilever,
     "slit_annular_plate": shell_problems.annulus,

@@ -13,8 +13,7 @@ from softjaw.fem.shell.grip import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
-from tests.fem.grips import grip, pose, thin
-from tests.fem.test_grip import e_n
+from tests.fem.grips import e_n, grip, pose, thin
 
 ROUGH = WallMesh(0.004, 0.008, 0.016)
 SIZE = MeshSize((0.0, np.pi), (0.05, 0.10), 0.013, 0.006, 0.012, 0.02)

@@ -10,7 +10,7 @@ from softjaw.fem.shell.thin_walled import supported
 from softjaw.fem.shell.wall_material import WallMaterial, faces, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell
-from tests.fem.shell_path import ShellProblem, load_steps
+from tests.fem.shell.shell_path import ShellProblem, load_steps
 
 FLASK = Revolution(
     np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3
