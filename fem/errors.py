@@ -6,7 +6,7 @@ class ConvergenceError(RuntimeError):
 
 
 class NotReachedError(ConvergenceError):
-    """However far the sheet travelled, the force stayed below the one that was asked for."""
+    """However far the backing plate travelled, the force stayed below the one that was asked for."""
 
 
 class CheckError(RuntimeError):

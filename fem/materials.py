@@ -84,6 +84,7 @@ def principal(C):
     """Eigenvalues ``(3,)`` and eigenvectors (columns) of a symmetric 3 x 3 matrix, by cyclic Jacobi rotations."""
     M, V = C.copy(), np.eye(3)
     for _ in range(30):
+        # relative to the diagonal: 1e-32 of the squares is 1e-16 of the entries, where rotations change nothing
         off = M[0, 1] ** 2 + M[0, 2] ** 2 + M[1, 2] ** 2
         if not off > 1e-32 * (M[0, 0] ** 2 + M[1, 1] ** 2 + M[2, 2] ** 2):
             break
@@ -91,6 +92,7 @@ def principal(C):
             for q in range(p + 1, 3):
                 if M[p, q] == 0.0:
                     continue
+                # the smaller of both angles that make the entry vanish: it converges and keeps nearly equal values
                 theta = 0.5 * (M[q, q] - M[p, p]) / M[p, q]
                 t = (1.0 if theta >= 0 else -1.0) / (abs(theta) + np.sqrt(theta * theta + 1.0))
                 c = 1.0 / np.sqrt(t * t + 1.0)
@@ -150,6 +152,7 @@ def hyperfoam(F, B, J, par, P, A):
     for a in range(3):
         for b in range(3):
             if a != b:
+                # for nearly equal stretches the differences cancel
                 if abs(c[b] - c[a]) > 1e-6 * (c[a] + c[b]):
                     shear[a, b] = (s[b] - s[a]) / (c[b] - c[a])
                 else:  # the limit of the quotient for equal stretches
@@ -239,6 +242,7 @@ def material(
         shear_modulus = float(np.sum(shear_moduli))
     if not shear_modulus > 0:
         raise ValueError(f"material '{law}' needs a positive shear modulus, found {shear_modulus} Pa")
+    # the law has one constant: another Poisson's ratio would be ignored without a word
     if law == "blatz_ko" and poisson_ratio != 0.25:
         raise ValueError(
             f"Blatz-Ko foam has Poisson's ratio 0.25, found {poisson_ratio}; use hyperfoam for other values"

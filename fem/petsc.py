@@ -23,16 +23,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.pattern import Pattern, add_up
+from softjaw.fem.assembly import Pattern
 from softjaw.fem.errors import ConvergenceError
 
 FloatArray = NDArray[np.float64]
+Result = TypeVar("Result")
 ROOM = 160 * 2**20  # bytes that are free before a library is let loose: the largest work memory and what goes with it
 
 
@@ -45,6 +46,7 @@ def take_buffers(*others: Callable[[], object]) -> None:
         Where addresses are too few for one of them.
     """
     one = np.eye(2)
+    # the addresses are only reserved, not touched: the look costs no memory
     for operation in (lambda: np.linalg.solve(one, one), lambda: scipy.linalg.lu_factor(one), *others):
         try:
             mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
@@ -83,6 +85,7 @@ def _dense_factors() -> None:
 
 
 take_buffers(_dense_factors)
+# without the log PETSc keeps no times of its own
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
@@ -94,28 +97,24 @@ PRINTING = re.compile("monitor|view|converged_reason")
 class Problem(Protocol):
     """What a nonlinear problem tells the solver.
 
-    A problem whose couplings change has an attribute ``pattern`` instead of ``rows`` and ``columns``; its ``tangent``
-    fills ``pattern.values``, after it has let the pattern grow where that is needed. A problem with a method ``keep(x,
-    first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it says whether the step from ``x``
-    may. ``first``: the factors are from the end of the solve before, whose solution is ``x``.
+    A problem with a method ``keep(x, first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it
+    says whether the step from ``x`` may. ``first``: the factors are from the end of the solve before, whose solution is
+    ``x``. Unknowns with the index ``non_negative`` are bounded by zero where the solver treats complementarity itself.
     """
 
     size: int
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    pattern: Pattern
+    non_negative: slice
     complementarity: bool
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual ``(size,)``."""
 
-    def tangent(self, x: FloatArray) -> FloatArray:
-        """Values of the entries ``(rows, columns)``; entries that coincide are added."""
+    def tangent(self, x: FloatArray) -> None:
+        """Fill ``pattern.values``; the pattern may grow before."""
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the unknowns; infinite where there are none."""
 
 
 @dataclass
@@ -163,12 +162,10 @@ class NonlinearSolver:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
         self.seconds, self.thrifty = Seconds(), True
-        self._pattern, self._slots = getattr(self.problem, "pattern", None), None
-        if self._pattern is None:
-            self._pattern = Pattern(n, self.problem.rows, self.problem.columns)
-            self._slots = self._pattern.slots(self.problem.rows, self.problem.columns)
+        self._pattern = self.problem.pattern
         self._stored = self._pattern.start
-        self._norms, self._end = [], None  # residual norm of every step of this solve; solution of the one before
+        self._norms: list[float] = []  # of the residual, at every step of this solve
+        self._end: FloatArray | None = None  # solution of the solve before
         self._matrix = PETSc.Mat().createAIJ(
             (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
         )
@@ -179,6 +176,7 @@ class NonlinearSolver:
         snes.setFunction(self._on_residual, self._f)
         snes.setJacobian(self._on_tangent, self._matrix)
         ksp = snes.getKSP()
+        # direct factors: contact makes the matrix indefinite or not symmetric, and thin walls make it ill-conditioned
         ksp.setType("preonly")
         ksp.getPC().setType("lu")
         ksp.getPC().setFactorSolverType("mumps")
@@ -186,7 +184,8 @@ class NonlinearSolver:
             snes.setFromOptions()
         self.problem.complementarity = snes.getType().startswith("vi")
         if self.problem.complementarity:
-            lower, upper = (np.where(np.isinf(b), np.sign(b) * PETSc.INFINITY, b) for b in self.problem.bounds())
+            lower, upper = np.full(n, -PETSc.INFINITY), np.full(n, PETSc.INFINITY)
+            lower[self.problem.non_negative] = 0.0
             snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in (lower, upper)))
         snes.setLineSearchPreCheck(self._on_step)
 
@@ -225,6 +224,7 @@ class NonlinearSolver:
         """
         snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
         _, _, _, limit = snes.getTolerances()
+        # relative and step tolerances are off, so a solve ends by the force out of balance alone
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
         self._norms, self._goal, self._limit = [], tolerance, iterations or limit
@@ -232,6 +232,7 @@ class NonlinearSolver:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
         except PETSc.Error as error:
+            # factors that failed half way must not be taken for those of the next solve
             snes.getKSP().getPC().reset()
             raise ConvergenceError(
                 f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something moves without force"
@@ -242,6 +243,7 @@ class NonlinearSolver:
             self.seconds.total += time.perf_counter() - start
             self.seconds.factorisation += factorisation_seconds() - factor
         reason, done = snes.getConvergedReason(), snes.getIterationNumber()
+        # too little memory looks like a singular matrix to PETSc, but shorter load steps would not help
         if reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE and self._out_of_memory():
             snes.getKSP().getPC().reset()
             raise MemoryError(f"for the factors of {self.problem.size} unknowns")
@@ -261,16 +263,15 @@ class NonlinearSolver:
         """Whether the last solve ended at ``x``, so that the factors at hand are those of a tangent close to it."""
         return self._end is not None and np.array_equal(x, self._end)
 
-    def negative_eigenvalues(self, entries: FloatArray) -> int:
-        """Their number for the symmetric matrix of ``entries`` in the tangent's order: negative pivots of LDL^T.
+    def negative_eigenvalues(self, values: FloatArray) -> int:
+        """Their number for the symmetric matrix of ``values`` in the tangent's pattern: negative pivots of LDL^T.
 
         An eigenvalue within rounding of zero may count as either; all of them count where MUMPS gives up.
         """
-        values = np.zeros_like(self._pattern.values)
-        add_up(self._slots, entries, values)
         matrix = PETSc.Mat().createAIJ(
             self._matrix.size, csr=(self._pattern.start, self._pattern.column, values), comm=PETSc.COMM_SELF
         )
+        # MUMPS counts negative pivots only in a symmetric factorisation; by Sylvester's law they are the eigenvalues'
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         factors = PETSc.PC().create(PETSc.COMM_SELF)
         factors.setType("cholesky")
@@ -288,17 +289,17 @@ class NonlinearSolver:
         b, y = self._f.duplicate(), self._f.duplicate()
         b.array[:] = right
         self._snes.getKSP().solve(b, y)
-        found = y.array.copy()
+        solution = y.array.copy()
         b.destroy()
         y.destroy()
-        return found
+        return solution
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
         for thing in (self._snes, self._matrix, self._x, self._f):
             thing.destroy()
 
-    def _timed(self, work: Callable[[], FloatArray]) -> FloatArray:
+    def _timed(self, work: Callable[[], Result]) -> Result:
         start = time.perf_counter()
         result = work()
         self.seconds.assembly += time.perf_counter() - start
@@ -313,10 +314,7 @@ class NonlinearSolver:
             return  # a matrix that nobody touches is not factorised again
 
         def fill() -> None:
-            values = self.problem.tangent(x.array_r)
-            if self._slots is not None:
-                self._pattern.values[:] = 0.0
-                add_up(self._slots, values, self._pattern.values)
+            self.problem.tangent(x.array_r)
             if self._pattern.start is not self._stored:
                 self._grow()
             _set_values(matrix, self._pattern.values)
@@ -328,8 +326,10 @@ class NonlinearSolver:
         keep, norms = getattr(self.problem, "keep", None), self._norms
         if keep is None or self.problem.complementarity:
             return False
+        # the first step of a solve: exact enough if it starts where the last solve ended
         if len(norms) == 1:
             return self.is_at(x) and keep(x, True)
+        # near the limit of iterations Newton's quadratic end is worth its factorisation
         if not self.thrifty or len(norms) > self._limit - RESERVED:
             return False
         return norms[-1] <= min(FAST * norms[-2], NEAR * self._goal) and keep(x, False)
@@ -337,6 +337,7 @@ class NonlinearSolver:
     def _grow(self) -> None:
         """Give the matrix the pattern's new rows; its factors are analysed anew."""
         self._stored = self._pattern.start
+        # the old symbolic analysis belongs to the old pattern
         self._matrix.setPreallocationCSR((self._pattern.start, self._pattern.column, self._pattern.values))
         self._snes.getKSP().getPC().reset()
 
@@ -352,6 +353,7 @@ def _set_values(matrix: PETSc.Mat, values: FloatArray) -> None:
 
     petsc4py goes through ``MatSetValues``, which looks for the place of every single one.
     """
+    # the array of a sequential AIJ matrix is the values in the order of its rows, as in `Pattern`
     lib, stored = ctypes.CDLL(PETSc.__file__), ctypes.POINTER(ctypes.c_double)()
     handle = ctypes.c_void_p(matrix.handle)
     lib.MatSeqAIJGetArray(handle, ctypes.byref(stored))
@@ -398,6 +400,7 @@ class Factors:
         X = np.empty(columns.shape, order="F")
         for k in range(0, columns.shape[1], self.COLUMNS):
             part = np.asfortranarray(columns[:, k : k + self.COLUMNS])
+            # dense PETSc matrices take over the memory they are given, so each gets an array of its own
             right, left = (
                 PETSc.Mat().createDense(part.shape, array=a, comm=PETSc.COMM_SELF)
                 for a in (part.copy(order="F"), np.zeros_like(part, order="F"))
@@ -417,23 +420,22 @@ class Factors:
 class _OneUnknown:
     """The equation ``x = 1``: enough for PETSc to read every option of a solve."""
 
-    size, rows, columns, complementarity = 1, np.zeros(1, np.int32), np.zeros(1, np.int32), False
+    size, complementarity, non_negative = 1, False, slice(0)
+
+    def __init__(self) -> None:
+        self.pattern = Pattern(1, np.zeros(1, np.int32), np.zeros(1, np.int32))
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `Problem`."""
         return x - 1.0
 
-    def tangent(self, x: FloatArray) -> FloatArray:
+    def tangent(self, x: FloatArray) -> None:
         """See `Problem`."""
-        return np.ones(1)
+        self.pattern.values[:] = 1.0
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """See `Problem`."""
         return 1.0
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """See `Problem`."""
-        return np.full(1, -np.inf), np.full(1, np.inf)
 
 
 def unknown_options(options: dict[str, Any]) -> list[str]:
@@ -444,7 +446,7 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
     asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
     solver = NonlinearSolver(_OneUnknown(), judged)
-    found = []
+    unknown = []
     with solver._options_in_effect():
         solver._snes.setFromOptions()
         solver._snes.solve(None, solver._x)  # MUMPS reads its options here
@@ -452,6 +454,6 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
             used = ctypes.c_int(0)
             asked(None, name.encode(), ctypes.byref(used))
             if not used.value:
-                found.append(name)
+                unknown.append(name)
     solver.destroy()
-    return found
+    return unknown

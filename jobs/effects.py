@@ -51,7 +51,7 @@ PADS = (
     ("gripper.shear_modulus_kpa=20", "friction.mu=0.3", "gripper.pad_thickness_mm=10"),
     ("gripper.shear_modulus_kpa=80", "friction.mu=0.02", 'gripper.material="neo_hookean"', "gripper.poisson_ratio=0.3"),
 )
-SHEETS = ((2.0, 200.0), (1.0, 5.0), (0.53, 200.0), (2.0, 3.0), (1.0, 70.0))  # mm, GPa
+PLATES = ((2.0, 200.0), (1.0, 5.0), (0.53, 200.0), (2.0, 3.0), (1.0, 70.0))  # mm, GPa
 CUP, BOTTLE = "jobs/cup.toml", "jobs/bottle.toml"
 WALLS = {  # file, wall, modulus [GPa], stations, forces
     **{f"cup {t} mm, {E} GPa": (CUP, f"wall_profile_mm=[[0, {t}], [110, {t}]]", E, "[50]", "[0.5, 2, 4]")
@@ -65,7 +65,7 @@ SHELLS = "object: linear or nonlinear shell"
 PANELS = {  # of an effect: threshold, and what the axis says
     "object: rigid or shell": (wall.STIFF, "indentation / closing displacement"),
     SHELLS: (wall.SMALL_INDENTATION, "indentation / wall thickness"),
-    "sheet": (effects.STIFF_SHEET, "compliance over that of the pad"),
+    "sheet": (effects.STIFF_PLATE, "compliance over that of the pad"),
     "friction": (TARGET, "1 - F_N / S"),
     "friction-pressure coupling": (effects.SMALL_TRACTION, "traction left out / pressure"),
     "limit surface": (0.0, "radial fit error"),  # quality, not e_n; the quartic is never skipped
@@ -134,8 +134,8 @@ def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
 
 
 def rigid_scenes() -> Iterator[tuple[str, Scene]]:
-    """Names and scenes of rigid objects, each with other pads, friction and sheets."""
-    for (label, (shape, stations)), pad, (thick, modulus) in zip(RIGID.items(), cycle(PADS), cycle(SHEETS)):
+    """Names and scenes of rigid objects, each with other pads, friction and backing plates."""
+    for (label, (shape, stations)), pad, (thick, modulus) in zip(RIGID.items(), cycle(PADS), cycle(PLATES)):
         sheet = (f"gripper.sheet_thickness_mm={thick}", f"gripper.sheet_modulus_gpa={modulus}")
         given = (f"candidates.stations_mm={stations}", "candidates.angles_deg=[0]", FORCES, *pad, *sheet)
         text = f"[object]\n{shape}\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [1]\n"
@@ -145,7 +145,7 @@ def rigid_scenes() -> Iterator[tuple[str, Scene]]:
 def rigid_rows() -> Iterator[Row]:
     """Every effect but the object's."""
     for label, scene in rigid_scenes():
-        compliance = effects.sheet_level(scene).compliance
+        compliance = effects.backing_plate_level(scene).compliance
         plain = {"sheet": "rigid"}
         foam, plate = climb(scene, **plain), climb(scene, sheet="elastic")
         coupled = climb(scene, **plain, friction_pressure_coupling="tangential")

@@ -39,13 +39,13 @@ class Flag(IntFlag):
     OVERHANG = 1 << 6, "overhang", f"some loaded faces of a patch are turned {DEGREES_90}"
     WINDING = 1 << 7, "winding", "some faces are wound against their normals, which were taken"
     NOT_ANTIPODAL = 1 << 8, "not antipodal", "contacts more than 5 deg from antipodal"
-    NODAL = 1 << 9, "nodal", "solved with nodal gaps, because weighted ones had no solution"
+    NODAL = 1 << 9, "nodal", "mortar contact did not converge, node-to-surface contact used"
     SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
-        "the front overlaps the object by more than a tenth of the closing, fewer than six elements carry load or only"
-        " one along its length or its width, or trilinear elements are too stiff for foam with a Poisson's ratio above"
-        " 0.45"
+        "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
+        " only one along its length or its width does, or trilinear elements are too stiff for foam with a Poisson's"
+        " ratio above 0.45"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
         "the force fell while the fingers closed, or grew less than half as fast as before on average"

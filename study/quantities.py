@@ -40,7 +40,7 @@ EFFECTS = {
 }
 INDICATORS = {
     "object": "indentation that a linear wall would get at the largest force, over the wall's thickness",
-    "sheet": "mean deflection of the sheet under an even pressure over that of the pad",
+    "sheet": "mean deflection of the backing plate under an even pressure over that of the pad",
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",
     "limit_surface": "radial fit error of the fitted limit surface, curved model, of the finger where it is larger",
@@ -238,7 +238,7 @@ TABLE = (
     Quantity("pose_rotation", (*F, "component", "component_2"), "", "rotation of the pad",
              "x_object = rotation x_pad + origin.", "fingers"),
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
-             "Centre of the undeformed front face at first touch, in the object's frame; under load the pad's back "
+             "Centre of the undeformed contact face at first touch, in the object's frame; under load the pad's back "
              "has moved on by the closing displacement, along its z axis.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
@@ -249,11 +249,11 @@ TABLE = (
              "Largest product of pressure and gap at a node, over the largest pressure and the element size.",
              "checks"),
     Quantity("penetration_depth", F, "m", "deepest point inside the object",
-             "Of the quadrature points of the front: weighted gaps hold on average, so this shows how well the mesh "
-             "follows the object.", "checks"),
+             "Of the quadrature points of the contact face: weighted gaps hold on average, so this shows how well the "
+             "mesh follows the object.", "checks"),
     Quantity("min_det_f", F, "", "smallest det F", "Smallest ratio of deformed to undeformed volume.", "checks"),
     Quantity("max_strain", F, "", "largest strain", "Largest difference of a principal stretch from 1.", "checks"),
-    Quantity("ellipticity", F, "", "smallest acoustic eigenvalue",
+    Quantity("ellipticity", F, "", "smallest eigenvalue of the acoustic tensor",
              "Over the shear modulus, in 24 directions at one point per element; not positive: the foam lost "
              "ellipticity and strains may localise.", "checks"),
     # work
@@ -332,7 +332,7 @@ TABLE = (
         )
     ),
     # contact patches
-    Quantity("pressure", (*F, "face"), "Pa", "contact pressure", "Pressure of each face of the pad's front.",
+    Quantity("pressure", (*F, "face"), "Pa", "contact pressure", "Pressure of each face of the pad's contact face.",
              "patch", needs="patches"),
     Quantity("area", (*F, "face"), "m^2", "face area", "Deformed area of each face.", "patch", needs="patches"),
     Quantity("centroid", (*F, "face", "component"), "m", "face centroid",

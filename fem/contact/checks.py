@@ -1,4 +1,4 @@
-"""Laws that a converged state must obey, whatever the solver said, and why a ladder of forces ends."""
+"""Laws that a converged state must obey, whatever the solver said, and why a load path ends."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Checks:
 
     ``force_balance`` is relative to the force, ``adhesion`` to the largest pressure, ``penetration`` and
     ``complementarity`` (largest product of pressure and gap, over the mean pressure) to the element's size;
-    ``penetration_depth`` is the deepest point of the front inside the object [m]: weighted gaps hold on average, so it
-    shows how well the mesh follows the object; ``ellipticity`` is the smallest eigenvalue of the acoustic tensor
+    ``penetration_depth`` is the deepest point of the contact face inside the object [m]: weighted gaps hold on average,
+    so it shows how well the mesh follows the object; ``ellipticity`` is the smallest eigenvalue of the acoustic tensor
     over the shear modulus: not positive means that the foam has lost ellipticity and that strains may localise.
     """
 
@@ -51,7 +51,7 @@ def check(
     x : (size,) array
         Unknowns of the pad.
     state : tuple
-        Nodal pressures, mean gaps and points of the front, as ``contact_state`` gives them.
+        Nodal pressures, mean gaps and points of the contact face, as ``contact_state`` gives them.
     left_over : float
         Largest force out of balance at a node, of the whole pad [N].
     force, residual : float
@@ -66,6 +66,7 @@ def check(
     pressure, gap, points = state
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
     size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
+    # a state without any pressure has to fail by its force balance, not by a division by zero
     largest = max(float(pressure.max(initial=0.0)), 1e-300)
     checks = Checks(
         force_balance=abs(points.force[2] / pad.share - force) / force,
@@ -83,6 +84,7 @@ def check(
         (checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
         (checks.complementarity <= COMPLEMENTARITY, "pressure and gap are both positive at a node"),
         (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
+        # a caller that loosens the tolerance of the solve loosens this check with it, and no other
         (left_over <= max(BALANCE, residual) * force, f"a node of the foam is out of balance by {left_over:.3g} N"),
     ):
         if not kept:
@@ -112,11 +114,12 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
         Last state in equilibrium, at the normal force ``force`` [N].
     """
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
+    # the reason is looked for in the last state in equilibrium: what failed beyond it has no state to look at
     if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < TOO_MUCH):
         return error
     if ellipticity > BARELY_ELLIPTIC:
         return ConvergenceError(
-            f"the pad is squeezed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
+            f"the pad is compressed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
             f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
         )
     return ConvergenceError(
@@ -139,6 +142,7 @@ def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
     CheckError
         If the force grew and the closing displacement fell.
     """
+    # a fallback pad may follow one with other gaps, and their closings differ a little without any fault
     if high[0] > low[0] and high[1] < (1.0 - MOST_FALL) * low[1]:
         raise CheckError(
             f"the closing displacement falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "

@@ -1,11 +1,13 @@
-"""The contact patch of a pressed pad: the deformed front in small faces, with pressures, unfolded to the whole pad.
+"""The contact patch of a pressed pad: small faces of the deformed contact face, unfolded to the whole pad.
 
-Every hexahedron of the front gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
+Every hexahedron of the contact face gives as many faces as the contact has quadrature points on it (2 x 2, or 3 x 3 for
 triquadratic ones).  A face takes point, normal and load from its quadrature point, so that sums over the patch are
 the integrals of the solution: the loads add up to ``S``, their components along the approach to the normal force.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +28,8 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
     """
     points = pressed.points
     load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
-    nodes = pressed.front.reshape(*pad.front_grid, 3)
+    nodes = pressed.contact_face.reshape(*pad.contact_grid, 3)
+    # each quadrature point owns the part of the facet that its weight stands for, so areas and loads belong together
     for axis in range(2):
         nodes = _subdivide(nodes, axis, pad.side_weights)
     nodes = _unfold(pad, nodes, shared=True)
@@ -43,41 +46,38 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
 
 def half_turned(patch: ContactPatch) -> ContactPatch:
     """Patch of a pad that was solved turned by half a turn about its approach, in the pad's own frame."""
-    sign = np.array([-1.0, -1.0, 1.0])
-    return ContactPatch(
-        patch.centroid[::-1] * sign,
-        patch.area[::-1],
-        patch.normal[::-1] * sign,
-        patch.pressure[::-1],
-        patch.corners[::-1][:, [2, 3, 0, 1]] * sign,
-    )
+    return _moved(patch, lambda values: values[::-1], (-1.0, -1.0, 1.0), [2, 3, 0, 1])
 
 
 def mirrored(pad: Pad, patch: ContactPatch) -> ContactPatch:
     """Patch of the other finger where a plane of symmetry lies between them: the image in the pad's plane y = 0."""
-    sign = np.array([1.0, -1.0, 1.0])
 
     def flipped(values: FloatArray) -> FloatArray:
         return np.flip(values.reshape(*pad.shape.patch_faces, *values.shape[1:]), 1).reshape(values.shape)
 
+    return _moved(patch, flipped, (1.0, -1.0, 1.0), [3, 2, 1, 0])
+
+
+def _moved(
+    patch: ContactPatch, ordered: Callable[[FloatArray], FloatArray], sign: Sequence[float], corners: list[int]
+) -> ContactPatch:
+    """Patch with its faces in another order, vectors with these signs, and every face's corners in another order."""
     return ContactPatch(
-        flipped(patch.centroid) * sign,
-        flipped(patch.area),
-        flipped(patch.normal) * sign,
-        flipped(patch.pressure),
-        flipped(patch.corners)[:, [3, 2, 1, 0]] * sign,
-    )
+        ordered(patch.centroid) * sign, ordered(patch.area), ordered(patch.normal) * sign, ordered(patch.pressure),
+        None if patch.corners is None else ordered(patch.corners)[:, corners] * sign,
+    )  # fmt: skip
 
 
 def _non_negative(load: FloatArray) -> FloatArray:
     """Loads ``(faces, points)`` without the negative parts of quadratic pressures; each hexahedron keeps its sum."""
     clipped = np.maximum(load, 0.0)
+    # quadratic pressures dip below zero beside a steep rise: the sum of a facet is right, its parts need not be
     total = clipped.sum(axis=1, keepdims=True)
     return clipped * (np.maximum(load.sum(axis=1, keepdims=True), 0.0) / np.where(total > 0, total, 1.0))
 
 
 def _as_grid(pad: Pad, values: FloatArray) -> FloatArray:
-    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed front ``(i, j, c)``."""
+    """Values at the quadrature points ``(faces, points, c)`` as one grid over the meshed contact face ``(i, j, c)``."""
     nx, ny = (n // 2 if half else n for n, half in zip(pad.shape.elements, pad.symmetry, strict=False))
     k = pad.shape.per_side
     return values.reshape(nx, ny, k, k, -1).transpose(0, 2, 1, 3, 4).reshape(nx * k, ny * k, -1)

@@ -1,13 +1,13 @@
 """Friction that acts back on the contact: tangential traction while the pad is pressed, with stick and slip.
 
-At every quadrature point of the front a traction ``t`` resists what the point moves along the object's surface::
+At every quadrature point of the contact face a traction ``t`` resists what the point moves along the object's surface::
 
     d = t_0 - k (x - x_0)             x_0, t_0: of the last accepted state, k: stiffness of the regularised stick
     t = P d                where |P d| <= mu p, P = I - n n^T     (stick)
     t = mu p P d / |P d|   elsewhere                              (slip)
 
-A point that was open at the last state starts without traction. So the result depends on the way to it, as friction
-does; `way` divides the forces finely enough. The tangent is exact.
+A point that was open at the last state starts without traction. So the result depends on the load path, as friction
+does; `load_steps` divides the forces finely enough. The tangent is exact.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.assembly import gather
 from softjaw.fem.contact.problem import IDLE, ContactPoints, ContactProblem, Gap
-from softjaw.fem.pad.foam import gather
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
@@ -26,10 +26,10 @@ STICK = 100.0  # stiffness of stick in units of E / thickness; three times as mu
 GROWTH, START = 1.5, 0.02  # of the force from step to step, and of the first force at the first step
 
 
-def way(reached: float, force: float) -> list[float]:
+def load_steps(reached: float, force: float) -> list[float]:
     """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
 
-    >>> way(2.0, 4.0)
+    >>> load_steps(2.0, 4.0)
     [2.8284271247461903, 4.0]
     """
     low = reached or START * force
@@ -49,6 +49,7 @@ class CoupledProblem(ContactProblem):
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
+        # stick is measured from accepted states, not from iterates: a step that is repeated starts from the same place
         self._contact(x, tangent=False)
         self._before = self._traction(x)[0]
         pressure = self._pressure(x)
@@ -61,17 +62,15 @@ class CoupledProblem(ContactProblem):
             return R
         pad = self.pad
         force = np.einsum("fq,qa,fqi->fia", pad.face_area, pad.face_N, self._traction(x)[0])
-        return R - gather(self._face_dofs, force, self.size)
+        return R - gather(self.dofs, force, self.size)
 
-    def tangent(self, x: FloatArray) -> FloatArray:
-        """Entries of the tangent in the order of ``rows`` and ``columns``."""
-        values = super().tangent(x)
+    def _evaluate_entries(self, x: FloatArray) -> None:
+        super()._evaluate_entries(x)
         N, weight = self.pad.face_N, self.pad.face_area
         _, by_place, by_pressure = self._traction(x, derivatives=True)
         self._K_uu -= np.einsum("fq,qa,qb,fqik->fiakb", weight, N, N, by_place, optimize=True)
         entries = self._parts()[2]
         entries -= self.kappa * np.einsum("fq,qb,qa,fqi->fbia", weight, N, N, by_pressure, optimize=True).ravel()
-        return values
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """As that of the frictionless problem, but every accepted state changes the tangent."""
@@ -85,7 +84,7 @@ class CoupledProblem(ContactProblem):
 
     def _pressure(self, x: FloatArray) -> FloatArray:
         """Nominal pressures of the points ``(faces, points)`` [Pa], negative ones of quadratic faces cut off."""
-        return np.maximum(self.kappa * x[self._pressures][self._face_pressures] @ self.pad.face_N.T, 0.0)
+        return np.maximum(self.pressure(x)[self.nodes] @ self.pad.face_N.T, 0.0)
 
     def _traction(self, x: FloatArray, derivatives: bool = False) -> tuple[FloatArray, ...]:
         """Traction on the pad ``(faces, points, 3)`` [Pa] where `_contact` was evaluated, and its derivatives.
@@ -97,6 +96,7 @@ class CoupledProblem(ContactProblem):
         across = np.einsum("fqi,fqi->fq", n, d)
         trial = d - across[..., None] * n
         size = np.linalg.norm(trial, axis=-1)
+        # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
         slips = (size > most)[..., None]
         along = trial / np.where(size > 0.0, size, 1.0)[..., None]
         t = np.where(slips, most[..., None] * along, trial)

@@ -1,4 +1,4 @@
-"""From one converged contact state to the next: by normal force, by halves of the step, or along the sheet's closing.
+"""Load stepping: from one converged contact state to the next, by force control or by displacement control.
 
 `Stepping` goes there in one step where Newton's method can; `Following` keeps to the path of equilibria of a pad on a
 rigid object, so that no force leads off it.
@@ -14,12 +14,14 @@ tangent on the free displacements, the nodes in contact held to the object, is p
 Where even a step of `SHORTEST_FORETOLD` leads from a stable state to an unstable one, the path forks: its states go on
 and are taken, but a pad that is disturbed may leave them. Where such a step leaves the path, the pad jumps: the path
 ends at a limit or folds. With weighted gaps this is an error, because nodal gaps often know of no jump; else the state
-beyond is taken. In both cases ``jumped`` is set: this state and those that follow depend on the way to them.
+beyond is taken. In both cases ``jumped`` is set: this state and those that follow depend on the load path.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -27,20 +29,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import BALANCE
-from softjaw.fem.contact.problem import Control
+from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.errors import ConvergenceError, NotReachedError
-from softjaw.fem.petsc import NonlinearSolver
+from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
-WALK_STEPS = 60  # of the sheet, for one force
-SHORTEST = 1.0 / 64.0  # of the longest step of a walk, where that is bounded
-MOST_FAILURES = 20  # of the steps of one walk
+MOST_STEPS = 60  # under displacement control, for one force
+SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
+MOST_FAILURES = 20  # under displacement control, for one force
 FIRST_TRIES = 12
 FALL = 1e-6  # of the force: less is the rounding of a plateau, see `falls`
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
 LONGEST = 0.2  # foretold closing displacement of one step
-STRAY = 0.1  # distance of a node or the sheet from where it was foretold; good steps of practice keep to 0.06
+STRAY = 0.1  # distance of a node or the backing plate from where it was foretold; good steps of practice keep to 0.06
 SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not halved again
 LEAST = 0.01  # foretold closing displacement of a step that is given up where Newton's method does not converge
 FEWEST = 1.0 / 1024.0  # part of a step that is not halved again where nothing is foretold
@@ -51,7 +53,7 @@ STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
 def falls(forces: Sequence[float]) -> bool:
-    """Whether a force fell on the way: by more than the solver's tolerance and rounding leave it open.
+    """Whether a force fell along a load path: by more than the solver's tolerance and rounding leave it open.
 
     >>> falls([1.0, 2.0, 1.999]), falls([1.0, 2.0, 2.0 - 1e-9, 3.0])
     (True, False)
@@ -65,7 +67,7 @@ class Settings:
     """When a solve ends and when a step is given up.
 
     ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that
-    is tried before another way.
+    is tried before displacement control.
     """
 
     residual: float = 1e-10
@@ -81,16 +83,51 @@ class Work:
     halvings: int = 0
 
 
-class Pressing(Protocol):
-    """A contact problem that is driven by its sheet."""
+class LoadPath:
+    """What follows a load path with one solver, and may go on with another problem where the first has no solution."""
+
+    solver: NonlinearSolver
+
+    def __post_init__(self) -> None:
+        """Set up the solver."""
+        self._set_up()
+
+    def _set_up(self) -> None:
+        """Make `solver` for the problem as it is now."""
+        raise NotImplementedError
+
+    def _start_again(self) -> None:
+        """Set up another solver after a change of the problem; its clock goes on."""
+        seconds = self.solver.seconds
+        self.solver.destroy()
+        self._set_up()
+        self.solver.seconds = seconds
+
+    def _stopwatch(self) -> Callable[[], Seconds]:
+        """Where the time goes from now on."""
+        before, start = copy(self.solver.seconds), time.perf_counter()
+
+        def elapsed() -> Seconds:
+            now, total = self.solver.seconds, time.perf_counter() - start
+            return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
+
+        return elapsed
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self.solver.destroy()
+
+
+class DrivenProblem(Protocol):
+    """A contact problem that is driven by its backing plate."""
 
     control: Control
 
-    def sheet_force(self, x: FloatArray) -> float:
-        """Normal force on the sheet [N]."""
+    def normal_force(self, x: FloatArray) -> float:
+        """Normal force on the backing plate [N]."""
 
     def closing(self, x: FloatArray) -> float:
-        """Closing displacement of the sheet [m]."""
+        """Closing displacement of the backing plate [m]."""
 
 
 @dataclass
@@ -99,7 +136,7 @@ class Stepping:
 
     Parameters
     ----------
-    problem : Pressing
+    problem : DrivenProblem
     solver : NonlinearSolver
     settings : Settings
     thickness : float
@@ -115,10 +152,10 @@ class Stepping:
     most : int, optional
         Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
     watch : callable
-        Told every new state and its force [N]; what it raises ends the way.
+        Called with every new state and its force [N]; what it raises ends the load path.
     """
 
-    problem: Pressing
+    problem: DrivenProblem
     solver: NonlinearSolver
     settings: Settings
     thickness: float
@@ -144,8 +181,10 @@ class Stepping:
         work.iterations += iterations
         return x
 
-    def climb(self, x: FloatArray, reached: float, force: float, work: Work, *, walk: bool = True) -> FloatArray:
-        """From the state at ``reached`` [N] to ``force``: in one step, by halves, or (``walk``) along the closing."""
+    def step_to(
+        self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
+    ) -> FloatArray:
+        """From the state at ``reached`` [N] to ``force``: at once, by halves, or (``by_displacement``) by closing."""
         fraction, done = 1.0, 0.0
         while done < 1.0:
             goal = min(1.0, done + fraction)
@@ -153,30 +192,32 @@ class Stepping:
             try:
                 x = self.solve(x, Control(force=target), work, self.most)
             except ConvergenceError:
+                # halves only: the length that worked last is kept, because the rest of the way is not easier
                 fraction *= 0.5
                 if fraction < self.settings.min_step:
-                    if not walk:
+                    if not by_displacement:
                         raise
-                    return self.walk(x, force, work)
+                    return self.displacement_control(x, force, work)
                 continue
             self.watch(x, target)
             done = goal
         return x
 
-    def walk(
+    def displacement_control(
         self, x: FloatArray, force: float, work: Work, longest: float = np.inf, forces: list[float] | None = None
     ) -> FloatArray:
         """Closing displacement on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
 
-        The forces on the way are appended to ``forces``.
+        The forces of the steps are appended to ``forces``.
         """
         problem, failures = self.problem, 0
-        step, low = min(0.02 * self.thickness, longest), (x, problem.sheet_force(x))
+        # a failed step is halved and an easy one lengthened, so the first length only has to be safe
+        step, low = min(0.02 * self.thickness, longest), (x, problem.normal_force(x))
         shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
-        for _ in range(WALK_STEPS):
+        for _ in range(MOST_STEPS):
             try:
                 ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
-                high = (ahead, problem.sheet_force(ahead))
+                high = (ahead, problem.normal_force(ahead))
                 if high[1] >= force:
                     return self._land(low, high, force, work)
                 self.watch(*high)
@@ -187,14 +228,15 @@ class Stepping:
                 step, failures = 0.5 * step, failures + 1
                 if step < shortest or failures > MOST_FAILURES:
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
-        raise NotReachedError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {WALK_STEPS} steps")
+        raise NotReachedError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {MOST_STEPS} steps")
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
-        """State at ``force`` between two on the way; Newton's method may jump to one further on, which is refused."""
+        """State at ``force`` between two on the path; Newton's method may jump to one further on, which is refused."""
+        # a linear start between two neighbouring states is nearer than either of them
         share = (force - low[1]) / (high[1] - low[1])
         x = self.solve(low[0] + share * (high[0] - low[0]), Control(force=force), work, self.most)
         ends = self.problem.closing(low[0]), self.problem.closing(high[0])
-        margin = 1e-3 * (ends[1] - ends[0])
+        margin = 1e-3 * (ends[1] - ends[0])  # of rounding and tolerance; a jump goes much further
         if not ends[0] - margin <= self.problem.closing(x) <= ends[1] + margin:
             raise ConvergenceError(f"the state at {force:.4g} N lies beyond the one that was looked for")
         self.watch(x, force)
@@ -203,6 +245,7 @@ class Stepping:
     def first(self, closing: float, force: float, work: Work) -> State:
         """First state in contact and its force, by displacement control near ``closing``; force has no start."""
         failure, best = "no force yet", None
+        # too deep a start does not converge, too shallow a one has no force: look in between
         for _ in range(FIRST_TRIES):
             try:
                 x = self.solve(self.guess(closing), Control(closing=closing), work)
@@ -211,7 +254,8 @@ class Stepping:
                     return best
                 closing, failure = 0.6 * closing, str(error)
                 continue
-            reached = self.problem.sheet_force(x)
+            reached = self.problem.normal_force(x)
+            # too little force is a state of a few nodes at the rim, a bad place to start the path from
             if reached > FIRMLY * force:
                 return x, reached
             best = (x, reached) if reached > BARELY * force else best
@@ -220,7 +264,8 @@ class Stepping:
             return best
         raise ConvergenceError(
             f"found no first contact for {force:.4g} N near a closing of {closing * 1e3:.4g} mm; the pad may rest on "
-            f"less than an element of its front: refine the pad's mesh or move the candidate. Last attempt: {failure}"
+            "less than an element of its contact face: refine the pad's mesh or move the candidate. Last attempt: "
+            f"{failure}"
         )
 
 
@@ -242,16 +287,19 @@ class _Place:
 class Following(Stepping):
     """Steps that stay on the path; parameters and attributes as for `fem.contact.load_stepping.Stepping`."""
 
+    problem: ContactProblem
     _last: _Place | None = None
 
     def first(self, closing: float, force: float, work: Work) -> State:
         """As `Stepping.first`, not further in than where a first contact is certain to be on the path."""
         return super().first(min(closing, FIRST * self.thickness), force, work)
 
-    def climb(self, x: FloatArray, reached: float, force: float, work: Work, *, walk: bool = True) -> FloatArray:
-        """As `Stepping.climb`, along the path."""
+    def step_to(
+        self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
+    ) -> FloatArray:
+        """As `Stepping.step_to`, along the path."""
         if self.problem.complementarity:  # the factors at hand are those of a part of the tangent
-            return super().climb(x, reached, force, work, walk=walk)
+            return super().step_to(x, reached, force, work, by_displacement=by_displacement)
         here = self._begin(x, reached, work)
         done, cut = 0.0, 1.0
         while done < 1.0:
@@ -263,18 +311,19 @@ class Following(Stepping):
             except ConvergenceError:
                 cut *= 0.5
                 if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > LEAST:
-                    if not walk:
+                    if not by_displacement:
                         raise
-                    return self._walked(here, force, work)
+                    return self._past_limit(here, force, work)
                 continue
             ahead = self._place(x, target, None)
             leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
+            # a state may have converged and still belong to another branch: it is judged before it is passed on
             if leaves or forks or ahead.strain - here.strain > FOLD:
                 if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
                 if leaves:
-                    self._jump(target, walk)
+                    self._jump(target, by_displacement)
                 self.jumped |= forks
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
@@ -323,18 +372,19 @@ class Following(Stepping):
             off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.thickness:
                 return True
+        # strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
         grown = ahead.strain - here.strain
         return grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
 
-    def _jump(self, force: float, walk: bool) -> None:
-        """Note that the path was left on the way to a force [N], or refuse it where there is another way."""
-        if not walk:
+    def _jump(self, force: float, by_displacement: bool) -> None:
+        """Note that the path was left before a force [N], or refuse it where the caller has something else to try."""
+        if not by_displacement:
             raise ConvergenceError(f"the pad jumps at {force:.4g} N")
         self.jumped = True
 
-    def _walked(self, here: _Place, force: float, work: Work) -> FloatArray:
-        """State at ``force`` by way of the closing; the force may fall on the way, which it does beyond a limit."""
+    def _past_limit(self, here: _Place, force: float, work: Work) -> FloatArray:
+        """State at ``force`` by displacement control; the force may fall in between, which it does beyond a limit."""
         forces = [here.force]
-        x = self.walk(here.x, force, work, STRAY * self.thickness, forces)
+        x = self.displacement_control(here.x, force, work, STRAY * self.thickness, forces)
         self.jumped |= falls(forces)
         return x

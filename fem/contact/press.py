@@ -1,17 +1,15 @@
-"""Press a pad on an object along a ladder of normal forces, each force started from the one before.
+"""Press a pad on an object along a load path, each normal force started from the one before.
 
-A force that Newton does not reach in one step is approached by halves. Where that fails, or the pad jumps, and a
-fallback pad with nodal gaps is given, the ladder goes on with that one, from first contact (weighted gaps couple
-neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever); where that
-fails too, or there is none, the sheet is walked by its closing until the force is bracketed. Every state that is passed
-on has converged and has been checked.
+A force that Newton's method does not reach in one step is approached by step halving. Where that fails, or the pad
+jumps, and a fallback pad with nodal gaps is given, the load path goes on with that one, from first contact (weighted
+gaps couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever).
+Where that fails too, or there is none, displacement control takes over until the force is bracketed. Every state that
+is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import Checks, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import Following, Settings, Stepping, Work
-from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap, SpringBed
+from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, Stepping, Work
+from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap, SpringBed
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
@@ -36,19 +34,19 @@ class Pressed:
     Parameters
     ----------
     force, closing displacement : float
-        Normal force [N] and closing displacement of the sheet from first touch [m].
+        Normal force [N] and closing displacement of the backing plate from first touch [m].
     unknowns : (n,) array
         State of the solver.
     pad : Pad
         The pad it was solved with: the fallback where the pad itself had no solution.
-    pressure : (front nodes,) array
-        Nominal contact pressure, in the order of ``Pad.front_nodes`` [Pa].
-    front : (front nodes, 3) array
-        Deformed nodes of the front, in the pad's frame at first touch [m].
+    pressure : (contact nodes,) array
+        Nominal contact pressure, in the order of ``Pad.contact_nodes`` [Pa].
+    contact_face : (contact nodes, 3) array
+        Deformed nodes of the contact face, in the pad's frame at first touch [m].
     points : ContactPoints
-        Position, normal and load of the quadrature points of the meshed front.
+        Position, normal and load of the quadrature points of the meshed contact face.
     path_dependent : bool
-        Whether the pad has jumped on the way here: another way may lead to another state.
+        Whether the pad has jumped before: another load path may lead to another state.
     """
 
     force: float
@@ -56,7 +54,7 @@ class Pressed:
     unknowns: FloatArray
     pad: Pad
     pressure: FloatArray
-    front: FloatArray
+    contact_face: FloatArray
     points: ContactPoints
     checks: Checks
     iterations: int
@@ -73,21 +71,15 @@ def pressed(
     """State of one pad that has passed its checks; parameters as in ``fem.contact.checks.check``."""
     pad, (pressure, _, points) = foam.pad, state
     checks = check(foam, x, state, left_over, force, settings.residual)
-    front = (pad.nodes + pad.displacement(x))[pad.front_nodes]
+    contact_face = (pad.nodes + pad.displacement(x))[pad.contact_nodes]
     return Pressed(
-        force, float(x[pad.closing_dof]), x, pad, pressure, front, points, checks, work.iterations, work.steps,
+        force, float(x[pad.closing_dof]), x, pad, pressure, contact_face, points, checks, work.iterations, work.steps,
         work.halvings, seconds, path_dependent,
     )  # fmt: skip
 
 
-def since(before: Seconds, now: Seconds, start: float) -> Seconds:
-    """Where the time since ``start`` went."""
-    total = time.perf_counter() - start
-    return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
-
-
 @dataclass
-class Press:
+class Press(LoadPath):
     """One pad against one object; ``gap`` takes points of the pad's frame, the pad at first touch.
 
     Parameters
@@ -102,7 +94,7 @@ class Press:
     settings : Settings
     problem_of : callable
         Pad and gap to the problem.
-    way : callable
+    load_steps : callable
         From one force [N] (0: no contact yet) to the next: the forces to go through, the last of them the next.
     stepping : type
         How to get from one of them to the next: along the path of equilibria, or in one step where Newton's method can.
@@ -114,12 +106,8 @@ class Press:
     fallback: Pad | None = None
     settings: Settings = field(default_factory=Settings)
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
-    way: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
+    load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
     stepping: type[Stepping] = Following
-
-    def __post_init__(self) -> None:
-        """Set up the solver of this pad and object."""
-        self._set_up()
 
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
@@ -131,11 +119,11 @@ class Press:
         )  # fmt: skip
 
     def _remember(self, x: FloatArray, force: float) -> None:
-        """Keep the last state in equilibrium, which tells why there is none beyond."""
+        """Keep the last state in equilibrium, which shows why there is none beyond."""
         self._last = x, force
         self.problem.accept(x)
 
-    def ladder(self, forces: Sequence[float]) -> Iterator[Pressed]:
+    def load_path(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on the whole pad [N].
 
         Raises
@@ -145,65 +133,47 @@ class Press:
         """
         x, reached = None, 0.0
         for force in forces:
-            work, before, start, below = Work(), copy(self.solver.seconds), time.perf_counter(), x
+            work, elapsed, below = Work(), self._stopwatch(), x
             try:
-                x = self._climb(x, reached, force, work)
+                x = self._step_to(x, reached, force, work)
             except ConvergenceError:
                 if self.fallback is None:
                     raise
-                x = self._other_way(force, work)
+                x = self._from_first_contact(self.fallback, force, work)
             if below is not None:
                 refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
-            seconds = since(before, self.solver.seconds, start)
             left_over = np.abs(self.problem.residual(x)[: self.pad.closing_dof + 1]).max() / self.pad.share
             state = self.problem.contact_state(x)
             yield pressed(
-                self.problem.foam, x.copy(), state, left_over, force, self.settings, work, seconds,
+                self.problem.foam, x.copy(), state, left_over, force, self.settings, work, elapsed(),
                 self._stepping.jumped,
             )  # fmt: skip
 
-    def _other_way(self, force: float, work: Work) -> FloatArray:
-        """State at ``force`` of the fallback pad, else of the pad itself beyond a jump; both from first contact on.
+    def _from_first_contact(self, nodal: Pad, force: float, work: Work) -> FloatArray:
+        """State at ``force`` of the pad with nodal gaps, else of the pad itself beyond a jump, from first contact on.
 
         All forces that follow keep to the pad that was found to serve.
         """
-        pads, self.fallback, errors = (self.fallback, self.pad), None, []
+        pads, self.fallback, errors = (nodal, self.pad), None, []
         for pad in pads:
-            self._change(pad)
+            self.pad = pad
+            self._start_again()
             try:
-                return self._climb(None, 0.0, force, work)
+                return self._step_to(None, 0.0, force, work)
             except ConvergenceError as error:
                 errors.append(error)
         raise errors[0]
 
-    def _change(self, pad: Pad) -> None:
-        """Go on with another pad."""
-        seconds = self.solver.seconds
-        self.solver.destroy()
-        self.pad = pad
-        self._set_up()
-        self.solver.seconds = seconds
-
-    def at_closing(self, closing: float, x: FloatArray | None = None) -> tuple[FloatArray, float]:
-        """State at a prescribed closing [m] and the normal force it takes [N], from ``x`` or from scratch."""
-        start = self._bed.guess(closing) if x is None else x
-        x = self._stepping.solve(start, Control(closing=closing), Work())
-        return x, self.problem.sheet_force(x)
-
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
-        self.solver.destroy()
-
-    def _climb(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
+    def _step_to(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
-        way = self.way(reached, force)
+        steps = self.load_steps(reached, force)
         if x is None:
-            x, reached = self._stepping.first(self._bed.closing(way[0]), way[0], work)
+            x, reached = self._stepping.first(self._bed.closing(steps[0]), steps[0], work)
         self._remember(x, reached)
         try:
-            for goal in (f for f in way if f > reached or f == force):
-                x, reached = self._stepping.climb(x, reached, goal, work, walk=self.fallback is None), goal
+            for goal in (f for f in steps if f > reached or f == force):
+                x, reached = self._stepping.step_to(x, reached, goal, work, by_displacement=self.fallback is None), goal
             return x
         except ConvergenceError as error:
             raise explained(error, self.problem.foam, *self._last) from error

@@ -30,7 +30,7 @@ class Pose:
     rotation : (3, 3) array
         Columns are the pad's long side, its short side and its approach direction, in the object's frame.
     origin : (3,) array
-        Centre of the pad's undeformed front face [m].
+        Centre of the pad's undeformed contact face [m].
     """
 
     rotation: FloatArray
@@ -133,7 +133,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     pose : Pose
         The pad's frame before the approach.
     points : (n, 3) array
-        Points of the pad's front face in the pad's frame [m].
+        Points of the pad's contact face in the pad's frame [m].
     reach : float
         Distance to give up at [m].
 

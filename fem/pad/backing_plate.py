@@ -1,4 +1,4 @@
-"""The sheet behind a pad as an elastic plate: its stiffness for the nodes of the pad's back, condensed once.
+"""The backing plate behind a pad as an elastic plate: its stiffness for the nodes of the pad's back, condensed once.
 
 The plate has the outline of the pad. The finger holds it on a patch in its middle, which moves by the closing alone;
 the rest bends. Its four-node shell elements have their corners on the nodes of the pad's back, which is glued to its
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.element import Shell, patch
 from softjaw.fem.shell.wall_model import LinearShell
 
@@ -22,36 +23,8 @@ CLOSE = 1e-9  # of the outline, within which a node is on the patch's rim
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """Plate behind a pad.
-
-    Parameters
-    ----------
-    thickness, young_modulus : float
-        [m], [Pa].
-    poisson_ratio : float
-    support : (float, float)
-        Length and width of the patch in the middle that the finger holds [m]; 0 for a line. What reaches beyond the
-        plate holds nothing: a plate that is no larger than the patch is rigid.
-    """
-
-    thickness: float
-    young_modulus: float
-    poisson_ratio: float
-    support: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        """Refuse numbers that are no plate."""
-        if not (self.thickness > 0 and self.young_modulus > 0 and min(self.support) >= 0):
-            raise ValueError(
-                f"a sheet needs a positive thickness and modulus and a support that is not negative, found "
-                f"{self.thickness} m, {self.young_modulus} Pa, {self.support} m"
-            )
-
-
-@dataclass(frozen=True)
 class BackStiffness:
-    """Stiffness of the sheet on the back of one mesh.
+    """Stiffness of the backing plate on the back of one mesh.
 
     Attributes
     ----------
@@ -65,9 +38,10 @@ class BackStiffness:
     K: FloatArray
 
 
+# both fingers and all candidates share few plates: one per mesh and symmetry
 @lru_cache(maxsize=8)
 def back_stiffness(
-    x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], sheet: Sheet
+    x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate
 ) -> BackStiffness:
     """Stiffness for nodes on the lines ``x`` and ``y`` [m]; ``symmetry`` as in `fem.pad.mesh.Pad`.
 
@@ -76,7 +50,7 @@ def back_stiffness(
     ValueError
         Where no node is on the patch that the finger holds.
     """
-    shell, fixed, free = _plate(x, y, symmetry, sheet)
+    shell, fixed, free = _plate(x, y, symmetry, plate)
     if not free.any():
         return BackStiffness(free, np.zeros((1, 1)))
     nodes = np.flatnonzero(free.any(axis=-1).ravel())
@@ -86,20 +60,22 @@ def back_stiffness(
     moving = free.reshape(-1, 3)[nodes].ravel()
     C = C[np.ix_(moving, moving)]
     approach = np.tile([0.0, 0.0, 1.0], len(nodes))[moving]
+    # the compliance is symmetric but for rounding; Cholesky needs it exactly, and so does a symmetric tangent
     S = cho_solve(cho_factor(0.5 * (C + C.T)), np.eye(len(C)))
     S = 0.5 * (S + S.T)
+    # a rigid motion along the approach needs no force: the finger's row and column follow from equilibrium
     Se = S @ approach
     return BackStiffness(free, np.block([[S, -Se[:, None]], [-Se[None], np.atleast_2d(approach @ Se)]]))
 
 
 def relative_compliance(
-    x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], sheet: Sheet, foam: float
+    x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate, foam: float
 ) -> float:
-    """Mean deflection of the sheet under an even pressure over that of the foam ``thickness / E = foam`` [m/Pa].
+    """Mean deflection of the plate under an even pressure over that of the foam ``thickness / E = foam`` [m/Pa].
 
-    Zero where the finger holds every node of the sheet.
+    Zero where the finger holds every node of the backing plate.
     """
-    shell, fixed, free = _plate(x, y, symmetry, sheet)
+    shell, fixed, free = _plate(x, y, symmetry, plate)
     if not free.any():
         return 0.0
     load = np.zeros((shell.nodes, 6))
@@ -110,16 +86,17 @@ def relative_compliance(
     return float(shell.node_area @ (q[:, 2] + q[:, 5]) / shell.node_area.sum() / foam)
 
 
-def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], sheet: Sheet):
+def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate):
     """Shell of the plate, its fixed numbers ``(6 k,)`` and the free displacements of its face (rows, columns, 3)."""
     X = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
-    shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), sheet.thickness), sheet.young_modulus, sheet.poisson_ratio)
-    rim = 0.5 * np.array(sheet.support) + CLOSE * (np.ptp(x) + np.ptp(y))
+    shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), plate.thickness), plate.young_modulus, plate.poisson_ratio)
+    # nodes on the rim count as held, whatever rounding makes of their place
+    rim = 0.5 * np.array(plate.support) + CLOSE * (np.ptp(x) + np.ptp(y))
     held = (np.abs(X[..., :2]) <= rim).all(axis=-1)
     if not held.any():
         raise ValueError(
-            f"no node of the pad's mesh lies on the {1e3 * sheet.support[0]:g} x {1e3 * sheet.support[1]:g} mm in the "
-            "middle of the sheet that the finger holds: use an even number of elements, or a larger support"
+            f"no node of the pad's mesh lies on the {1e3 * plate.support[0]:g} x {1e3 * plate.support[1]:g} mm in the "
+            "middle of the backing plate that the finger holds: use an even number of elements, or a larger support"
         )
     fixed = np.repeat(held[..., None], 6, axis=-1)
     for axis in range(2):

@@ -16,11 +16,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.fem import materials
+from softjaw.fem.assembly import gather, pairs
 from softjaw.fem.materials import stress
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
-SMALLEST_DET = 0.05  # a Newton step is shortened before an element is squeezed further than this
+SMALLEST_DET = 0.05  # a Newton step is shortened before an element is compressed further than this
 
 
 @njit(cache=True)
@@ -66,8 +67,10 @@ def extreme_eigenvalues(M):
     a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
     d, e, f = M[0, 1], M[0, 2], M[1, 2]
     radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    # three equal eigenvalues: the angle below is undefined
     if radius <= 1e-12 * abs(mean):
         return mean, mean
+    # rounding can push the cosine of the angle beyond 1
     half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
     angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
     return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
@@ -95,6 +98,7 @@ def _elements(law, par, u, dN, w, nodes, r, K):
             J = _gradient(u[e], g, nodes, F, B)
             smallest = min(smallest, J)
             stress(law, F, B, J, par, P, A)
+            # the node loop is innermost and contiguous, so that it becomes vector instructions
             dv = w[e, q]
             for i in range(3):
                 p0, p1, p2 = dv * P[i, 0], dv * P[i, 1], dv * P[i, 2]
@@ -173,6 +177,7 @@ def _bound_to(laws):
                         C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
                 low, high = extreme_eigenvalues(C)
                 strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
+                # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
                 if q > 0:
                     continue
                 stress(law, F, B, J, par, P, A)
@@ -232,6 +237,7 @@ def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
                 weighted_gap[f, a] += dA * N[q, a] * gap[f, q]
                 for i in range(3):
                     force[f, i, a] -= dA * N[q, a] * p * normal[f, q, i]
+            # skipped where nothing presses: most facets of a pad are open, and their Hessian may not exist
             if not tangent:
                 continue
             for a in range(nodes):
@@ -253,15 +259,15 @@ class Foam:
     rows, columns : (entries,) arrays
         Where the entries of `stiffness` belong; negative means fixed.
     closing_entries : (k,) array
-        Those of them in the row of the sheet's closing displacement.
+        Those of them in the row of the backing plate's closing displacement.
     """
 
     def __init__(self, pad: Pad) -> None:
         self.pad = pad
         n, nodes = pad.element_nodes.shape
         dofs = pad.dofs[pad.element_nodes].transpose(0, 2, 1)  # (n, 3, nodes)
-        pair = np.broadcast_arrays(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
-        rows, columns = (index.ravel().astype(np.int32) for index in pair)
+        rows, columns = pairs(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
+        # the condensed plate is one dense element between all free unknowns of the back
         self._elements, behind = len(rows), pad.back_dofs if pad.back else pad.back_dofs[:0]
         self.rows = np.concatenate([rows, np.repeat(behind, len(behind))])
         self.columns = np.concatenate([columns, np.tile(behind, len(behind))])
@@ -272,7 +278,7 @@ class Foam:
         self._none = np.empty((0, 0, 0, 0, 0))
 
     def force(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """Internal force on every unknown ``(size,)`` [N], the sheet's in its closing, and the smallest ``det F``."""
+        """Internal force on every unknown ``(size,)`` [N], the plate's in its closing, and the smallest ``det F``."""
         smallest = self._evaluate(x, self._none)
         R = gather(self._dofs, self._r, self.pad.size)
         if self.pad.back:
@@ -285,12 +291,13 @@ class Foam:
         if self.pad.back:
             out[self._elements :] = self.pad.back.K.ravel()
 
-    def sheet_force(self, x: FloatArray) -> float:
-        """Normal force on the whole pad that the sheet must exert at ``x`` [N]."""
+    def normal_force(self, x: FloatArray) -> float:
+        """Normal force on the whole pad that the backing plate must exert at ``x`` [N]."""
         return float(self.force(x)[0][self.pad.closing_dof]) / self.pad.share
 
     def shorten(self, x: FloatArray, step: FloatArray, longest: float) -> float:
-        """Factor that keeps the change of closing below ``longest`` [m] and the squeezing of elements within reason."""
+        """Factor that keeps the change of closing below ``longest`` [m] and ``det F`` above `SMALLEST_DET`."""
+        # halving ends after 12: a step that is still wrong at 1/4096 is refused by the residual's NaN
         factor = min(1.0, longest / max(abs(step[self.pad.closing_dof]), 1e-300))
         for _ in range(12):
             if smallest_det(self._displacements(x - factor * step), self.pad.dN) > SMALLEST_DET:
@@ -310,8 +317,3 @@ class Foam:
 
     def _displacements(self, x: FloatArray) -> FloatArray:
         return np.ascontiguousarray(self.pad.displacement(x)[self.pad.element_nodes].transpose(0, 2, 1))
-
-
-def gather(dofs: NDArray[np.int32], values: FloatArray, size: int) -> FloatArray:
-    """Sum element values into a vector; fixed unknowns (index -1) fall off the front."""
-    return np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:]

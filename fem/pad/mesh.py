@@ -1,9 +1,10 @@
-"""The pad: a foam block bonded to a rigid sheet, meshed with hexahedra through scikit-fem.
+"""The pad: a foam block bonded to a rigid backing plate, meshed with hexahedra through scikit-fem.
 
 The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
-``[free displacements | closing of the sheet | nodal pressures]``: the nodes of the bonded back share one unknown, the
-closing, so that the force on the sheet is the residual of that unknown. On an elastic sheet only the nodes that the
-finger holds do; the others are free, and the sheet connects them to the closing displacement.
+``[free displacements | closing of the backing plate | nodal pressures]``: the nodes of the bonded back share one
+unknown, the closing, so that the force on the plate is the residual of that unknown. On an elastic plate only the nodes
+that the
+finger holds do; the others are free, and the backing plate connects them to the closing displacement.
 """
 
 from __future__ import annotations
@@ -17,17 +18,18 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine
 
 from softjaw.fem.materials import Material
-from softjaw.fem.pad.backing_plate import BackStiffness, Sheet, back_stiffness
-from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.pad.backing_plate import BackStiffness, back_stiffness
+from softjaw.fem.pad.shape import BackingPlate, PadShape
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+# these orders give 2 x 2 x 2 and 3 x 3 x 3 Gauss points
 BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
 SIDES = {2: (ElementLineP1(), [0, 1]), 3: (ElementLineP2(), [0, 2, 1])}  # element along a side, its nodes in order
 
 
 class Pad:
-    """Discrete pad in its own frame: front face at ``z = 0``, back at ``z = -thickness``.
+    """Discrete pad in its own frame: contact face at ``z = 0``, back at ``z = -thickness``.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ class Pad:
     contact : str
         ``"weighted"`` integrates gap and pressure over the contact face with Gauss points, ``"nodal"`` collocates them
         at its nodes.
-    sheet : Sheet, optional
+    backing_plate : BackingPlate, optional
         The plate behind the pad; rigid without.
 
     Attributes
@@ -49,15 +51,15 @@ class Pad:
         Node positions [m].
     element_nodes : (n, nodes) array
     back : BackStiffness or None
-        Of an elastic sheet.
+        Of an elastic backing plate.
     back_dofs : (k + 1,) array
         Its unknowns: the free displacements of the back, then the closing displacement.
     dofs : (k, 3) array
         Unknown of each displacement; -1 is fixed.
     face_nodes : (m, face nodes) array
-        Nodes of the faces of the front.
+        Nodes of the facets of the contact face.
     face_N, face_area : (points, face nodes), (m, points) arrays
-        Shape functions and reference areas [m^2] at the quadrature points of the front.
+        Shape functions and reference areas [m^2] at the quadrature points of the contact face.
     side_weights : (points along a side,) array
         Weights of that quadrature along one side of a face.
     """
@@ -68,34 +70,37 @@ class Pad:
         material: Material,
         symmetry: tuple[bool, bool] = (False, False),
         contact: str = "weighted",
-        sheet: Sheet | None = None,
+        backing_plate: BackingPlate | None = None,
     ) -> None:
         if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
             raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
-        self.shape, self.material, self.symmetry, self.sheet = shape, material, tuple(symmetry), sheet
+        self.shape, self.material, self.symmetry, self.backing_plate = shape, material, symmetry, backing_plate
         element, order = BASES[shape.element]
         lines = [shape.lines(0, symmetry[0]), shape.lines(1, symmetry[1]), shape.lines(2, False)]
         basis = Basis(MeshHex.init_tensor(*lines), element(), intorder=order)
         self.nodes = np.ascontiguousarray(basis.doflocs.T)
         self.element_nodes = np.ascontiguousarray(basis.element_dofs.T.astype(np.int32))
+        # scikit-fem broadcasts gradients that do not change from element to element; the kernel needs them all
         gradients = np.stack([np.broadcast_to(b[0].grad, (3, *basis.dx.shape)) for b in basis.basis])
         self.dN = np.ascontiguousarray(gradients.transpose(2, 3, 1, 0))
         self.volume = np.ascontiguousarray(basis.dx)
         self._number_unknowns(basis)
-        self._describe_front(lines, contact)
+        self._describe_contact_face(lines, contact)
 
     def _number_unknowns(self, basis: Basis) -> None:
-        """Number free displacements, then the closing displacement, then one pressure per node of the front."""
+        """Number free displacements, then the closing displacement, then one pressure per node of the contact face."""
+        # node positions come out of scikit-fem's map with rounding; mesh lines lie much further apart
         tol, count = 1e-9 * max(self.shape.size), len(self.nodes)
 
         def on_plane(axis: int, place: float) -> NDArray[np.int64]:
             """Nodes of the facets there."""
             return basis.get_dofs(lambda x: np.abs(x[axis] - place) < tol).flatten()
 
-        self.front_nodes, self.front_grid = _as_grid(self.nodes, on_plane(2, 0.0), tol)
+        self.contact_nodes, self.contact_grid = _as_grid(self.nodes, on_plane(2, 0.0), tol)
         back_nodes, _ = _as_grid(self.nodes, on_plane(2, -self.shape.size[2]), tol)
         free = np.ones((count, 3), dtype=bool)
-        self.back = self._on_sheet(back_nodes)
+        self.back = self._on_plate(back_nodes)
+        # an elastic plate leaves all of the back free that neither the finger nor a plane of symmetry holds
         free[back_nodes] = self.back.free.reshape(-1, 3) if self.back else False
         for axis in range(2):
             if self.symmetry[axis]:
@@ -106,22 +111,22 @@ class Pad:
         self.dofs[back_nodes[~free[back_nodes, 2]], 2] = self.closing_dof
         self.back_dofs = np.append(self.dofs[back_nodes][free[back_nodes]], np.int32(self.closing_dof))
         self.pressure_index = np.full(count, -1, dtype=np.int32)
-        self.pressure_index[self.front_nodes] = np.arange(len(self.front_nodes), dtype=np.int32)
-        self.size = self.closing_dof + 1 + len(self.front_nodes)
+        self.pressure_index[self.contact_nodes] = np.arange(len(self.contact_nodes), dtype=np.int32)
+        self.size = self.closing_dof + 1 + len(self.contact_nodes)
 
-    def _on_sheet(self, back_nodes: IntArray) -> BackStiffness | None:
-        """Stiffness of the elastic sheet behind the nodes of the back."""
-        if self.sheet is None:
+    def _on_plate(self, back_nodes: IntArray) -> BackStiffness | None:
+        """Stiffness of the elastic backing plate behind the nodes of the back."""
+        if self.backing_plate is None:
             return None
-        grid = self.nodes[back_nodes].reshape(*self.front_grid, 3)
+        grid = self.nodes[back_nodes].reshape(*self.contact_grid, 3)
         lines = (tuple(map(float, line)) for line in (grid[:, 0, 0], grid[0, :, 1]))
-        return back_stiffness(*lines, self.symmetry, self.sheet)
+        return back_stiffness(*lines, self.symmetry, self.backing_plate)
 
-    def _describe_front(self, lines: list[FloatArray], contact: str) -> None:
-        """Faces of the front as a tensor grid, and its quadrature."""
+    def _describe_contact_face(self, lines: list[FloatArray], contact: str) -> None:
+        """Faces of the contact face as a tensor grid, and its quadrature."""
         per_side = self.shape.per_side
         step = per_side - 1
-        grid = self.front_nodes.reshape(self.front_grid)
+        grid = self.contact_nodes.reshape(self.contact_grid)
         nx, ny = len(lines[0]) - 1, len(lines[1]) - 1
         local = [(i, j) for i in range(per_side) for j in range(per_side)]
         self.face_nodes = np.stack(
@@ -134,7 +139,7 @@ class Pad:
         self.node_area = np.bincount(
             self.pressure_index[self.face_nodes].ravel(),
             (self.face_area @ self.face_N).ravel(),
-            len(self.front_nodes),
+            len(self.contact_nodes),
         )
 
     @property
@@ -144,7 +149,7 @@ class Pad:
 
     @property
     def rounding(self) -> float:
-        """Norm of the forces that rounding leaves where a stiff sheet meets the closing displacement [N]."""
+        """Norm of the forces that rounding leaves where a stiff backing plate meets the closing displacement [N]."""
         if self.back is None:
             return 0.0
         return float(np.finfo(float).eps * self.shape.size[2] * np.linalg.norm(np.diag(self.back.K)[:-1]))
@@ -170,6 +175,7 @@ def _as_grid(nodes: FloatArray, chosen: NDArray[np.int64], tol: float) -> tuple[
 
 def _lines(x: FloatArray, tol: float) -> IntArray:
     """Number ``(n,)`` of the mesh line of every coordinate; nodes inside elements are off it by rounding."""
+    # consecutive coordinates that differ by more than rounding begin another line
     order = np.argsort(x)
     number = np.empty(len(x), dtype=np.int32)
     number[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > tol)])
@@ -181,6 +187,7 @@ def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     if contact == "weighted":
         (points,), weights = get_quadrature(RefLine, 2 * per_side - 1)
     elif contact == "nodal":
+        # Lobatto points are the nodes: the shape functions become the identity, and each node has a gap of its own
         points = np.linspace(0.0, 1.0, per_side)
         weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
     else:

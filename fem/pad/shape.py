@@ -1,4 +1,4 @@
-"""Dimensions and mesh lines of a pad, before anything is discretised: a plan needs no more, and loads no scikit-fem."""
+"""Pad and backing plate before discretisation: a plan needs no more, and loads neither scikit-fem nor numba."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PadShape:
     elements : tuple of 3 ints
         Of the whole pad along x, y, z.
     grading : tuple of 3 floats
-        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the front [-].
+        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the contact face [-].
     element : str
         ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
     """
@@ -48,12 +48,13 @@ class PadShape:
 
     @property
     def patch_faces(self) -> tuple[int, int]:
-        """Faces of a contact patch along length and width: one for each quadrature point of the front."""
+        """Faces of a contact patch along length and width: one for each quadrature point of the contact face."""
         return self.per_side * self.elements[0], self.per_side * self.elements[1]
 
     def halved(self) -> PadShape:
         """The same pad with half as many elements in every direction, rounded up."""
-        return PadShape(self.size, tuple(-(-n // 2) for n in self.elements), self.grading, self.element)
+        length, width, depth = (-(-n // 2) for n in self.elements)
+        return PadShape(self.size, (length, width, depth), self.grading, self.element)
 
     def lines(self, axis: int, half: bool) -> FloatArray:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
@@ -64,6 +65,34 @@ class PadShape:
             return np.linspace(-length / 2, length / 2, n + 1)
         positive = length / 2 * _graded(n // 2, ratio)
         return positive if half else np.concatenate([-positive[:0:-1], positive])
+
+
+@dataclass(frozen=True)
+class BackingPlate:
+    """Plate behind a pad.
+
+    Parameters
+    ----------
+    thickness, young_modulus : float
+        [m], [Pa].
+    poisson_ratio : float
+    support : (float, float)
+        Length and width of the patch in the middle that the finger holds [m]; 0 for a line. What reaches beyond the
+        plate holds nothing: a plate that is no larger than the patch is rigid.
+    """
+
+    thickness: float
+    young_modulus: float
+    poisson_ratio: float
+    support: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no plate."""
+        if not (self.thickness > 0 and self.young_modulus > 0 and min(self.support) >= 0):
+            raise ValueError(
+                f"a backing plate needs a positive thickness and modulus and a support that is not negative, found "
+                f"{self.thickness} m, {self.young_modulus} Pa, {self.support} m"
+            )
 
 
 def _graded(n: int, ratio: float) -> FloatArray:

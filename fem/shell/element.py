@@ -16,10 +16,13 @@ Arithmetic is strict IEEE, as in ``fem.pad.foam``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
 
+from softjaw.fem.assembly import Pattern, pairs
 from softjaw.fem.shell import element_kernel as kernel
 from softjaw.fem.shell.element_kernel import A_0, A_G, B_0, B_G, GAUSS, N_G, STRAINS, FloatArray
 
@@ -63,6 +66,9 @@ class ShellMesh:
     def thickness(self) -> FloatArray:
         """Wall thickness at every node ``(k,)`` [m]."""
         return 2.0 * np.linalg.norm(self.D, axis=1)
+
+
+MeshT = TypeVar("MeshT", bound=ShellMesh)
 
 
 def grid_elements(number: IntArray) -> IntArray:
@@ -119,7 +125,7 @@ class Elements:
     poisson_ratio: float
 
     @property
-    def loops(self) -> tuple:
+    def loops(self) -> tuple[Any, ...]:
         """Leading arguments of the compiled loops."""
         return (
             self.nodes, self.plane, self.twist, self.membrane, self.in_plane, self.shear, self.thickness, self.start,
@@ -143,6 +149,7 @@ def elements(X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float
     nodes = np.ascontiguousarray(nodes, dtype=np.int32)
     x, d = X[nodes], D[nodes]
     side = np.linalg.norm(d, axis=2)
+    # an axis that treats both directions alike: results do not depend on which side of an element comes first
     e1 = _bisecting_axis(*(np.einsum("i,nik->nk", s, x) for s in (A_0, B_0)))
     g_centre, _ = _metric(x, A_0, B_0, e1)
     points = [_metric(x, a, b, e1) for a, b in zip(A_G, B_G, strict=True)]
@@ -198,6 +205,7 @@ def _metric(x: FloatArray, a: FloatArray, b: FloatArray, e1: FloatArray) -> tupl
     f1 = e1 - np.einsum("nk,nk->n", e1, n)[:, None] * n
     f1 /= np.linalg.norm(f1, axis=1)[:, None]
     M = np.einsum("nak,nbk->nab", A, np.stack([f1, np.cross(n, f1)], axis=1))  # A_alpha . e_b
+    # only so that the inverse exists: the caller refuses an element without area
     M[area <= 0] = np.eye(2)
     return np.linalg.inv(M), area
 
@@ -210,7 +218,7 @@ def _side_mixing() -> FloatArray:
     return mix
 
 
-class Shell:
+class Shell(Generic[MeshT]):
     """Thin-walled object.
 
     Parameters
@@ -232,7 +240,7 @@ class Shell:
     """
 
     def __init__(
-        self, mesh: ShellMesh, young_modulus: float, poisson_ratio: float, springs: FloatArray | None = None
+        self, mesh: MeshT, young_modulus: float, poisson_ratio: float, springs: FloatArray | None = None
     ) -> None:
         self.mesh, self.young_modulus, self.poisson_ratio = mesh, float(young_modulus), float(poisson_ratio)
         self.elements = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
@@ -247,22 +255,18 @@ class Shell:
     def _build_pattern(self) -> None:
         """Blocks of 6 x 6 between nodes that share an element."""
         nodes, n = self.elements.nodes, len(self.mesh.X)
-        keys = (nodes[:, :, None].astype(np.int64) * n + nodes[:, None, :]).ravel()
-        loose = np.arange(n, dtype=np.int64) * (n + 1)
-        blocks, position = np.unique(np.concatenate([keys, loose]), return_inverse=True)
-        row, neighbour = blocks // n, blocks % n
-        first = np.searchsorted(row, np.arange(n + 1))
-        count = np.diff(first)
+        rows, columns = pairs(nodes[:, :, None], nodes[:, None, :])
+        graph = Pattern(n, rows, columns)
+        count = np.diff(graph.start)
+        row = np.repeat(np.arange(n), count)
+        # the kernel adds whole blocks: where each begins, and how far apart its six rows are
+        place = 36 * graph.start[row] + 6 * (np.arange(len(row)) - graph.start[row])
+        self._place = place[graph.slots(rows, columns)].reshape(-1, 4, 4).astype(np.int32)
         self._width = (6 * count).astype(np.int32)
-        place = 36 * first[row] + 6 * (np.arange(len(blocks)) - first[row])
-        self._place = place[position[: keys.size]].reshape(-1, 4, 4).astype(np.int32)
-        self.start = np.concatenate([[0], np.cumsum(np.repeat(6 * count, 6))]).astype(np.int32)
-        self.column = np.empty(self.start[-1], dtype=np.int32)
-        for k in range(6):
-            for m in range(6):
-                self.column[place + k * 6 * count[row] + m] = 6 * neighbour + m
-        where = np.repeat(np.arange(self.size), np.diff(self.start)) == self.column
-        self._diagonal = np.flatnonzero(where)
+        blocks = np.zeros((len(row), 6, 6))
+        matrix = bsr_matrix((blocks, graph.column, graph.start), shape=(self.size, self.size)).tocsr()
+        self.start, self.column = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+        self._diagonal = np.flatnonzero(np.repeat(np.arange(self.size), np.diff(self.start)) == self.column)
 
     @property
     def nodes(self) -> int:
@@ -288,6 +292,7 @@ class Shell:
             there in far fewer iterations. Leave it out in the first iteration, also after every cut step.
         """
         values = np.zeros(self.start[-1])
+        # assigned, not added: the kernel adds the elements to it
         values[self._diagonal] = self.springs
         q = q.reshape(-1, 6)
         step = NO_STEP if before is None else q - before.reshape(-1, 6)

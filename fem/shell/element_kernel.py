@@ -25,7 +25,7 @@ def shape(xi: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray, Floa
 GAUSS = CORNERS / np.sqrt(3.0)
 SIDES = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])  # 2 E13 on the first two, 2 E23 on the others
 N_G, A_G, B_G = shape(*GAUSS.T)
-N_0, A_0, B_0 = (value[0] for value in shape(np.zeros(1), np.zeros(1)))
+_, A_0, B_0 = (value[0] for value in shape(np.zeros(1), np.zeros(1)))
 N_S, A_S, B_S = shape(*SIDES.T)
 S_S = np.concatenate([A_S[:2], B_S[2:]])  # derivative along xi on the first two sides, along eta on the others
 
@@ -238,6 +238,7 @@ def _add_point(a, b, n, G):
 @njit(cache=True)
 def _add_geometric(plane, twist, s, n, G, K):
     """Add the stresses' share of the tangent to the blocks of ``K`` on and above the diagonal."""
+    # the geometric part is the same for all three components, so one 4 x 4 block per pair serves three
     G[:] = 0.0  # [0] couples places with places, [1] places with directors
     for q in range(4):
         _covariant(plane[q, 0], plane[q, 1], s[2 * q], s[2 * q + 1], n)
@@ -269,6 +270,7 @@ def _add_thickness(x, thickness, K):
             for k in range(3):
                 for m in range(3):
                     K[12 + 3 * i + k, 12 + 3 * j + m] += thickness[i, j] * x[4 + i, k] * x[4 + j, m]
+    # only places over directors were computed; the other block is its transpose
     for i in range(12):
         for j in range(12):
             K[12 + j, i] = K[i, 12 + j]
@@ -310,6 +312,7 @@ def tangent(nodes, plane, twist, membrane, in_plane, shear, thickness, start, nu
         if step.shape[0] > 0:
             _gather(step, nodes[c], d)
             _form(d, plane[c], twist[c], v, extra)
+        # strains of the last linear step: its quadratic share is what Newton's linearisation did not see
         for i in range(STRAINS):
             e[i] -= start[c, i] + extra[i]
         _stress(e, membrane[c], in_plane[c], shear[c], thickness[c], nu, s)

@@ -119,6 +119,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         If a point close to the wall finds no place.
     """
     found = _search(wall, points, places, v, w)
+    # a second search for the few that failed is cheaper than a safe start for all of them
     again = np.flatnonzero(np.isnan(found.gap) | (found.gap == FAR))
     if len(again):
         # where a point was last may lie beyond a fold by now: begin once more from the nearest place of the whole wall
@@ -166,6 +167,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
     n, n_1, n_2, r, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     shape, shape_1, shape_2 = np.empty(4), np.empty(4), np.empty(4)
     at = np.empty(4, np.int32)
+    # a place on the rim of the mesh is inside it, whatever rounding makes of it
     margin_t, margin_s = 1e-9, 1e-9 * (high - low)
     for k in range(points.shape[0]):
         t0, s0, g = places[k, 0], places[k, 1], 0.0
@@ -194,6 +196,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
             if not _invert(J, inverse):
                 break
             size = abs(r[0]) + abs(r[1]) + abs(r[2])
+            # the derivatives below belong to this very place, so it is checked before the step, not after
             if size <= SHARP:
                 ok = True
                 break
@@ -212,6 +215,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
                 break
         inside = low - margin_s <= s0 <= high + margin_s
         inside = inside and (closed or theta[0] - margin_t <= t0 <= theta[-1] + margin_t)
+        # a point close to the wall that finds no place would be a hole in the contact; further off it is not
         if not inside or (not ok and size > 1e-9):
             gap[k] = np.nan if inside and abs(g) < 0.002 else FAR
             continue

@@ -1,23 +1,21 @@
-"""Press two fingers on a thin-walled object along a ladder of normal forces, each started from the one before.
+"""Press two fingers on a thin-walled object along a load path, each normal force started from the one before.
 
-As in ``fem.contact.press``, with a wall that gives way. Where a wall snaps in, force control jumps or fails; then the
-fingers are walked on by their closing, in short steps, and the first state with the wanted force is taken: what a
+As in ``fem.contact.press``, with a wall that gives way. Where a wall snaps in, force control jumps or fails; then
+displacement control closes the fingers in short steps, and the first state with the wanted force is taken: what a
 gripper that closes with a growing force meets first.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softjaw.fem.contact.load_stepping import Settings, Stepping, Work, falls
-from softjaw.fem.contact.press import Pressed, pressed, since
+from softjaw.fem.contact.load_stepping import LoadPath, Settings, Stepping, Work, falls
+from softjaw.fem.contact.press import Pressed, pressed
 from softjaw.fem.contact.problem import Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import FloatArray
@@ -26,7 +24,7 @@ from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
 SIDES = 0.3  # of the largest distance from the plane between the fingers on a ring: nodes nearer to it are left out
-LONGEST_STEP = 5e-4  # of the closing displacement while a wall is walked in [m]
+LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, while a wall snaps in [m]
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
 MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
@@ -57,23 +55,22 @@ class Opening:
         self._inner = mesh.X - mesh.D
         x = self._inner[mesh.number, 0]
         bound = np.maximum(SIDES * np.abs(x).max(axis=0), 1e-6)
-        self._front = np.unique(mesh.number[x > bound])
+        self._near = np.unique(mesh.number[x > bound])
         back = np.unique(mesh.number[x < -bound])
-        self._back = None if mesh.symmetry[0] else back
-        if self._back is not None:
-            self._back = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._front, 1:])[1]]
-        self._whole = 1.0
-        self._whole = self._distances(np.zeros(mesh.X.size * 2))
+        self._across = None if mesh.symmetry[0] else back
+        if self._across is not None:
+            self._across = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]]
+        self._whole = self._apart(np.zeros(mesh.X.size * 2))
         self.last = 1.0, 0.0
 
     def __call__(self, q: FloatArray) -> float:
         """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
-        return float(self._distances(q).min())
+        return float((self._apart(q) / self._whole).min())
 
-    def _distances(self, q: FloatArray) -> FloatArray:
+    def _apart(self, q: FloatArray) -> FloatArray:
         parts = q.reshape(-1, 6)
         x = self._inner[:, 0] + parts[:, 0] - parts[:, 3]
-        return (x[self._front] - (-x[self._front] if self._back is None else x[self._back])) / self._whole
+        return x[self._near] - (-x[self._near] if self._across is None else x[self._across])
 
     def watch(self, q: FloatArray, force: float) -> None:
         """Note the state at a force [N] of the fingers.
@@ -81,7 +78,7 @@ class Opening:
         Raises
         ------
         CheckError
-            If the walls have met on the way here.
+            If the walls have met at a lower force.
         """
         opening = self(q)
         if opening > 0.0:
@@ -105,7 +102,7 @@ class WallState:
     reaction : (3,) array
         Force of supports and springs on the whole object [N].
     snapped : bool
-        Whether the wall has snapped in on the way here: the force fell while the fingers closed, or it hardly grew.
+        Whether the wall has snapped in before: the force fell while the fingers closed, or it hardly grew.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.grip``: 1 undeformed, 0 where they would meet.
     """
@@ -127,14 +124,14 @@ class Gripped:
 
 
 @dataclass
-class Grip:
+class Grip(LoadPath):
     """Pads on a thin-walled object.
 
     Parameters
     ----------
     problem : GripProblem
     gaps : sequence of callables
-        Of the undeformed object in the frame of each pad, as in ``Press``; they tell where contact begins.
+        Of the undeformed object in the frame of each pad, as in ``Press``; contact begins where they are zero.
     mirrors : (bool, bool)
         Whether ``x = 0`` and ``y = 0`` are planes of symmetry that the mesh of the wall ends at.
     options : dict
@@ -150,10 +147,6 @@ class Grip:
     options: dict[str, Any] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
     fallback: Callable[[], GripProblem] | None = None
-
-    def __post_init__(self) -> None:
-        """Set up the solver."""
-        self._set_up()
 
     def _set_up(self) -> None:
         fingers = self.problem.fingers
@@ -174,7 +167,7 @@ class Grip:
             x[f.own] = bed.guess(closing)
         return x
 
-    def ladder(self, forces: Sequence[float]) -> Iterator[Gripped]:
+    def load_path(self, forces: Sequence[float]) -> Iterator[Gripped]:
         """Equilibrium states at ascending normal forces per finger [N].
 
         Raises
@@ -184,25 +177,28 @@ class Grip:
         """
         x, reached, compliance, snapped = None, 0.0, np.inf, False
         for force in forces:
-            work, before, start = Work(), copy(self.solver.seconds), time.perf_counter()
+            work, elapsed = Work(), self._stopwatch()
             try:
                 x, slope, fell = self._level(x, reached, force, compliance, work)
             except ConvergenceError as error:
                 self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
                 if self.fallback is None:
                     raise
-                self._fall_back()
+                last, self.problem, self.fallback = self.opening.last, self.fallback(), None
+                self._start_again()
+                self.opening.last = last
                 try:
                     x, slope, fell = self._level(x, reached, force, compliance, work)
                 except ConvergenceError as again:
                     self._refuse_folded(again, INDENTED)
                     raise
             reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
-            yield self._gripped(x, force, snapped, work, since(before, self.solver.seconds, start))
+            yield self._gripped(x, force, snapped, work, elapsed())
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found, or that it may have."""
         left, force = self.opening.last
+        # the opening tells a wall that has collapsed from a solve that failed for another reason
         if left < limit:
             closer = f"its opposite sides have come {1 - left:.0%} of their distance closer"
             if left < FOLDED:
@@ -214,41 +210,35 @@ class Grip:
                 )
             raise CheckError(f"{text} ({error})") from error
 
-    def _fall_back(self) -> None:
-        """Go on with nodal gaps."""
-        seconds, last = self.solver.seconds, self.opening.last
-        self.solver.destroy()
-        self.problem, self.fallback = self.fallback(), None
-        self._set_up()
-        self.solver.seconds, self.opening.last = seconds, last
-
     def _level(
         self, x: FloatArray | None, reached: float, force: float, compliance: float, work: Work
     ) -> tuple[FloatArray, float, bool]:
-        """State at ``force``, the mean compliance [m/N] on the way, and whether a limit was passed."""
+        """State at ``force``, the mean compliance [m/N] up to it, and whether a limit was passed."""
         if x is None:
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
             compliance = self.problem.closing(x) / reached  # foam gets stiffer, so this is more than what comes
-        ahead, fell = self._climb(x, reached, force, compliance, work)
+        ahead, fell = self._step_to(x, reached, force, compliance, work)
+        # the first contact may have more force than the first level asks for: no slope yet
         if not force > reached:
             return ahead, np.inf, fell
         slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
         return ahead, slope, fell or GIVES_WAY * slope > self.problem.closing(x) / reached
 
-    def _climb(
+    def _step_to(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
     ) -> tuple[FloatArray, bool]:
-        """State at ``force``, and whether a limit was passed on the way from the one at ``reached`` [N]."""
+        """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
         expected = max(JUMP, 2.0 * compliance * (force - reached))
         try:
-            ahead = self._stepping.climb(x, reached, force, work, walk=False)
+            ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
                 return ahead, False
         except ConvergenceError:
             pass
+        # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
-        ahead = self._stepping.walk(x, force, work, LONGEST_STEP, forces)
+        ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces)
         return ahead, falls([reached, *forces])
 
     def _watch(self, x: FloatArray, force: float) -> None:
@@ -262,7 +252,7 @@ class Grip:
         """
         fingers = self.problem.fingers
         load = np.zeros(self.problem.size)
-        load[[f.closing for f in fingers]] = [f.pad.share for f in fingers]
+        load[[f.closing_dof for f in fingers]] = [f.pad.share for f in fingers]
         return bool(self.problem.closing(self.solver.answer(load)) * force > self.problem.closing(x) / GIVES_WAY)
 
     def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
@@ -270,7 +260,7 @@ class Grip:
         problem, residual = self.problem, np.abs(self.problem.residual(x))
         fingers = []
         for k, f in enumerate(problem.fingers):
-            left_over = residual[f.offset : f.closing + 1].max() / f.pad.share
+            left_over = residual[f.offset : f.closing_dof + 1].max() / f.pad.share
             part = seconds if k == 0 else Seconds()
             fingers.append(pressed(
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
@@ -297,9 +287,6 @@ class Grip:
 
     def _reaction(self, load: FloatArray) -> FloatArray:
         """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""
+        # forces across a plane of symmetry cancel with those of the other half; the others add up
         mirrored = np.array([*self.mirrors, False])
         return np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
-
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
-        self.solver.destroy()

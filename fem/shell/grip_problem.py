@@ -7,8 +7,8 @@ residual is::
     R_u     = r_int(u) - int N_a p n dA                          p = sum N_i kappa l_i
     R_q     = r_int(q) + int N_a p n dA                          on both numbers that move the outer face
     R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]            G_i = int N_i g dA
-    R_delta = force on the sheet - F                             (force)
-              k (sum of the closings - their goal), and the difference of the sheets' forces   (closing displacement)
+    R_delta = force on the backing plate - F                             (force)
+              k (sum of the closings - their goal), and the difference of the plates' forces   (closing displacement)
 
 All rows are forces [N]. Both pads press with the same force, each with a closing displacement of its own.
 """
@@ -21,22 +21,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.pattern import Pattern, add_up
-from softjaw.fem.contact.problem import ContactPoints, Control, borne
+from softjaw.fem.assembly import Pattern, add_up, gather, pairs, shifted
+from softjaw.fem.contact.problem import ContactPoints, Control, PressedPad, borne
 from softjaw.fem.objects.gap import FloatArray, Pose
-from softjaw.fem.pad.foam import Foam, gather
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Facing, Wall, face
 from softjaw.fem.shell.wall_kernel import contact_forces, contact_tangent
-from softjaw.fem.shell.wall_model import WallModel
+from softjaw.fem.shell.wall_model import NonlinearWall
 
 IntArray = NDArray[np.int32]
 LONGEST_CLOSING = 1e-3  # of one iteration [m]
 CARRIED = 0.3  # part of a node's area that must face the wall for the node to carry load
 
 
-class Finger:
-    """One pad, where it stands and which unknowns of the whole problem are its own.
+class Finger(PressedPad):
+    """One pad, where it stands and what it can touch.
 
     Parameters
     ----------
@@ -50,27 +49,14 @@ class Finger:
     """
 
     def __init__(self, pad: Pad, pose: Pose, wall: Wall, offset: int) -> None:
-        self.pad, self.pose, self.wall, self.offset = pad, pose, wall, offset
-        self.foam = Foam(pad)
-        self.own = slice(offset, offset + pad.size)
-        self.closing = offset + pad.closing_dof
-        self.kappa = pad.modulus_per_thickness
+        super().__init__(pad, offset)
+        self.pose, self.wall = pose, wall
         self.R = np.ascontiguousarray(pose.rotation)
-        self.local_dofs = np.ascontiguousarray(pad.dofs[pad.face_nodes].transpose(0, 2, 1))  # (faces, 3, k)
-        self.dofs = _shift(self.local_dofs, offset)
-        self.pressures = _shift(pad.closing_dof + 1 + pad.pressure_index[pad.face_nodes], offset)
-        self.nodes = pad.pressure_index[pad.face_nodes]
+        self.foam_entries = shifted(self.foam.rows, offset), shifted(self.foam.columns, offset)
 
-    def pressure(self, x: FloatArray) -> FloatArray:
-        """Nominal pressures of the front's nodes at the whole state ``x`` [Pa]."""
-        return self.kappa * x[self.own][self.pad.closing_dof + 1 :]
-
-    def points(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Quadrature points of the front in the pad's frame ``(faces, points, 3)`` and the object's ``(n, 3)`` [m]."""
-        pad = self.pad
-        corners = (pad.nodes + pad.displacement(x[self.own]))[pad.face_nodes]
-        own = np.einsum("qa,fai->fqi", pad.face_N, corners)
-        return own, self.pose.to_object(own.reshape(-1, 3))
+    def object_points(self, x: FloatArray) -> FloatArray:
+        """Quadrature points of the contact face in the object's frame ``(n, 3)`` [m]."""
+        return self.pose.to_object(self.points(x).reshape(-1, 3))
 
 
 @dataclass
@@ -89,136 +75,127 @@ class GripProblem:
 
     Parameters
     ----------
-    model : WallModel
+    model : NonlinearWall or LinearWall
         The wall; its unknowns come first.
     pads : sequence of (Pad, Pose, Wall)
         One where a plane of symmetry lies between the fingers, else two; with what each can touch.
     """
 
-    complementarity = False
+    complementarity, non_negative = False, slice(0)  # the active set is part of the residual, whatever the solver
 
-    def __init__(self, model: WallModel, pads: Sequence[tuple[Pad, Pose, Wall]]) -> None:
+    def __init__(self, model: NonlinearWall, pads: Sequence[tuple[Pad, Pose, Wall]]) -> None:
         self.model = model
         self.fingers: list[Finger] = []
         self.size = model.size
         for pad, pose, wall in pads:
             self.fingers.append(Finger(pad, pose, wall, self.size))
             self.size += pad.size
-        self.stiffness = sum(f.kappa * f.pad.node_area.sum() for f in self.fingers)
+        self.stiffness = sum(f.kappa * f.area.sum() for f in self.fingers)
         self.control = Control(closing=0.0)
-        self.places = [f.wall.places(f.points(np.zeros(self.size))[1]) for f in self.fingers]
+        self.places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
         self._build_pattern()
 
     @property
     def control(self) -> Control:
-        """What drives the sheets; setting it begins a new solve, whose first tangent of the wall is the plain one."""
+        """What drives the fingers; setting it begins a new solve, whose first tangent of the wall is the plain one."""
         return self._control
 
     @control.setter
     def control(self, control: Control) -> None:
-        self._control, self._before = control, None
+        self._control = control
+        self._before: FloatArray | None = None
 
     def _build_pattern(self) -> None:
         """Everything but the couplings between pads and wall, which come as pads touch."""
-        rows, columns = [], []
-        for part in (self.model.entries(), *map(self._own_entries, self.fingers)):
-            rows.append(part[0])
-            columns.append(part[1])
+        rows, columns = zip(self.model.entries, *map(self._own_entries, self.fingers), strict=True)
         self.pattern = Pattern(self.size, np.concatenate(rows), np.concatenate(columns))
-        self._wall_slots = self.pattern.slots(*self.model.entries())
-        self._foam_slots = [self.pattern.slots(*self._foam_entries(f)) for f in self.fingers]
+        self._wall_slots = self.pattern.slots(*self.model.entries)
+        self._foam_slots = [self.pattern.slots(*f.foam_entries) for f in self.fingers]
         self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
         if len(self.fingers) == 2:
             f = self.fingers[0]
-            columns = self._foam_entries(f)[1][f.foam.closing_entries]
-            self._balance_slots = self.pattern.slots(np.full_like(columns, self.fingers[1].closing), columns)
-
-    def _foam_entries(self, f: Finger) -> tuple[IntArray, IntArray]:
-        return _shift(f.foam.rows, f.offset), _shift(f.foam.columns, f.offset)
+            back = f.foam_entries[1][f.foam.closing_entries]
+            self._balance_slots = self.pattern.slots(np.full_like(back, self.fingers[1].closing_dof), back)
 
     def _own_entries(self, f: Finger) -> tuple[IntArray, IntArray]:
-        rows, columns = self._foam_entries(f)
-        pair = [a.ravel() for a in np.broadcast_arrays(f.dofs[:, :, :, None], f.pressures[:, None, None, :])]
-        rows, columns = np.concatenate([rows, pair[0], pair[1]]), np.concatenate([columns, pair[1], pair[0]])
-        if f is self.fingers[-1] and f is not self.fingers[0]:  # its closing row may hold the balance of both sheets
-            other = self.fingers[0]
-            back = _shift(other.foam.columns[other.foam.closing_entries], other.offset)
-            rows = np.concatenate([rows, np.full_like(back, f.closing), [other.closing]])
-            columns = np.concatenate([columns, back, [f.closing]])
-        return rows.astype(np.int32), columns.astype(np.int32)
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """No bounds: the complementarity is in the residual."""
-        return np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        one, other = pairs(f.dofs[:, :, :, None], f.pressure_dofs[:, None, None, :])
+        rows, columns = [f.foam_entries[0], one, other], [f.foam_entries[1], other, one]
+        if f is self.fingers[-1] and f is not self.fingers[0]:
+            # its closing row may hold the balance of both backing plates
+            first = self.fingers[0]
+            back = first.foam_entries[1][first.foam.closing_entries]
+            rows += [np.full_like(back, f.closing_dof), np.array([first.closing_dof], np.int32)]
+            columns += [back, np.array([f.closing_dof], np.int32)]
+        return np.concatenate(rows), np.concatenate(columns)
 
     def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[_Evaluated]:
         """Evaluate the contact of all fingers; adds to the forces on the wall's nodes."""
         v, w = self.model.outer(x[: self.model.size])
-        found = []
+        contacts = []
         for f, places in zip(self.fingers, self.places, strict=True):
-            facing = face(f.wall, f.points(x)[1], places, v, w)
+            facing = face(f.wall, f.object_points(x), places, v, w)
             pad, lam = f.pad, f.pressure(x)[f.nodes]
             (weighted, part), force = np.empty((2, *f.nodes.shape)), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
             contact_forces(
                 pad.face_N, pad.face_area, lam, facing.gap, facing.normal, facing.nodes, facing.N, f.R,
                 weighted, part, force, wall_force,
             )  # fmt: skip
-            gaps, faced = (np.bincount(f.nodes.ravel(), sums.ravel(), len(pad.node_area)) for sums in (weighted, part))
-            gaps = np.where(faced > CARRIED * pad.node_area, gaps, FAR * pad.node_area)
-            active = pad.node_area * (f.pressure(x) / f.kappa) - gaps > 0.0
-            found.append(_Evaluated(facing, lam, gaps, active, force))
-        return found
+            # a node that hangs over the rim with most of its area would put all of its pressure on the rest
+            gaps = np.where(f.nodal(part) > CARRIED * f.area, f.nodal(weighted), FAR * f.area)
+            contacts.append(_Evaluated(facing, lam, gaps, f.active(x[f.pressures], gaps), force))
+        return contacts
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
         R, wall_force = np.zeros(self.size), self._no_force()
         try:
             contacts = self._contact(x, wall_force)
+        # a point without a place on the wall: refuse the step, a shorter one will find it
         except ArithmeticError:
             return np.full(self.size, np.nan)
-        self._pressing = np.concatenate([c.active for c in contacts])
+        self._active_set = np.concatenate([c.active for c in contacts])
         R[: self.model.size] = self.model.residual(x[: self.model.size], wall_force)
         for f, c in zip(self.fingers, contacts, strict=True):
             own, smallest = f.foam.force(x[f.own])
             if not smallest > 0.0:
                 return np.full(self.size, np.nan)
-            own += gather(f.local_dofs, c.force, f.pad.size)
-            pressed = f.pad.node_area * x[f.own][f.pad.closing_dof + 1 :]
-            own[f.pad.closing_dof + 1 :] = f.kappa * (pressed - np.maximum(0.0, pressed - c.weighted))
-            R[f.own] = own
+            R[f.own] = own + gather(f.local_dofs, c.force, f.pad.size)
+            R[f.pressures] = f.contact_rows(x[f.pressures], c.weighted)
         self._drive(x, R)
         return R
 
     def _drive(self, x: FloatArray, R: FloatArray) -> None:
-        """Rows of the travels; they hold the forces on the sheets so far."""
+        """Rows of the closing displacements; they hold the forces on the backing plates so far."""
         one, last = self.fingers[0], self.fingers[-1]
         if self.control.force is not None:
             for f in self.fingers:
-                R[f.closing] -= self.control.force * f.pad.share
+                R[f.closing_dof] -= self.control.force * f.pad.share
             return
         if last is not one:
-            R[last.closing] = R[last.closing] / last.pad.share - R[one.closing] / one.pad.share
-        closing = np.mean([x[f.closing] for f in self.fingers])
-        R[one.closing] = self.stiffness * (closing - self.control.closing)
+            R[last.closing_dof] = R[last.closing_dof] / last.pad.share - R[one.closing_dof] / one.pad.share
+        closing = np.mean([x[f.closing_dof] for f in self.fingers])
+        R[one.closing_dof] = self.stiffness * (closing - self.control.closing)
 
-    def tangent(self, x: FloatArray) -> FloatArray:
+    def tangent(self, x: FloatArray) -> None:
         """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
         q = x[: self.model.size].copy()
         wall = self.model.tangent(q, self._before)
         self._before, self._by_force = q, self.control.force is not None
         contacts = self._contact(x, self._no_force())
-        self._held = np.concatenate([c.active for c in contacts])
+        self._tangent_set = np.concatenate([c.active for c in contacts])
         for f, values in zip(self.fingers, self._values, strict=True):
             f.foam.stiffness(x[f.own], values)
+        # adding the contact may find entries without a place; the pattern grows and all is filled once more
         while True:
             self._fill(wall, contacts)
             if all([self._add_contact(f, c) for f, c in zip(self.fingers, contacts, strict=True)]):
-                return self.pattern.values
+                return
             self._grow(contacts)
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """Whether the last tangent may serve once more, as in ``fem.contact.problem``."""
-        if self._by_force != (self.control.force is not None) or not np.array_equal(self._pressing, self._held):
+        same_control = self._by_force == (self.control.force is not None)
+        if not same_control or not np.array_equal(self._active_set, self._tangent_set):
             return False
         if first:
             self._before = x[: self.model.size].copy()  # the wall's next tangent counts its step from here
@@ -232,27 +209,27 @@ class GripProblem:
         for f, slots, own, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
             add_up(slots, own, values)
             idle = np.flatnonzero(~c.active)
-            index = f.offset + f.pad.closing_dof + 1 + idle
-            values[self.pattern.slots(index, index)] += f.kappa * f.pad.node_area[idle]
+            index = f.closing_dof + 1 + idle
+            values[self.pattern.slots(index, index)] += f.kappa * f.area[idle]
         if self.control.force is None:
             self._fill_closing_rows(values)
 
     def _fill_closing_rows(self, values: FloatArray) -> None:
-        """Under displacement control the first row holds the mean closing, the second the balance of both sheets."""
+        """Under displacement control the first row holds the mean closing, the second the balance of both plates."""
         one, last = self.fingers[0], self.fingers[-1]
         back = self._foam_slots[0][one.foam.closing_entries]
         if last is not one:
-            values[self.pattern.start[last.closing] : self.pattern.start[last.closing + 1]] /= last.pad.share
+            values[self.pattern.start[last.closing_dof] : self.pattern.start[last.closing_dof + 1]] /= last.pad.share
             add_up(self._balance_slots, -self._values[0][one.foam.closing_entries] / one.pad.share, values)
         values[back[back >= 0]] = 0.0
-        closings = np.array([f.closing for f in self.fingers])
-        values[self.pattern.slots(np.full_like(closings, one.closing), closings)] = self.stiffness / len(closings)
+        closings = np.array([f.closing_dof for f in self.fingers])
+        values[self.pattern.slots(np.full_like(closings, one.closing_dof), closings)] = self.stiffness / len(closings)
 
     def _add_contact(self, f: Finger, c: _Evaluated) -> bool:
         pad, facing, pattern = f.pad, c.facing, self.pattern
         return contact_tangent(
             pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
-            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressures, self.model.first,
+            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressure_dofs, self.model.first,
             self.model.second, pattern.start, pattern.column, pattern.values,
         )  # fmt: skip
 
@@ -261,14 +238,15 @@ class GripProblem:
         rows, columns = [], []
         for f, c in zip(self.fingers, contacts, strict=True):
             points = f.pad.face_N.shape[0]
+            # facets that already press, or that the next iteration may close
             near = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
             faces = np.repeat(np.arange(len(f.nodes)), points)
             pick = near[faces] & (c.facing.gap < FAR)
-            own = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressures], axis=1)[faces[pick]]
+            own = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[faces[pick]]
             nodes = c.facing.nodes[pick]
             other = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2).reshape(len(nodes), -1)
-            pair = [a.ravel() for a in np.broadcast_arrays(own[:, :, None], other[:, None, :])]
-            among = [a.ravel() for a in np.broadcast_arrays(other[:, :, None], other[:, None, :])]
+            pair = pairs(own[:, :, None], other[:, None, :])
+            among = pairs(other[:, :, None], other[:, None, :])
             rows += [*pair, among[0]]
             columns += [*pair[::-1], among[1]]
         moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
@@ -283,19 +261,19 @@ class GripProblem:
             self._balance_slots = move(self._balance_slots)
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
-        """Factor that keeps the change of the travels and the squeezing of every element within reason."""
+        """Factor that keeps the change of closing displacements and the compression of every element within reason."""
         return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_CLOSING) for f in self.fingers)
 
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
         f = self.fingers[number]
         c = self._contact(x, self._no_force())[number]
-        own, _ = f.points(x)
+        own = f.points(x)
         normal = np.where(c.facing.gap[:, None] < FAR, c.facing.normal @ f.R, [0.0, 0.0, -1.0]).reshape(own.shape)
         gap = c.facing.gap.reshape(own.shape[:2])
         pressure = borne(f.pressure(x), c.active)
-        load = np.where(gap < FAR, f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T), 0.0)
-        return pressure, c.weighted / f.pad.node_area, ContactPoints(own, normal, gap, load)
+        load = np.where(gap < FAR, f.loads(pressure), 0.0)
+        return pressure, c.weighted / f.area, ContactPoints(own, normal, gap, load)
 
     def _no_force(self) -> FloatArray:
         return np.zeros((len(self.model.first), 3))
@@ -310,15 +288,10 @@ class GripProblem:
         """State of the whole shell ``(6 k,)`` [m]."""
         return self.model.state(x[: self.model.size])
 
-    def sheet_force(self, x: FloatArray) -> float:
-        """Normal force on the sheets [N], mean of the fingers."""
-        return float(np.mean([f.foam.sheet_force(x[f.own]) for f in self.fingers]))
+    def normal_force(self, x: FloatArray) -> float:
+        """Normal force on the backing plates [N], mean of the fingers."""
+        return float(np.mean([f.foam.normal_force(x[f.own]) for f in self.fingers]))
 
     def closing(self, x: FloatArray) -> float:
-        """Closing displacement of the sheets [m], mean of the fingers."""
-        return float(np.mean([x[f.closing] for f in self.fingers]))
-
-
-def _shift(index: IntArray, offset: int) -> IntArray:
-    """Unknowns of a part as unknowns of the whole; fixed ones stay fixed."""
-    return np.where(index >= 0, index + offset, -1).astype(np.int32)
+        """Closing displacement of the backing plates [m], mean of the fingers."""
+        return float(np.mean([x[f.closing_dof] for f in self.fingers]))

@@ -8,7 +8,7 @@ turn about its approach (``flipped``), and its results are turned back.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -31,37 +31,10 @@ HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Supported:
-    """Shell with its support.
+    """Shell with weak springs ``shell.springs``, and which of its numbers ``fixed (6 k,)`` are zero by its support."""
 
-    Attributes
-    ----------
-    shell : Shell
-        Has the weak springs in ``shell.springs``.
-    fixed : (6 k,) array of bool
-        Numbers that are zero: by the planes of symmetry and by the support.
-    held : (6 k,) array of bool
-        Those of them that the support fixes.
-    symmetry : (bool, bool)
-        As the mesh's.
-    """
-
-    shell: Shell
+    shell: Shell[BodyMesh]
     fixed: FloatArray
-    held: FloatArray
-    symmetry: tuple[bool, bool]
-
-    def reaction(self, q: FloatArray, load: FloatArray | None = None) -> FloatArray:
-        """Force ``(3,)`` [N] of the whole body's support and weak springs on it in the equilibrium ``q (6 k,)``.
-
-        ``load (6 k,)`` are the outer forces on the held numbers, none by default. In a frictionless grasp of a slope
-        this is what the pads fail to hold: more than friction could carry means that the body slides out.
-        """
-        force = -self.shell.springs * q
-        at = self.held
-        force[at] = self.shell.residual(q)[at] - (0.0 if load is None else load[at])
-        total = force.reshape(-1, 6)[:, :3].sum(axis=0) * 2.0 ** sum(self.symmetry)
-        total[:2][list(self.symmetry)] = 0.0  # the other side's cancel
-        return total
 
 
 def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = WEAK) -> Supported:
@@ -86,11 +59,11 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
     if not stiffness > 0:
         raise ValueError(f"the weak springs need a positive stiffness, found {stiffness} N/m")
     shell = Shell(mesh, material.young_modulus, material.poisson_ratio)
+    # spread by area, so that they resist rigid motions alike whatever the mesh
     shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
     held = np.zeros((shell.nodes, 6), dtype=bool)
     SUPPORTS[support](mesh, held)
-    held = held.ravel() & ~mesh.symmetric
-    return Supported(shell, held | mesh.symmetric, held, mesh.symmetry)
+    return Supported(shell, held.ravel() | mesh.symmetric)
 
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
@@ -102,11 +75,9 @@ def _standing(mesh: BodyMesh, held: FloatArray) -> None:
     held[mesh.foot, 2] = True
 
 
-def _free(mesh: BodyMesh, held: FloatArray) -> None:
-    """Nothing but the weak springs."""
-
-
-SUPPORTS = {"clamped": _clamped, "standing": _standing, "free": _free}
+SUPPORTS: dict[str, Callable[[BodyMesh, FloatArray], None]] = {
+    "clamped": _clamped, "standing": _standing, "free": lambda mesh, held: None,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -195,6 +166,7 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
         same = np.abs(p.rotation - q.rotation).max() <= ALIKE
         return same and np.abs(p.origin - q.origin).max() <= ALIKE * size
 
+    # the plane y = 0 halves both pads, the plane x = 0 makes one finger the other's image
     across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, ALIKE * size) for pose in (one, two))
     between = allowed[0] and turned.symmetric[0] and alike(_image(one), two)
     flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in (one, two))
@@ -213,6 +185,7 @@ def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh:
     return (LinearWall if linear else NonlinearWall)(one.shell, one.fixed), [wall] * len(held.poses)
 
 
+# the indicator of every candidate asks for the same factors
 @lru_cache(maxsize=4)
 def object_factors(
     body: ThinWalled, angle: float, mirrors: tuple[bool, bool], mesh: WallMesh, half: float
@@ -226,8 +199,9 @@ def object_factors(
 
 def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
     surface = Turned(body.surface, held.angle, body.round)
-    thickness = body.thickness if np.ndim(body.thickness) == 0 else [list(pair) for pair in body.thickness]
-    mesh = body_mesh(surface, thickness, size, held.mirrors, open_top=body.open_top, base_thickness=body.base_thickness)
+    mesh = body_mesh(
+        surface, body.thickness, size, held.mirrors, open_top=body.open_top, base_thickness=body.base_thickness
+    )
     return supported(mesh, body.material, body.support, body.springs)
 
 

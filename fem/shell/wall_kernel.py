@@ -1,9 +1,9 @@
 """Compiled loop over the points of a pad that press on a deformable wall.
 
 At a point with the pressure ``p = sum N_i lam_i`` the pad's node ``b`` gets ``-p dA N_b n`` and the wall's node ``a``
-gets ``p dA N_a n``; the weighted gap of a node of the front is ``int N_i g dA``. Points that face no wall are left out
-of both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``facing``. Pad quantities are
-in the pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
+gets ``p dA N_a n``; the weighted gap of a contact node is ``int N_i g dA``. Points that face no wall are left out of
+both, so that a pad over a rim is carried up to the rim. Derivatives are those of ``facing``. Pad quantities are in the
+pad's frame, ``x_object = R x_pad + origin``; the wall's in the object's.
 
 A node of the wall has unknowns ``first``, the displacement of the middle, and ``second``, the change of the director:
 both move the outer face, and so the same force works on both.
@@ -87,6 +87,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
     for f in range(area.shape[0]):
         engaged = False
         for i in range(k):
+            # facets that neither press nor are about to have no couplings, and most have none
             engaged = engaged or active[f, i] or lam[f, i] != 0.0
         if not engaged:
             continue
@@ -139,6 +140,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
                 for j in range(t + 24 + (0 if gap_row else k)):
                     if column_dof[j] < 0:
                         continue
+                    # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
                     place = low + np.searchsorted(column[low:high], column_dof[j])
                     if place == high or column[place] != column_dof[j]:
                         complete = False

@@ -8,7 +8,7 @@ cautious value for blown walls, which are softer where they were stretched littl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,19 +62,18 @@ def wall_material(
     ValueError
         For an unknown name, or values that are missing or that no wall has.
     """
-    if name is not None and name.lower() not in MATERIALS:
+    if name is None:
+        if young_modulus is None or poisson_ratio is None:
+            known = ", ".join(MATERIALS)
+            raise ValueError(f"a wall material needs a name ({known}) or young_modulus and poisson_ratio")
+        return WallMaterial(young_modulus, poisson_ratio, yield_strength)
+    if name.lower() not in MATERIALS:
         raise ValueError(
             f"wall material '{name}' is unknown; choose one of {', '.join(MATERIALS)}, or give young_modulus "
             "and poisson_ratio"
         )
-    base = MATERIALS[name.lower()] if name is not None else None
-    if base is None and (young_modulus is None or poisson_ratio is None):
-        raise ValueError(f"a wall material needs a name ({', '.join(MATERIALS)}) or young_modulus and poisson_ratio")
-    return WallMaterial(
-        base.young_modulus if young_modulus is None else young_modulus,
-        base.poisson_ratio if poisson_ratio is None else poisson_ratio,
-        (base.yield_strength if base else None) if yield_strength is None else yield_strength,
-    )
+    given = {"young_modulus": young_modulus, "poisson_ratio": poisson_ratio, "yield_strength": yield_strength}
+    return replace(MATERIALS[name.lower()], **{key: value for key, value in given.items() if value is not None})
 
 
 @dataclass(frozen=True)
@@ -120,12 +119,3 @@ def faces(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
         strain = np.dstack([membrane + zeta * bending, shear])
         states.append(FaceState(strain, strain @ C))
     return states[0], states[1]
-
-
-def largest(shell: Shell, q: FloatArray) -> dict[str, float]:
-    """Largest equivalent stress [Pa] and principal strain (by size) of each face: what a wall has to bear."""
-    result = {}
-    for name, face in zip(("outer", "inner"), faces(shell, q), strict=True):
-        result[f"{name}_von_mises"] = float(face.von_mises.max())
-        result[f"{name}_strain"] = float(np.abs(face.principal_strain).max())
-    return result

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from skfem import ElementQuad1
 
-from softjaw.fem.objects.outer_surface import OuterSurface
+from softjaw.fem.objects.outer_surface import OuterSurface, Turned
 from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
 
+Outer = OuterSurface | Turned
+Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
 SAMPLES = 4000  # of the wanted element size along a line
 TURN = np.radians(25.0)  # largest turn of the outline within one element
 SQUARE = ElementQuad1()
@@ -59,6 +61,7 @@ class MeshSize:
 
 def limited(x: FloatArray, h: FloatArray, growth: float) -> FloatArray:
     """Largest sizes below ``h (n,)`` at the even places ``x (n,)`` that grow by at most ``growth`` per length."""
+    # two sweeps of a running minimum, left to right and back, are exact for sizes on a line
     drift = growth * x
     rising = np.minimum.accumulate(h - drift) + drift
     return np.minimum(rising, np.minimum.accumulate((h + drift)[::-1])[::-1] - drift)
@@ -72,24 +75,22 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
     fine = np.linspace(start, end, SAMPLES)
     density = 1.0 / np.interp(fine, x, h)
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
+    # rounding just above a whole number of intervals must not add one
     n = multiple * max(1, int(np.ceil((count[-1] - 1e-6) / multiple)))
     places = np.interp(np.arange(n + 1) * count[-1] / n, count, fine)
     places[[0, -1]] = start, end
     return places
 
 
-def along(
-    surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, hole: float, marks: Sequence[float] = ()
-) -> FloatArray:
+def along(surface: Outer, size: MeshSize, open_bottom: bool, open_top: bool, marks: Sequence[float] = ()) -> FloatArray:
     """Grid lines along the outline, with one on the edge of each flat lid and at each of the places ``marks``."""
-    begin = surface.wall[0] if open_bottom else hole
+    begin = surface.wall[0] if open_bottom else 0.0
     end = surface.wall[1] if open_top else surface.end
-    if hole > 0 and not (hole < surface.flat[0] and not open_bottom):
-        raise ValueError(f"a hole of radius {hole:g} m needs a flat bottom that is larger")
     low, high = (surface.station(z) for z in size.heights)
     x = np.linspace(begin, end, SAMPLES)
     off = np.maximum(np.maximum(low - x, x - high), 0.0)
     bend = np.abs(surface.curve.curvature(x))
+    # fine where pads touch, and wherever the outline bends: facets must follow a rounded edge
     h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
     h = limited(x, h, size.growth)
     edges = sorted({edge for edge in (*surface.flat, *marks) if begin + 1e-9 < edge < end - 1e-9})
@@ -97,14 +98,14 @@ def along(
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
 
-def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
+def around(surface: Outer, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
     """Grid lines round the body; the sizes are true at the middle of the gripped heights."""
     begin, end = {
         (False, False): (size.angles[0], size.angles[0] + 2 * np.pi),
         (False, True): (0.0, np.pi),
         (True, False): (-0.5 * np.pi, 0.5 * np.pi),
         (True, True): (0.0, 0.5 * np.pi),
-    }[tuple(bool(plane) for plane in symmetry)]
+    }[bool(symmetry[0]), bool(symmetry[1])]
     s = surface.station(0.5 * sum(size.heights))
     fine = np.linspace(0, 4 * np.pi, 2881) - 2 * np.pi
     speed = np.linalg.norm(surface.jets(fine, s)[:, 1], axis=1)
@@ -112,11 +113,11 @@ def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -
     turn = np.interp(0.0, fine, arc) - np.interp(-2 * np.pi, fine, arc)
     middles = np.interp(np.mod(size.angles, 2 * np.pi), fine, arc)
 
-    ends = np.interp([begin, end], fine, arc)
-    x = np.linspace(*ends, SAMPLES)
+    first, last = (float(place) for place in np.interp([begin, end], fine, arc))
+    x = np.linspace(first, last, SAMPLES)
     off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
     h = np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
-    theta = np.interp(divided(*ends, x, h, 4 >> sum(symmetry)), arc, fine)
+    theta = np.interp(divided(first, last, x, h, 4 >> sum(symmetry)), arc, fine)
     theta[[0, -1]] = begin, end
     return theta
 
@@ -139,7 +140,7 @@ class BodyMesh(ShellMesh):
         Numbers that these planes fix.
     """
 
-    surface: OuterSurface
+    surface: Outer
     theta: FloatArray
     s: FloatArray
     number: IntArray
@@ -156,27 +157,23 @@ class BodyMesh(ShellMesh):
         """Part of the body that is meshed: 1, 1/2 or 1/4."""
         return 0.5 ** sum(self.symmetry)
 
-    def ring(self, s: float) -> IntArray:
-        """Nodes of the grid line nearest to the place s on the outline."""
-        return np.unique(self.number[:, np.abs(self.s - s).argmin()])
-
     @property
     def foot(self) -> IntArray:
         """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
-        return self.ring(self.surface.flat[0])
+        return np.unique(self.number[:, np.abs(self.s - self.surface.flat[0]).argmin()])
 
     def locate(self, theta: ArrayLike, s: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
         """Nodes ``(n, 4)``, shape functions ``N (n, 4)`` and their derivatives by theta and s ``(n, 2, 4)`` at points.
 
         A value interpolated with ``N`` is bilinear in theta and s. Points outside the mesh get the nearest element.
         """
-        theta, s = np.atleast_1d(theta).astype(float), np.atleast_1d(s).astype(float)
+        t, p = (np.atleast_1d(np.asarray(place, dtype=float)) for place in (theta, s))
         if self.closed:
-            theta = self.theta[0] + np.mod(theta - self.theta[0], 2 * np.pi)
-        i = np.clip(np.searchsorted(self.theta, theta, side="right") - 1, 0, len(self.theta) - 2)
-        j = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+            t = self.theta[0] + np.mod(t - self.theta[0], 2 * np.pi)
+        i = np.clip(np.searchsorted(self.theta, t, side="right") - 1, 0, len(self.theta) - 2)
+        j = np.clip(np.searchsorted(self.s, p, side="right") - 1, 0, len(self.s) - 2)
         h, k = self.theta[i + 1] - self.theta[i], self.s[j + 1] - self.s[j]
-        u, v = (theta - self.theta[i]) / h, (s - self.s[j]) / k
+        u, v = (t - self.theta[i]) / h, (p - self.s[j]) / k
         basis = [SQUARE.lbasis(np.stack([u, v]), corner) for corner in range(4)]
         N = np.stack([value for value, _ in basis], axis=1)
         dN = np.stack([slope for _, slope in basis]).transpose(2, 1, 0) / np.stack([h, k], axis=1)[:, :, None]
@@ -187,15 +184,14 @@ class BodyMesh(ShellMesh):
 
 
 def body_mesh(
-    surface: OuterSurface,
-    thickness: float | Sequence[tuple[float, float]],
+    surface: Outer,
+    thickness: Thickness,
     size: MeshSize,
     symmetry: tuple[bool, bool] = (False, False),
     *,
     open_top: bool = True,
     open_bottom: bool = False,
     base_thickness: float | None = None,
-    hole: float = 0.0,
 ) -> BodyMesh:
     """Mesh of the wall inside a surface; its outer face lies on the surface.
 
@@ -211,8 +207,6 @@ def body_mesh(
         Whether the mesh ends at the last or begins at the first given section instead of on the axis.
     base_thickness : float, optional
         Thickness of the flat bottom [m]; the rim above it changes over to the wall's.
-    hole : float
-        Radius of a hole left open in the middle of a flat bottom [m]; without one the elements there are triangles.
 
     Raises
     ------
@@ -222,43 +216,43 @@ def body_mesh(
     for plane, wanted, found in zip("xy", symmetry, surface.symmetric, strict=True):
         if wanted and not found:
             raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
-    s = along(surface, size, open_bottom, open_top, hole, _steps(surface, thickness))
+    s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
     number, first = _numbers(surface, theta, s, whole=not any(symmetry))
     t, p = theta[first[0]], s[first[1]]
     D = 0.5 * _wall(surface, thickness, base_thickness, p)[:, None] * surface.normals(t, p)
     X = surface.jets(t, p)[:, 0] - D
     planes = _planes(symmetry, theta, number, len(X))
-    return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, tuple(symmetry), planes)
+    return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, symmetry, planes)
 
 
-def _steps(surface: OuterSurface, thickness: float | Sequence[tuple[float, float]]) -> list[float]:
+def _steps(surface: Outer, thickness: Thickness) -> list[float]:
     """Places on the wall where a given thickness changes its slope: the mesh needs a line there."""
-    if np.ndim(thickness) == 0:
+    if isinstance(thickness, float):
         return []
     z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
     low, high = z.min() + AT_END, z.max() - AT_END
     return [surface.station(height) for height, _ in thickness if low < height < high]
 
 
-def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
+def _numbers(surface: Outer, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
     """Node on each crossing, and the (theta, s) line numbers ``(2, k)`` of every node's first crossing."""
     m, n = len(theta), len(s)
     key = np.arange(m * n).reshape(m, n)
     if whole:
+        # the last line of a whole body is its first one
         key[-1] = key[0]
     for end, j in ((0.0, 0), (surface.end, n - 1)):
         if s[j] == end:
+            # all angles meet in one node on the axis, and its elements become triangles
             key[:, j] = key[0, j]
     first, number = np.unique(key, return_inverse=True)
     return number.reshape(m, n).astype(np.int32), np.stack([first // n, first % n])
 
 
-def _wall(
-    surface: OuterSurface, thickness: float | Sequence[tuple[float, float]], base: float | None, s: FloatArray
-) -> FloatArray:
+def _wall(surface: Outer, thickness: Thickness, base: float | None, s: FloatArray) -> FloatArray:
     """Thickness ``(n,)`` at the places s."""
-    table = np.atleast_2d(thickness) if np.ndim(thickness) else np.array([[0.0, float(thickness)]])
+    table = np.array([(0.0, thickness)] if isinstance(thickness, float) else thickness)
     z = surface.curve.derivative(s)[:, 0]
     t = np.interp(z, table[:, 0], table[:, 1])
     if base is not None:

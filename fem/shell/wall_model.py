@@ -1,24 +1,30 @@
 """Two models of a wall that gives way: the nonlinear shell, and the linear one.
 
-Both tell a contact problem the same things: unknowns of their own, forces and tangent, where the outer face's nodes
+Both give a contact problem the same things: unknowns of their own, forces and tangent, where the outer face's nodes
 are, and which unknowns move them (``fem.shell.wall_kernel``: ``first`` and ``second``).
 """
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from softjaw.fem.contact.pattern import Pattern, add_up
+from softjaw.fem.assembly import Pattern, add_up
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.petsc import Factors
 from softjaw.fem.shell.element import FloatArray, IntArray, Shell
-from softjaw.fem.shell.solve import free_numbers
+from softjaw.fem.shell.wall_mesh import BodyMesh
 
 AT_ONCE = 192  # right-hand sides; bounds the memory
 LOOSE = 1e15  # ratio of the largest to the smallest stiffness from which on a shell counts as loose
+
+
+def free_numbers(fixed: FloatArray) -> tuple[IntArray, IntArray]:
+    """Unknown of each shell number, -1 where ``fixed (6 k,)`` is set, and the numbers that are unknown."""
+    free = np.flatnonzero(~np.asarray(fixed, dtype=bool).ravel())
+    unknown = np.full(np.size(fixed), -1, dtype=np.int32)
+    unknown[free] = np.arange(len(free), dtype=np.int32)
+    return unknown, free
 
 
 class LinearShell:
@@ -32,16 +38,15 @@ class LinearShell:
 
     def __init__(self, shell: Shell, fixed: FloatArray) -> None:
         self.shell = shell
-        self.unknown, self.free = free_numbers(fixed)
-        rows, columns = shell.entries(self.unknown)
-        pattern = Pattern(len(self.free), rows, columns)
-        add_up(pattern.slots(rows, columns), shell.tangent(np.zeros(shell.size)), pattern.values)
+        unknown, self.free = free_numbers(fixed)
+        pattern = _matrix(len(self.free), shell.entries(unknown), shell.tangent(np.zeros(shell.size)))
         self._factors = Factors(pattern)
         self._refuse_loose(float(np.abs(pattern.values).max()))
 
     def _refuse_loose(self, stiffest: float) -> None:
         """Rounding keeps a loose body's pivots from being exactly zero; its displacements are beyond all bounds."""
         load = np.zeros(self.shell.size)
+        # any load with a share of every motion will do; the seed keeps a run the same to the bit
         load[self.free] = np.random.default_rng(0).normal(size=len(self.free))
         ratio = stiffest * np.abs(self.solve(load)).max() / np.abs(load).max()
         if not ratio < LOOSE:
@@ -66,6 +71,7 @@ class LinearShell:
         """
         u = (6 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()
         C, W = np.empty((len(u), len(u))), np.empty((len(u), len(u)))
+        # the whole load matrix of a fine wall would not fit into memory
         for k in range(0, len(u), AT_ONCE):
             part = u[k : k + AT_ONCE]
             load = np.zeros((self.shell.size, len(part)))
@@ -80,66 +86,47 @@ class LinearShell:
         self._factors.destroy()
 
 
-class WallModel(Protocol):
-    """What a contact problem asks of a wall with ``n`` unknowns and ``k`` nodes."""
-
-    shell: Shell
-    size: int
-    first: IntArray
-    second: IntArray
-
-    def entries(self) -> tuple[IntArray, IntArray]:
-        """Rows and columns of `tangent`'s values."""
-
-    def outer(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Displacement of the outer face and change of the director at every node, ``(k, 3)`` each [m]."""
-
-    def residual(self, y: FloatArray, force: FloatArray) -> FloatArray:
-        """Inner forces plus ``force (k, 3)`` on the outer face's nodes: ``(n,)`` [N]."""
-
-    def tangent(self, y: FloatArray, before: FloatArray | None) -> FloatArray:
-        """Values of the tangent at ``y``; ``before`` is the state at the last tangent of the same solve, if any."""
-
-    def state(self, y: FloatArray) -> FloatArray:
-        """State of the whole shell ``(6 k,)`` that belongs to ``y``."""
-
-
 class NonlinearWall:
-    """Shell with finite displacements; its unknowns are its numbers that are not ``fixed (6 k,)``."""
+    """Shell with finite displacements, as part of a contact problem.
 
-    def __init__(self, shell: Shell, fixed: FloatArray) -> None:
+    Parameters
+    ----------
+    shell : Shell
+    fixed : (6 k,) array of bool
+        Numbers that are zero; the others are the ``n`` unknowns.
+
+    Attributes
+    ----------
+    first, second : (k, 3) arrays
+        Unknowns that move every node's middle and director, -1 where fixed; both move the outer face.
+    entries : (rows, columns)
+        Of `tangent`'s values.
+    """
+
+    def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
         self.shell = shell
-        self.free = np.flatnonzero(~np.asarray(fixed, dtype=bool))
+        unknown, self.free = free_numbers(fixed)
         self.size = len(self.free)
-        unknown = np.full(shell.size, -1, dtype=np.int32)
-        unknown[self.free] = np.arange(self.size, dtype=np.int32)
-        self._entries = shell.entries(unknown)
+        self.entries = shell.entries(unknown)
         numbers = unknown.reshape(-1, 6)
         self.first, self.second = np.ascontiguousarray(numbers[:, :3]), np.ascontiguousarray(numbers[:, 3:])
 
-    def entries(self) -> tuple[IntArray, IntArray]:
-        """See `WallModel`."""
-        return self._entries
-
     def outer(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `WallModel`."""
-        parts = self._full(y).reshape(-1, 6)
+        """Displacement of the outer face and change of the director at every node, ``(k, 3)`` each [m]."""
+        parts = self.state(y).reshape(-1, 6)
         return parts[:, :3] + parts[:, 3:], np.ascontiguousarray(parts[:, 3:])
 
     def residual(self, y: FloatArray, force: FloatArray) -> FloatArray:
-        """See `WallModel`; a force on the outer face works on both of a node's vectors."""
-        inner = self.shell.residual(self._full(y)).reshape(-1, 6) + np.hstack([force, force])
+        """Inner forces plus ``force (k, 3)`` on the outer face's nodes, which works on both vectors: ``(n,)`` [N]."""
+        inner = self.shell.residual(self.state(y)).reshape(-1, 6) + np.hstack([force, force])
         return inner.ravel()[self.free]
 
     def tangent(self, y: FloatArray, before: FloatArray | None) -> FloatArray:
-        """See `WallModel`."""
-        return self.shell.tangent(self._full(y), None if before is None else self._full(before))
+        """Values of the tangent at ``y``; ``before`` is the state at the last tangent of the same solve, if any."""
+        return self.shell.tangent(self.state(y), None if before is None else self.state(before))
 
     def state(self, y: FloatArray) -> FloatArray:
-        """See `WallModel`."""
-        return self._full(y)
-
-    def _full(self, y: FloatArray) -> FloatArray:
+        """State of the whole shell ``(6 k,)`` [m] that belongs to the unknowns ``y (n,)``."""
         q = np.zeros(self.shell.size)
         q[self.free] = y
         return q
@@ -152,17 +139,23 @@ class LinearWall(NonlinearWall):
     does not pay: its compliance is dense, and dearer to factorise than the whole sparse stiffness.
     """
 
-    def __init__(self, shell: Shell, fixed: FloatArray) -> None:
+    def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
         super().__init__(shell, fixed)
         self._values = shell.tangent(np.zeros(shell.size))
-        pattern = Pattern(self.size, *self._entries)
-        add_up(pattern.slots(*self._entries), self._values, pattern.values)
+        pattern = _matrix(self.size, self.entries, self._values)
         self.stiffness = csr_matrix((pattern.values, pattern.column, pattern.start), shape=(self.size, self.size))
 
     def residual(self, y: FloatArray, force: FloatArray) -> FloatArray:
-        """See `WallModel`."""
+        """See `NonlinearWall`."""
         return self.stiffness @ y + np.hstack([force, force]).ravel()[self.free]
 
     def tangent(self, y: FloatArray, before: FloatArray | None) -> FloatArray:
-        """See `WallModel`."""
+        """See `NonlinearWall`."""
         return self._values
+
+
+def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -> Pattern:
+    """Compressed rows with the values of these entries."""
+    pattern = Pattern(size, *entries)
+    add_up(pattern.slots(*entries), values, pattern.values)
+    return pattern

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.pattern import Pattern
+from softjaw.fem.assembly import Pattern
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.petsc import Factors
 from softjaw.study import pipeline

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from softjaw.fem.objects.gap import GapObject
     from softjaw.fem.objects.outer_surface import OuterSurface
     from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport
-    from softjaw.fem.pad.backing_plate import Sheet
-    from softjaw.fem.pad.shape import PadShape
+    from softjaw.fem.pad.shape import BackingPlate, PadShape
     from softjaw.study.scene import Scene
     from softjaw.study.scene.objects import Shape, Walled
     from softjaw.study.scene.sections import Gripper
@@ -190,11 +189,11 @@ def pad_material(gripper: Gripper) -> Material:
     return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
 
 
-def sheet(gripper: Gripper) -> Sheet:
+def backing_plate(gripper: Gripper) -> BackingPlate:
     """Plate behind each pad."""
-    from softjaw.fem.pad.backing_plate import Sheet
+    from softjaw.fem.pad.shape import BackingPlate
 
-    return Sheet(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
+    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

@@ -12,15 +12,15 @@ import numpy as np
 
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.friction.patch import FloatArray
-from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.case.build import backing_plate, pad_material, pad_shape
 from softjaw.study.case.margin import surely_below
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
-# In 440 cases (pads, objects, supports, forces up to 13 N) a rigid sheet put e_n off by at most 3.5 times the relative
-# compliance of the sheet that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
-STIFF_SHEET = 0.005
+# In 440 cases (pads, objects, supports, forces up to 13 N) a rigid plate put e_n off by at most 3.5 times the relative
+# compliance of the plate that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
+STIFF_PLATE = 0.005
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
 # tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.
 SMALL_TRACTION = 0.03
@@ -37,10 +37,10 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
 @dataclass(frozen=True)
-class SheetLevel:
-    """Level of the sheets of a scene; ``reason`` is one of `study.quantities.REASONS`.
+class BackingPlateLevel:
+    """Level of the backing plates of a scene; ``reason`` is one of `study.quantities.REASONS`.
 
-    ``compliance`` is the mean deflection of the sheet under an even pressure over that of the pad.
+    ``compliance`` is the mean deflection of the plate under an even pressure over that of the pad.
     """
 
     elastic: bool
@@ -48,21 +48,22 @@ class SheetLevel:
     reason: str
 
 
-def sheet_level(scene: Scene) -> SheetLevel:
+def backing_plate_level(scene: Scene) -> BackingPlateLevel:
     """The level that the scene asks for, else the cheapest whose e_n is good to 2 %."""
     compliance = _compliance(scene.gripper)
     if scene.effects.sheet != "auto":
-        return SheetLevel(scene.effects.sheet == "elastic", compliance, "forced by the scene")
-    if surely_below(compliance, STIFF_SHEET):
-        return SheetLevel(False, compliance, "indicator below the target")
-    return SheetLevel(True, compliance, "indicator above the target")
+        return BackingPlateLevel(scene.effects.sheet == "elastic", compliance, "forced by the scene")
+    if surely_below(compliance, STIFF_PLATE):
+        return BackingPlateLevel(False, compliance, "indicator below the target")
+    return BackingPlateLevel(True, compliance, "indicator above the target")
 
 
 @lru_cache(maxsize=8)
 def _compliance(gripper: Gripper) -> float:
     shape, halves = pad_shape(gripper), tuple(n % 2 == 0 for n in gripper.elements[:2])
     x, y = (tuple(map(float, shape.lines(axis, half))) for axis, half in enumerate(halves))
-    return relative_compliance(x, y, halves, sheet(gripper), shape.size[2] / pad_material(gripper).young_modulus)
+    foam = shape.size[2] / pad_material(gripper).young_modulus
+    return relative_compliance(x, y, halves, backing_plate(gripper), foam)
 
 
 def coupling_level(scene: Scene, contacts: Sequence[Any], walled: bool) -> tuple[str, float, int]:
@@ -83,7 +84,7 @@ def coupling_level(scene: Scene, contacts: Sequence[Any], walled: bool) -> tuple
 
 
 def neglected_traction(state: Any, mu: float) -> float:
-    """Share of the pressure sum that friction would add across it, if every point of the front stuck or slid [-].
+    """Share of the pressure sum that friction would add across it, if every point of the face stuck or slid [-].
 
     A point that moved by ``d`` along the object's surface would be held back by ``min(mu p, E d / thickness)``, as a
     column of foam is that is sheared by ``d``. A slope shows here too: there the whole pad moves along the surface.
@@ -109,21 +110,21 @@ def effects_of(
     """Level, indicator and reason of every effect of one case; keys and levels as in ``EFFECTS``.
 
     The indicators are those of ``INDICATORS``. Levels that change the solve are chosen before it, by
-    `study.case.wall` and `sheet_level`; here they only get their names.
+    `study.case.wall` and `backing_plate_level`; here they only get their names.
     """
     wanted = scene.effects
 
     def only(name: str) -> int:
         return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
 
-    sheet = sheet_level(scene)
+    plate = backing_plate_level(scene)
     S, F_N = (sum(getattr(c.limits["ccm"], name) for c in contacts) for name in ("S", "F_N"))
     curved = [own["ccm"] for own in fits]
     dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
     size = MODEL_SIZES[solving.planes]
     return {
         "object": _object(solving.level),
-        "sheet": (EFFECTS["sheet"][sheet.elastic], sheet.compliance, REASONS.index(sheet.reason)),
+        "sheet": (EFFECTS["sheet"][plate.elastic], plate.compliance, REASONS.index(plate.reason)),
         "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
         "fingers": _fingers(solving, only("fingers")),
         "friction": ("ccm", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),

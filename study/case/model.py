@@ -8,28 +8,28 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.friction_coupling import CoupledProblem, way
+from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
 from softjaw.fem.pad.mesh import Pad
-from softjaw.study.case.build import build_object, pad_material, pad_shape, sheet
+from softjaw.study.case.build import backing_plate, build_object, pad_material, pad_shape
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.effects import sheet_level
+from softjaw.study.case.effects import backing_plate_level
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
-DEEP = 0.9  # of the pad's thickness: how far round the undeformed front the object must be known
+DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
 @lru_cache(maxsize=8)
-def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_sheet: bool) -> Pad:
-    """Discrete pad with its sheet; the same for all candidates, so it is made once."""
-    behind = sheet(gripper) if elastic_sheet else None
+def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_plate: bool) -> Pad:
+    """Discrete pad with its backing plate; the same for all candidates, so it is made once."""
+    behind = backing_plate(gripper) if elastic_plate else None
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
 
 
@@ -74,12 +74,12 @@ def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Po
     reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
     ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
     start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
-    distance = first_touch(obj, start, _front(size), 2.0 * reach)
+    distance = first_touch(obj, start, _contact_face(size), 2.0 * reach)
     return Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
 
 
-def _front(size: tuple[float, float, float]) -> FloatArray:
-    """Points spread over the undeformed front, independent of the mesh, the planes of symmetry among them."""
+def _contact_face(size: tuple[float, float, float]) -> FloatArray:
+    """Points spread over the undeformed contact face, independent of the mesh, the planes of symmetry among them."""
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
     return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
 
@@ -132,8 +132,8 @@ def settings(scene: Scene) -> Settings:
 
 
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
-    """Pad on its sheet; ``rule`` collocates the gaps."""
-    return pad(scene.gripper, symmetry, rule, coarser, sheet_level(scene).elastic)
+    """Pad on its backing plate; ``rule`` collocates the gaps."""
+    return pad(scene.gripper, symmetry, rule, coarser, backing_plate_level(scene).elastic)
 
 
 def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
@@ -144,7 +144,7 @@ def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     fallback = None if nodal is wanted else nodal
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
-        steps = {"problem_of": problem, "way": way, "stepping": Stepping}
+        steps = {"problem_of": problem, "load_steps": load_steps, "stepping": Stepping}
         return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), **steps)
     return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))
 

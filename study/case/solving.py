@@ -70,16 +70,16 @@ class PressedContact(Contact):
         return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
 
     @property
-    def free_front(self) -> float:
-        """How far the unloaded part of the front has come beyond first touch [m]."""
+    def free_face(self) -> float:
+        """How far the unloaded part of the contact face has come beyond first touch [m]."""
         return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
 
 
 def state_flags(contacts: Sequence[PressedContact]) -> Flag:
     """Flags of the solved states of both fingers."""
     one, two = contacts
-    between_fronts = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
-    found = Flag.COLLISION * (one.free_front + two.free_front > between_fronts * (1.0 - ALIKE))
+    between_faces = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
+    found = Flag.COLLISION * (one.free_face + two.free_face > between_faces * (1.0 - ALIKE))
     found |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
     for c in contacts:
@@ -143,7 +143,7 @@ class OnRigid:
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        ladders = (zip(*(p.ladder(forces) for p in own), strict=True) for own in self.presses)
+        ladders = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
         for states in zip(*ladders, strict=True):
             pairs = zip(self.fingers, states, strict=False)
             contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
@@ -171,7 +171,7 @@ class OnWall:
 
     def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        for states in zip(*(g.ladder(forces) for g in self.grips), strict=True):
+        for states in zip(*(g.load_path(forces) for g in self.grips), strict=True):
             each = [self._contacts(held, state) for held, state in zip(self.held, states, strict=True)]
             yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
 

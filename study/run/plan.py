@@ -270,7 +270,7 @@ def wall_size(scene: Any) -> WallSize | None:
 
     def grid(heights: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
-        return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top, 0.0)
+        return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top)
 
     theta, s = grid((low, high))
     wide, tall = grid(_heights(surface))

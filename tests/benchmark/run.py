@@ -64,7 +64,7 @@ def contact_solve() -> None:
     finger = approach(cylinder, pose, SIZE)
     for elements, forces, goal in (((24, 12, 6), (3.0, 10.0, 30.0), 40), ((48, 24, 12), (3.0,), 25)):
         press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), finger.gap)
-        states = list(press.ladder(forces))
+        states = list(press.load_path(forces))
         total, factor, assembly = (
             sum(getattr(s.seconds, k) for s in states) for k in ("total", "factorisation", "assembly")
         )

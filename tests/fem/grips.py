@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from softjaw.fem.contact.extract import extract
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
@@ -14,6 +15,8 @@ from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.friction.frame import contact_frame, in_frame
+from softjaw.friction.wrench import friction_limits
 
 SIZE = (0.03, 0.02, 0.02)
 COARSE = WallMesh(0.003, 0.005, 0.010)
@@ -67,3 +70,10 @@ def _gap(at: Pose):
         return g, normal @ at.rotation, at.rotation.T @ hessian @ at.rotation
 
     return gap
+
+
+def e_n(finger):
+    """Eccentricity parameter of one finger's patch, planar reading [m]."""
+    patch = extract(finger.pad, finger)
+    local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
+    return friction_limits(local, 1.0, "pcm").e_n

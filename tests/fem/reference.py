@@ -8,8 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.load_stepping import Work
+from softjaw.fem.contact.problem import Control
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
@@ -123,7 +126,7 @@ def hertz_cylinder(line_force, R, E_star):
     return Hertz(a, 2 * line_force / (np.pi * a))
 
 
-# -- rigid objects in the pad's frame, touching the centre of the undeformed front ------------------------------------
+# -- rigid objects in the pad's frame, touching the centre of the undeformed contact face ------------------------------
 
 
 def plane(x):
@@ -174,3 +177,22 @@ def e_n(state):
     """Eccentricity parameter of a pressed pad, curved model [m]."""
     patch = extract(state.pad, state)
     return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "ccm").e_n
+
+
+# -- what tests ask of a solver ----------------------------------------------------------------------------------------
+
+
+def dense(problem, x=None, values=None):
+    """Tangent at ``x``, or other ``values`` in its pattern, as a full matrix."""
+    pattern = problem.pattern
+    if x is not None:
+        problem.tangent(x)
+        values = pattern.values
+    return csr_matrix((values, pattern.column, pattern.start), shape=(problem.size,) * 2).toarray()
+
+
+def at_closing(press, closing, x=None):
+    """State at a prescribed closing displacement [m] and the normal force it takes [N], from ``x`` or from scratch."""
+    start = press._bed.guess(closing) if x is None else x
+    x = press._stepping.solve(start, Control(closing=closing), Work())
+    return x, press.problem.normal_force(x)

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.contact.checks import refuse_fall
-from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, way
+from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, load_steps
 from softjaw.fem.contact.load_stepping import falls
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
@@ -29,8 +29,9 @@ from softjaw.fem.objects.spline_surface import spline_surface
 from softjaw.fem.objects.stacked import Stacked, wall_surface
 from softjaw.fem.objects.traced_outline import Rays, _centre_line, cast, centroids, folded
 from softjaw.fem.objects.traced_surface import _symmetric
-from softjaw.fem.pad.backing_plate import Sheet, _plate
+from softjaw.fem.pad.backing_plate import _plate
 from softjaw.fem.pad.mesh import _as_grid, _lines
+from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.facing import FAR, Wall, face
 from softjaw.fem.shell.thin_walled import ThinWalled, _clamped, grasp
 from softjaw.fem.shell.wall_mesh import MeshSize, _planes, _steps, _wall, along, divided
@@ -375,7 +376,7 @@ def test_a_force_falls_by_more_than_rounding(seed):
 def test_a_way_of_whole_steps_has_as_many_forces(seed, steps):
     low = np.random.default_rng(seed).uniform(0.01, 10.0)
     reached, force = moved([low, low * GROWTH**steps], seed)
-    assert len(way(float(reached), float(force))) == steps
+    assert len(load_steps(float(reached), float(force))) == steps
 
 
 @tries
@@ -425,14 +426,14 @@ def test_nodes_on_the_rim_of_the_support_are_held(seed):
     x, y = np.linspace(-0.025, 0.025, 11), np.linspace(-0.011, 0.011, 5)
     scale = np.random.default_rng(seed).uniform(0.3, 3.0)
     support = tuple(scale * np.array([0.020, 0.011]))
-    sheet = Sheet(1e-3, 2e9, 0.35, tuple(moved(support, seed)))
+    sheet = BackingPlate(1e-3, 2e9, 0.35, tuple(moved(support, seed)))
     half, whole = ((x[5:], y[2:], (True, True)), (x, y, (False, False)))
     for lines, other, symmetry in (half, whole):
         _, fixed, free = _plate(tuple(moved(scale * lines, seed)), tuple(moved(scale * other, seed)), symmetry, sheet)
         held = ~free.any(axis=-1)
         assert held.sum() == (6 if all(symmetry) else 15)
         assert fixed.sum() == (6 * 6 + 2 * (3 + 1) if all(symmetry) else 15 * 6)
-    assert outcome(_plate, x[:2], y, (False, False), Sheet(1e-3, 2e9, 0.35, (0.02, 0.011))) is ValueError
+    assert outcome(_plate, x[:2], y, (False, False), BackingPlate(1e-3, 2e9, 0.35, (0.02, 0.011))) is ValueError
 
 
 @tries
@@ -449,7 +450,7 @@ def test_a_length_of_whole_elements_has_as_many(seed, many):
 
 BODY = ThinWalled(of_sections([Section(z, 0.03) for z in (0.0, 0.05, 0.1)]), True, 1e-3, None)
 COARSE = MeshSize(heights=(0.03, 0.05), along=0.006, coarse=0.012)
-LINES = along(BODY.surface, COARSE, True, True, 0.0)
+LINES = along(BODY.surface, COARSE, True, True)
 
 
 @tries
@@ -457,7 +458,7 @@ LINES = along(BODY.surface, COARSE, True, True, 0.0)
 def test_a_slope_of_the_thickness_at_an_end_adds_no_line(seed):
     """Places within rounding of the ends of the mesh, or of the edge of a flat lid's own line."""
     marks = moved([*BODY.surface.wall, BODY.surface.wall[0]], seed)
-    assert len(along(BODY.surface, COARSE, True, True, 0.0, marks)) == len(LINES)
+    assert len(along(BODY.surface, COARSE, True, True, marks)) == len(LINES)
 
 
 @tries

@@ -18,8 +18,7 @@ from softjaw.fem.shell.thin_walled import ThinWalled, supported
 from softjaw.fem.shell.wall_material import wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell
-from tests.fem.grips import can, grip, thin
-from tests.fem.test_grip import e_n
+from tests.fem.grips import can, e_n, grip, thin
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 PET = wall_material("pet")
@@ -204,7 +203,7 @@ def traced_can(facet=0.0015):
 
 def test_a_traced_can_between_two_fingers_is_the_can():
     """Force 1 N and 3 N; the facets' sagitta is 8 um, the travels are about 1 mm."""
-    exact, found = (list(grip(body).ladder((1.0, 3.0))) for body in (thin(), traced_can()))
+    exact, found = (list(grip(body).load_path((1.0, 3.0))) for body in (thin(), traced_can()))
     for a, b in zip(exact, found, strict=True):
         assert b.fingers[0].closing == pytest.approx(a.fingers[0].closing, rel=0.01)
         assert e_n(b.fingers[0]) == pytest.approx(e_n(a.fingers[0]), rel=0.01)

@@ -27,7 +27,7 @@ def foam(det, strain, ellipticity):
     ("state", "error", "words"),
     [
         ((0.5, 0.4, 0.3), STUCK, "stuck at 3 N"),
-        ((0.1, 1.2, 0.9), STUCK, "the pad is squeezed too far: at 3 N its largest strain is 120%"),
+        ((0.1, 1.2, 0.9), STUCK, "the pad is compressed too far: at 3 N its largest strain is 120%"),
         ((0.4, 1.2, -0.06), STUCK, "the foam loses ellipticity: at 3 N .* is -0.06 of the shear modulus"),
         ((0.4, 1.2, -0.06), NotReachedError("the force stays below"), "the force stays below"),
     ],

@@ -146,8 +146,8 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     scene = parse_scene(SPHERE)
     on = 1.0 + ulp
     assert not effects.surely_below(on, 1.0)
-    monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_SHEET * on)
-    assert effects.sheet_level(scene).elastic
+    monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_PLATE * on)
+    assert effects.backing_plate_level(scene).elastic
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
     reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
     assert effects.REASONS[reason].startswith("left out")
@@ -174,7 +174,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0):
         origin = turn.apply([0.0, 0.0, -0.5 * side * distance])
         pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
         made.append(SimpleNamespace(
-            mu=mu, normal=R[:, 2], origin=origin, free_front=free, coarse=False, nodal_instead=False,
+            mu=mu, normal=R[:, 2], origin=origin, free_face=free, coarse=False, nodal_instead=False,
             frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose),
             state=SimpleNamespace(checks=SimpleNamespace(ellipticity=1.0), path_dependent=False),
         ))  # fmt: skip

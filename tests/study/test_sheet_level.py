@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softjaw.study.case.effects import STIFF_SHEET as STIFF
+from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.quantities import REASONS
 from tests.study.test_pipeline import OVAL, cases, e_n, solved
 from tests.study.test_walls import CUP

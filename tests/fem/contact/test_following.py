@@ -28,7 +28,7 @@ def press_of(law=NEO, gap=ROUND, symmetry=(True, True), elements=(12, 6, 4), **c
 
 def last(press, forces):
     """Last state of a list of forces."""
-    *_, state = press.ladder([float(f) for f in forces])
+    *_, state = press.load_path([float(f) for f in forces])
     return state
 
 
@@ -54,27 +54,21 @@ def test_nor_does_it_with_other_laws_and_objects(law, gap):
     assert not at_once.path_dependent
 
 
-def dense(press, entries):
-    K = np.zeros((press.problem.size + 1,) * 2)
-    np.add.at(K, (press.problem.rows, press.problem.columns), entries)
-    return K[:-1, :-1]
-
-
 def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
     """Stable: the tangent on displacements that keep the nodes in contact on the object is positive definite."""
     found = {}
     for stepping in (Stepping, Following):
         press = press_of(stepping=stepping)
         state = last(press, [5, 500])
-        entries, held = press.problem.symmetric_tangent(state.unknowns)
-        K, n = dense(press, entries), press.pad.closing_dof + 1
+        values, active = press.problem.symmetric_tangent(state.unknowns)
+        K, n = reference.dense(press.problem, values=values), press.pad.closing_dof + 1
         np.testing.assert_allclose(K, K.T, atol=1e-12 * np.abs(K).max())
         B = K[n:, :n][np.abs(K[n:, :n]).any(axis=1)]
-        assert len(B) == held == np.count_nonzero(state.pressure > 0)
+        assert len(B) == active == np.count_nonzero(state.pressure > 0)
         _, _, V = np.linalg.svd(B)
-        free = V[held:] @ K[:n, :n] @ V[held:].T
+        free = V[active:] @ K[:n, :n] @ V[active:].T
         negative = int((np.linalg.eigvalsh(free) < 0).sum())
-        assert press.solver.negative_eigenvalues(entries) == held + negative
+        assert press.solver.negative_eigenvalues(values) == active + negative
         found[stepping] = negative
     assert found == {Stepping: 1, Following: 0}
 
@@ -84,7 +78,7 @@ def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
 def test_tangent_of_the_path_by_finite_differences(symmetry, control):
     """Of states at forces 1 % lower and higher, whose nodes in contact are the same."""
     press = press_of(symmetry=symmetry)
-    low, state, high = press.ladder([19.8, 20.0, 20.2])
+    low, state, high = press.load_path([19.8, 20.0, 20.2])
     problem, work = press.problem, Work()
     x = state.unknowns
     if control == "closing":
@@ -97,8 +91,8 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
 
 def test_looking_for_stability_leaves_the_solver_as_it_was():
     once, again = press_of(), press_of()
-    ladder = again.ladder([5.0, 20.0])
-    plain, first = list(once.ladder([5.0, 20.0])), next(ladder)
+    ladder = again.load_path([5.0, 20.0])
+    plain, first = list(once.load_path([5.0, 20.0])), next(ladder)
     again.problem.symmetric_tangent(first.unknowns * 1.001)
     assert next(ladder).unknowns.tobytes() == plain[1].unknowns.tobytes()
 
@@ -119,7 +113,7 @@ class Curve:
     def __init__(self, strain=lambda x: 0.0):
         self.strain = strain
 
-    def sheet_force(self, x):
+    def normal_force(self, x):
         return float(force(x[0] / MM))
 
     def closing(self, x):
@@ -171,7 +165,7 @@ def test_a_jump_is_noted_however_the_force_is_reached(forces):
     steps = following(Curve())
     x, reached = np.array([0.01 * MM]), force(0.01)
     for goal in forces:
-        x, reached = steps.climb(x, reached, goal, Work()), goal
+        x, reached = steps.step_to(x, reached, goal, Work()), goal
         assert force(x[0] / MM) == pytest.approx(goal)
         assert steps.jumped == (goal > 2.5)
 
@@ -179,8 +173,8 @@ def test_a_jump_is_noted_however_the_force_is_reached(forces):
 def test_a_jump_is_an_error_where_there_is_another_way():
     steps = following(Curve())
     with pytest.raises(ConvergenceError, match=r"jumps at 2\.\d+ N|jumps at 3 N"):
-        steps.climb(np.array([0.01 * MM]), force(0.01), 3.0, Work(), walk=False)
-    x = steps.climb(np.array([0.01 * MM]), force(0.01), 2.4, Work(), walk=False)
+        steps.step_to(np.array([0.01 * MM]), force(0.01), 3.0, Work(), by_displacement=False)
+    x = steps.step_to(np.array([0.01 * MM]), force(0.01), 2.4, Work(), by_displacement=False)
     assert x[0] < MM
     assert not steps.jumped
 
@@ -190,7 +184,7 @@ def test_a_fold_of_the_foam_is_a_jump():
     sudden = following(Curve(lambda x: 0.8 if force(x) > 1.5 else 0.0))
     steady = following(Curve(lambda x: 0.8 * force(x) / 2.4))
     for steps in (sudden, steady):
-        steps.climb(np.array([0.01 * MM]), force(0.01), 2.4, Work())
+        steps.step_to(np.array([0.01 * MM]), force(0.01), 2.4, Work())
     assert sudden.jumped
     assert not steady.jumped
 
@@ -198,7 +192,7 @@ def test_a_fold_of_the_foam_is_a_jump():
 def test_an_unstable_start_is_noted():
     steps = following(Curve(lambda x: 0.6))
     steps.problem.symmetric_tangent = lambda x: (x, 0)
-    steps.climb(np.array([0.01 * MM]), force(0.01), 1.0, Work())
+    steps.step_to(np.array([0.01 * MM]), force(0.01), 1.0, Work())
     assert steps.jumped
 
 
@@ -232,15 +226,15 @@ def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():
     press = press_of()
     tried = []
 
-    def climb(x, reached, goal, work):
+    def step_to(x, reached, goal, work):
         tried.append((press.pad.contact, press.fallback is None))
         if len(tried) < 3:
             raise ConvergenceError("the pad jumps at 7 N")
         press._stepping.jumped = True
         return proper(x, reached, goal, work)
 
-    proper, press._climb = press._climb, climb
-    (state,) = press.ladder([10.0])
+    proper, press._step_to = press._step_to, step_to
+    (state,) = press.load_path([10.0])
     assert tried == [("weighted", False), ("nodal", True), ("weighted", True)]
     assert state.path_dependent
     assert state.pad.contact == "weighted"

@@ -34,12 +34,12 @@ def test_volumes_and_areas_add_up(element, contact, symmetry):
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_every_unknown_has_its_place(element, symmetry):
-    """Free displacements first, one closing displacement for the bonded back, one pressure per node of the front."""
+    """Free displacements first, one closing displacement for the bonded back, one pressure per contact node."""
     pad = Pad(PadShape(SIZE, (4, 6, 3), element=element), FOAM, symmetry)
     order = pad.shape.per_side - 1
     n = [order * (k // 2 if s else k) + 1 for k, s in zip((4, 6, 3), (*symmetry, False), strict=True)]
     assert len(pad.nodes) == np.prod(n)
-    assert pad.front_grid == (n[0], n[1])
+    assert pad.contact_grid == (n[0], n[1])
     above = np.prod(n[:2]) * (n[2] - 1)
     fixed = sum(np.prod([n[j] for j in range(2) if j != i]) * (n[2] - 1) for i in range(2) if symmetry[i])
     assert pad.closing_dof == 3 * above - fixed
@@ -58,12 +58,12 @@ def test_every_unknown_has_its_place(element, symmetry):
 @pytest.mark.parametrize("elements", [(4, 6, 2), (20, 10, 1)])
 def test_front_nodes_run_along_the_width_first(element, elements, symmetry):
     pad = Pad(PadShape(SIZE, elements, (1.5, 2.0, 1.0), element), FOAM, symmetry)
-    grid = pad.nodes[pad.front_nodes].reshape(*pad.front_grid, 3)
+    grid = pad.nodes[pad.contact_nodes].reshape(*pad.contact_grid, 3)
     assert (grid[..., 2] == 0).all()
     assert (np.diff(grid[..., 0], axis=0) > 0).all()
     assert (np.diff(grid[..., 1], axis=1) > 0).all()
     assert max(np.ptp(grid[..., 0], axis=1).max(), np.ptp(grid[..., 1], axis=0).max()) < 1e-15
-    assert (pad.front_nodes[pad.pressure_index[pad.front_nodes]] == pad.front_nodes).all()
+    assert (pad.contact_nodes[pad.pressure_index[pad.contact_nodes]] == pad.contact_nodes).all()
     # a face's nodes span it in the same order as its shape functions
     middle = np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
     middle = middle.reshape(len(middle), pad.shape.per_side, -1, 3)
@@ -88,7 +88,7 @@ def test_grading():
     assert x[-1] / x[4] == pytest.approx(4)
     assert x[5:] / x[4:-1] == pytest.approx(4 ** (1 / 3))
     assert y == pytest.approx(SIZE[1] / 6)
-    assert z[0] / z[-1] == pytest.approx(3)  # the back over the front
+    assert z[0] / z[-1] == pytest.approx(3)  # the back over the contact face
     assert z.sum() == pytest.approx(SIZE[2])
     assert shape.lines(0, True) == pytest.approx(shape.lines(0, False)[4:])
     assert shape.lines(2, False)[-1] == 0

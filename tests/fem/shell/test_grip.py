@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial
-from softjaw.friction.frame import contact_frame, in_frame
-from softjaw.friction.wrench import friction_limits
-from tests.fem.grips import _gap, grip, pose, thin
+from tests.fem.grips import _gap, e_n, grip, pose, thin
 
 FORCES = (0.5, 2.0)
 FINE = WallMesh(0.00085, 0.0025, 0.005)
@@ -24,14 +21,7 @@ FINE = WallMesh(0.00085, 0.0025, 0.005)
 def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, support="standing", theta=0.0):
     """Ladder over FORCES."""
     body = thin(thickness, support=support)
-    return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).ladder(FORCES))
-
-
-def e_n(finger):
-    """Eccentricity parameter of one finger's patch, planar reading [m]."""
-    patch = extract(finger.pad, finger)
-    local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
-    return friction_limits(local, 1.0, "pcm").e_n
+    return tuple(grip(body, z, allowed=allowed, level=level, theta=theta).load_path(FORCES))
 
 
 @pytest.mark.parametrize(
@@ -101,10 +91,10 @@ def test_fingers_object_and_support_are_in_balance(support):
 
 def test_a_very_stiff_wall_is_a_rigid_object():
     stiff = thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")
-    soft = list(grip(stiff).ladder(FORCES))
+    soft = list(grip(stiff).load_path(FORCES))
     pad = soft[0].fingers[0].pad
     press = Press(pad, _gap(pose(0.0, 0.075)))
-    for a, b in zip(soft, press.ladder(FORCES), strict=True):
+    for a, b in zip(soft, press.load_path(FORCES), strict=True):
         assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
         np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
@@ -143,7 +133,7 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
         x = step.solve(x, Control(closing=closing), work)
         expected = PROTOTYPE[thickness].get(round(closing * 1e3, 6))
         if expected:
-            F = held.problem.sheet_force(x)
+            F = held.problem.normal_force(x)
             assert F == pytest.approx(expected[0], rel=0.035)
             finger = held._gripped(x, F, False, work, held.solver.seconds).fingers[0]
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)

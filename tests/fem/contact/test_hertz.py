@@ -42,7 +42,7 @@ def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
     pad = Pad(shape, material("linear", E / 2, 0.0), (False, True))
     forces = np.pi * E * (np.asarray(factors) * a) ** 2 / (4 * R) * length
     errors = []
-    for pressed in Press(pad, reference.cylinder(R)).ladder(forces):
+    for pressed in Press(pad, reference.cylinder(R)).load_path(forces):
         hertz = reference.hertz_cylinder(pressed.force / length, R, E)
         y = pressed.points.position[..., 1]
         half_width = radius(pressed, [1], 4.0)
@@ -96,7 +96,7 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8",
         (True, True),
     )
     errors, lacking = [], []
-    for pressed in Press(pad, reference.sphere(R)).ladder([4 * E_star * (f * a) ** 3 / (3 * R) for f in factors]):
+    for pressed in Press(pad, reference.sphere(R)).load_path([4 * E_star * (f * a) ** 3 / (3 * R) for f in factors]):
         hertz = reference.hertz_sphere(pressed.force, R, E_star)
         r = np.linalg.norm(pressed.points.position[..., :2], axis=-1)
         errors.append(
@@ -147,6 +147,6 @@ def test_nafems_cylinder_on_a_block():
     assert full.peak == pytest.approx(3585e6, rel=1e-3)
     shape = PadShape((1e-3, 0.020, 0.020), (1, 64, 32), (1.0, 20.0, 40.0))
     pad = Pad(shape, material("linear", E_star / 2, 0.0), (False, True))
-    (pressed,) = Press(pad, reference.cylinder(0.05)).ladder([350.0])
+    (pressed,) = Press(pad, reference.cylinder(0.05)).load_path([350.0])
     assert radius(pressed, [1], 4.0) == pytest.approx(0.621e-3, rel=0.01)
     assert pressed.pressure.max() == pytest.approx(358.5e6, rel=0.01)

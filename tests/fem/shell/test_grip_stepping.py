@@ -29,7 +29,7 @@ class Curve:
 
     control = Control(closing=0.0)
 
-    def sheet_force(self, x):
+    def normal_force(self, x):
         return float(force(x[0] / MM))
 
     def closing(self, x):
@@ -59,23 +59,23 @@ def stepping(**choices):
 @pytest.mark.parametrize("wanted", [0.3, 1.9, 2.1, 2.4, 2.45, 3.5])
 def test_a_walk_lands_on_the_first_crossing(wanted):
     forces = []
-    x = stepping().walk(np.zeros(1), wanted, Work(), 0.5 * MM, forces)
+    x = stepping().displacement_control(np.zeros(1), wanted, Work(), 0.5 * MM, forces)
     assert x[0] / MM == pytest.approx(crossings(wanted)[0], abs=1e-9)
     assert (np.diff(forces) < 0).any() == (wanted > 2.5)
 
 
 def test_a_landing_far_from_its_bracket_is_refused_and_tried_from_closer():
     work = Work()
-    x = stepping(close=0.003).walk(np.zeros(1), 2.2, work, 0.5 * MM)
+    x = stepping(close=0.003).displacement_control(np.zeros(1), 2.2, work, 0.5 * MM)
     assert x[0] / MM == pytest.approx(crossings(2.2)[0], abs=1e-9)
     assert work.steps > 8  # brackets were halved
 
 
 def test_a_force_that_is_never_reached_ends_with_a_sentence():
     flat = stepping()
-    flat.problem.sheet_force = lambda x: 1.0 - np.exp(-x[0] / MM)
+    flat.problem.normal_force = lambda x: 1.0 - np.exp(-x[0] / MM)
     with pytest.raises(ConvergenceError, match=r"stays below 2 N: reached 1 N after 60 steps"):
-        flat.walk(np.zeros(1), 2.0, Work(), 0.5 * MM)
+        flat.displacement_control(np.zeros(1), 2.0, Work(), 0.5 * MM)
 
 
 def test_what_watches_the_way_can_end_it():
@@ -88,7 +88,7 @@ def test_what_watches_the_way_can_end_it():
 
     steps.watch = watch
     with pytest.raises(RuntimeError, match="enough"):
-        steps.walk(np.zeros(1), 4.0, Work(), 0.5 * MM)
+        steps.displacement_control(np.zeros(1), 4.0, Work(), 0.5 * MM)
     assert len(seen) >= 3
 
 
@@ -102,14 +102,14 @@ def climbing(**choices):
 
 def test_a_jump_under_force_control_is_walked_instead():
     start = np.array([crossings(1.0)[0] * MM])
-    x, fell = climbing()._climb(start, 1.0, 2.2, 0.2 * MM, Work())
+    x, fell = climbing()._step_to(start, 1.0, 2.2, 0.2 * MM, Work())
     assert x[0] / MM == pytest.approx(crossings(2.2)[0], abs=1e-9)
     assert not fell
 
 
 def test_beyond_the_limit_the_force_is_said_to_have_fallen():
     start = np.array([crossings(2.0)[0] * MM])
-    x, fell = climbing()._climb(start, 2.0, 3.0, 0.2 * MM, Work())
+    x, fell = climbing()._step_to(start, 2.0, 3.0, 0.2 * MM, Work())
     assert x[0] / MM == pytest.approx(crossings(3.0)[0], abs=1e-9)
     assert fell
 
@@ -117,7 +117,7 @@ def test_beyond_the_limit_the_force_is_said_to_have_fallen():
 def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
     grip = climbing()
     first = np.array([0.1 * MM])
-    grip._stepping.first = lambda closing, F, work: (first, grip.problem.sheet_force(first))
+    grip._stepping.first = lambda closing, F, work: (first, grip.problem.normal_force(first))
     grip._beds = [SimpleNamespace(closing=lambda F: 0.1 * MM)]
     grip._stepping.problem.closing = lambda x: float(x[0])
     x, _, fell = grip._level(None, 0.0, 6.0, np.inf, Work())
@@ -134,5 +134,5 @@ def test_steps_that_keep_failing_end_the_walk():
     steps.solver.solve = solve
     work = Work()
     with pytest.raises(ConvergenceError, match="stuck at 0 N of 1 N: no luck"):
-        steps.walk(np.zeros(1), 1.0, work, 0.5 * MM)
+        steps.displacement_control(np.zeros(1), 1.0, work, 0.5 * MM)
     assert work.halvings < 12

@@ -25,7 +25,7 @@ def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), 
 
 
 def contacting_state(problem, closing=1.2e-3):
-    """A pad pressed into the object, out of balance, with about half of its front active, no node near the switch."""
+    """A pad pressed into the object, out of balance, half of its contact face active, no node near the switch."""
     pad, rng = problem.pad, np.random.default_rng(4)
     x = np.zeros(problem.size)
     u = np.zeros_like(pad.nodes)
@@ -38,13 +38,6 @@ def contacting_state(problem, closing=1.2e-3):
     return x
 
 
-def dense(problem, values):
-    K = np.zeros((problem.size, problem.size))
-    keep = (problem.rows >= 0) & (problem.columns >= 0)
-    np.add.at(K, (problem.rows[keep], problem.columns[keep]), values[keep])
-    return K
-
-
 @pytest.mark.parametrize("control", [Control(force=2.0), Control(closing=1e-3)], ids=["force", "closing"])
 @pytest.mark.parametrize("complementarity", [False, True], ids=["active set", "bounds"])
 @pytest.mark.parametrize("contact", ["weighted", "nodal"])
@@ -53,11 +46,11 @@ def test_tangent_is_the_derivative_of_the_residual(name, contact, complementarit
     problem = problem_of(OBJECTS[name], contact)
     problem.control, problem.complementarity = control, complementarity
     x = contacting_state(problem)
-    active = problem._active(x, problem._contact(x, tangent=False))
+    active = problem.active(x[problem.pressures], problem._contact(x, tangent=False))
     assert active.any()
     if name != "plane":
         assert not active.all()
-    K, h = dense(problem, problem.tangent(x)), 1e-7
+    K, h = reference.dense(problem, x), 1e-7
     for direction in np.random.default_rng(6).uniform(-1, 1, (4, problem.size)):
         by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
         difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
@@ -73,14 +66,14 @@ def test_tangent_of_triquadratic_elements(law):
     h = 3e-8
     by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
     difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
-    analytic = dense(problem, problem.tangent(x)) @ direction
+    analytic = reference.dense(problem, x) @ direction
     assert np.abs(analytic - difference).max() < 1e-7 * np.abs(difference).max()
 
 
 def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed():
     problem = problem_of(OBJECTS["sphere"])
     problem.control, problem.complementarity = Control(force=2.0), True
-    K = dense(problem, problem.tangent(contacting_state(problem)))
+    K = reference.dense(problem, contacting_state(problem))
     n = problem.pad.closing_dof + 1
     assert np.abs(K[:n, :n] - K[:n, :n].T).max() < 1e-13 * np.abs(K).max()
     assert np.abs(K[:n, n:] + K[n:, :n].T).max() < 1e-15 * np.abs(K).max()
@@ -109,7 +102,7 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
     assert abs(R[pad.closing_dof]) < 1e-13 * scale
     assert np.abs(R[pad.closing_dof + 1 :]).max() < 1e-13 * scale
     assert np.abs(R[vertical]).max() < 1e-13 * scale
-    assert problem.sheet_force(x) == pytest.approx(scale, rel=1e-13)
+    assert problem.normal_force(x) == pytest.approx(scale, rel=1e-13)
     nodal, gap, points = problem.contact_state(x)
     assert nodal == pytest.approx(pressure, rel=1e-13)
     assert np.abs(gap).max() < 1e-15
@@ -121,10 +114,7 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
 
 def test_pressures_are_bounded_and_nothing_else():
     problem = problem_of(reference.plane)
-    lower, upper = problem.bounds()
-    assert (lower[problem.pad.closing_dof + 1 :] == 0).all()
-    assert np.isneginf(lower[: problem.pad.closing_dof + 1]).all()
-    assert np.isposinf(upper).all()
+    assert (np.arange(problem.size)[problem.non_negative] == np.arange(problem.pad.closing_dof + 1, problem.size)).all()
 
 
 def test_active_set_row_switches_between_pressure_and_gap():
@@ -143,7 +133,7 @@ def test_active_set_row_switches_between_pressure_and_gap():
 def test_an_inverted_pad_has_no_residual():
     problem = problem_of(reference.plane)
     x = np.zeros(problem.size)
-    x[problem.pad.dofs[problem.pad.front_nodes, 2]] = -1.5 * SIZE[2]
+    x[problem.pad.dofs[problem.pad.contact_nodes, 2]] = -1.5 * SIZE[2]
     assert np.isnan(problem.residual(x)).all()
 
 
@@ -155,7 +145,7 @@ def test_steps_are_shortened_by_closing_and_by_squeezing():
     step[pad.dofs[:, 2]] = -SIZE[2]  # the whole pad moves: no element is squeezed, but the closing is too long
     assert problem.shorten(x, step) == pytest.approx(0.1)
     step[:] = 0
-    step[pad.dofs[pad.front_nodes, 2]] = SIZE[2]  # x - step: the front is pushed back through the sheet
+    step[pad.dofs[pad.contact_nodes, 2]] = SIZE[2]  # x - step: the contact face is pushed through the plate
     factor = problem.shorten(x, step)
     det = problem.foam.strains(x - factor * step, np.eye(3))[0]
     assert 0.05 < det < 1

@@ -23,7 +23,7 @@ PARTS = [(True, False), (False, True), (True, True)]
 def patch_of(symmetry=(True, True), element="hex8", gap=OVAL, elements=(8, 4, 2), force=10.0, contact="weighted"):
     shape = PadShape(SIZE, elements, (1.5, 0.7, 1.0), element)
     pad = Pad(shape, FOAM, symmetry, contact)
-    (pressed,) = Press(pad, gap).ladder([force])
+    (pressed,) = Press(pad, gap).load_path([force])
     return pad, pressed, extract(pad, pressed)
 
 
@@ -83,7 +83,7 @@ def test_loads_are_those_of_the_solution(whole):
 
 
 def test_faces_tile_the_deformed_front(whole):
-    """Neighbours share corners, the faces cover the deformed front, and each holds its centre."""
+    """Neighbours share corners, the faces cover the deformed contact face, and each holds its centre."""
     _, pad, pressed, patch = whole
     nx, ny = pad.shape.patch_faces
     corners = patch.corners.reshape(nx, ny, 4, 3)
@@ -91,7 +91,7 @@ def test_faces_tile_the_deformed_front(whole):
     assert np.abs(corners[1:, :, 3] - corners[:-1, :, 2]).max() == 0
     assert np.abs(corners[:, 1:, 0] - corners[:, :-1, 3]).max() == 0
     ends = np.array([corners[0, 0, 0], corners[-1, -1, 2]])
-    front = pressed.front.reshape(*pad.front_grid, 3)
+    front = pressed.contact_face.reshape(*pad.contact_grid, 3)
     assert np.abs(ends - [front[0, 0], front[-1, -1]]).max() < 1e-15
     e, f = patch.corners[:, 1] - patch.corners[:, 0], patch.corners[:, 3] - patch.corners[:, 0]
     r = patch.centroid - patch.corners[:, 0]
@@ -100,12 +100,12 @@ def test_faces_tile_the_deformed_front(whole):
 
 
 def test_flat_patch_has_the_areas_of_the_front():
-    """On a plane the confined middle only moves along z, and the faces' areas add up to the widened front."""
+    """On a plane the confined middle only moves along z, and the faces' areas add up to the widened contact face."""
     pad, pressed, patch = patch_of(gap=reference.plane, force=30.0)
     assert np.abs(patch.normal - [0, 0, 1]).max() < 1e-15
     assert np.abs(patch.centroid[:, 2]).max() < 1e-12
     assert patch.load.sum() == pytest.approx(30, rel=1e-12)
-    x, y, _ = pressed.front.reshape(*pad.front_grid, 3).transpose(2, 0, 1)  # quarter: area by the shoelace formula
+    x, y, _ = pressed.contact_face.reshape(*pad.contact_grid, 3).transpose(2, 0, 1)  # a quarter
     rim = np.concatenate([[0], x[-1], x[::-1, -1]]), np.concatenate([[0], y[-1], y[::-1, -1]])
     area = 0.5 * np.abs(np.dot(rim[0], np.roll(rim[1], -1)) - np.dot(rim[1], np.roll(rim[0], -1)))
     assert patch.area.sum() == pytest.approx(4 * area, rel=1e-12)

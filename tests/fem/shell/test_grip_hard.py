@@ -13,8 +13,7 @@ from softjaw.fem.shell.grip import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
-from tests.fem.grips import grip, pose, thin
-from tests.fem.test_grip import e_n
+from tests.fem.grips import e_n, grip, pose, thin
 
 ROUGH = WallMesh(0.004, 0.008, 0.016)
 SIZE = MeshSize((0.0, np.pi), (0.05, 0.10), 0.013, 0.006, 0.012, 0.02)
@@ -49,23 +48,23 @@ def test_the_opening_is_the_part_of_the_distance_that_is_left(symmetry):
 def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
     """It folds between the pads; the figures of the sentence are those of the last state that was found."""
     soft = grip(thin(2e-4, WallMaterial(1e8, 0.38)), elements=(6, 4, 2), mesh=ROUGH)
-    ladder = soft.ladder([0.02, 1.0, 3.0])
+    ladder = soft.load_path([0.02, 1.0, 3.0])
     assert [next(ladder).wall.opening < 0.75 for _ in range(2)] == [False, True]
     with pytest.raises(CheckError, match=r"the wall collapsed: (its opposite sides meet at|beyond) 1\.\d+ N"):
         next(ladder)
 
 
 def test_a_wall_that_gives_way_is_flagged_and_stays_flagged():
-    found = [s.wall.snapped for s in grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([0.3, 1.5, 4.0])]
+    found = [s.wall.snapped for s in grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([0.3, 1.5, 4.0])]
     assert found == [False, True, True]
-    stiff = grip(thin(1e-3), elements=(6, 4, 2), mesh=ROUGH).ladder([0.5, 5.0])
+    stiff = grip(thin(1e-3), elements=(6, 4, 2), mesh=ROUGH).load_path([0.5, 5.0])
     assert not any(s.wall.snapped for s in stiff)
 
 
 @pytest.mark.long
 def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
-    at_once = next(grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([4.0]))
-    *_, stepwise = grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1.0, 2.5, 3.0, 4.0])
+    at_once = next(grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([4.0]))
+    *_, stepwise = grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([1.0, 2.5, 3.0, 4.0])
     assert at_once.wall.snapped
     assert stepwise.wall.snapped
     assert at_once.fingers[0].closing == pytest.approx(stepwise.fingers[0].closing, rel=1e-6)
@@ -73,23 +72,23 @@ def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
 
 @pytest.mark.long
 def test_a_foil_and_tiny_forces_are_solved():
-    *_, foil = grip(thin(5e-5), elements=(6, 4, 2), mesh=ROUGH).ladder([0.005, 0.01])
+    *_, foil = grip(thin(5e-5), elements=(6, 4, 2), mesh=ROUGH).load_path([0.005, 0.01])
     assert foil.fingers[0].checks.force_balance < 1e-8
-    *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).ladder([1e-3, 1e-2])
+    *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([1e-3, 1e-2])
     assert tiny.fingers[0].closing < 1e-4
 
 
 @pytest.mark.long
 def test_many_levels_end_where_few_do():
     forces = np.linspace(0.05, 1.5, 30)
-    *_, many = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder(forces)
-    *_, few = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).ladder([1.5])
+    *_, many = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).load_path(forces)
+    *_, few = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).load_path([1.5])
     assert many.fingers[0].closing == pytest.approx(few.fingers[0].closing, rel=1e-7)
 
 
 def test_pads_and_wall_must_balance():
     held = grip(thin(), elements=(6, 4, 2), mesh=ROUGH)
-    state = next(held.ladder([1.0]))
+    state = next(held.load_path([1.0]))
     held._check_balance(state.fingers, state.wall.load, 1.0)
     with pytest.raises(CheckError, match="out of balance"):
         held._check_balance(state.fingers, 1.001 * state.wall.load, 1.0)
@@ -103,7 +102,7 @@ def test_a_long_side_that_points_down_gives_the_same_patch_turned():
     assert grasp(thin(), up).flipped == (False,)
     assert grasp(thin(), down).flipped == (True,)
     np.testing.assert_allclose(grasp(thin(), down).poses[0].rotation, up[0].rotation, atol=1e-12)
-    finger = next(grip(thin(), z=0.142, elements=(6, 4, 2), mesh=ROUGH).ladder([1.0])).fingers[0]
+    finger = next(grip(thin(), z=0.142, elements=(6, 4, 2), mesh=ROUGH).load_path([1.0])).fingers[0]
     patch = extract(finger.pad, finger)
     again = half_turned(half_turned(patch))
     for name in ("centroid", "normal", "corners", "pressure"):
@@ -152,7 +151,7 @@ def test_flat_bottoms_are_not_faced_but_the_rim_above_them_is(quarter):
 
 def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
     """The can ends open at z = 205 mm; a pad at 198 mm stands over by 8 mm."""
-    finger = next(grip(thin(), z=0.198, elements=(12, 4, 2), mesh=ROUGH, radius=0.013).ladder([0.5])).fingers[0]
+    finger = next(grip(thin(), z=0.198, elements=(12, 4, 2), mesh=ROUGH, radius=0.013).load_path([0.5])).fingers[0]
     patch = extract(finger.pad, finger)
     height = 0.198 + patch.centroid[:, 0]
     assert patch.pressure[height > 0.2051].max() == 0.0
@@ -168,7 +167,7 @@ def test_the_wall_of_a_partly_meshed_body_is_not_closed():
 
 def closing_and_e_n(elements, size):
     sizes = WallMesh(size * 0.002, size * 0.003, size * 0.006)
-    state = next(grip(thin(), elements=elements, mesh=sizes).ladder([3.0])).fingers[0]
+    state = next(grip(thin(), elements=elements, mesh=sizes).load_path([3.0])).fingers[0]
     return np.array([state.closing, e_n(state)])
 
 
@@ -184,7 +183,7 @@ def test_closing_and_e_n_converge_with_order_two_in_the_walls_mesh_and_by_a_perc
 @pytest.mark.long
 def test_linear_walls_agree_within_one_percent_while_the_indentation_is_small():
     for thickness, force in ((5e-4, 1.0), (8e-4, 3.0), (1.2e-3, 8.0)):
-        sides = [next(grip(thin(thickness), level=level).ladder([force])) for level in ("nonlinear", "linear")]
+        sides = [next(grip(thin(thickness), level=level).load_path([force])) for level in ("nonlinear", "linear")]
         indentation = np.linalg.norm(sides[0].wall.q.reshape(-1, 6)[:, :3], axis=1).max()
         assert indentation < 0.3 * thickness
         assert e_n(sides[1].fingers[0]) == pytest.approx(e_n(sides[0].fingers[0]), rel=0.01)

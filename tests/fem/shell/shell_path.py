@@ -1,16 +1,17 @@
-"""A shell under given loads: the nonlinear problem for PETSc, and load steps that are cut where Newton fails."""
+"""A shell under given loads, for the published tables: load steps that are halved, and a path by arc length."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from softjaw.fem.assembly import Pattern, add_up
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.petsc import NonlinearSolver
-from softjaw.fem.shell.element import FloatArray, IntArray, Shell
+from softjaw.fem.shell.element import FloatArray, Shell
+from softjaw.fem.shell.wall_model import free_numbers
 
 TOLERANCE = 1e-7  # of the residual, relative to the load
 ROUNDING = 16.0 * np.finfo(float).eps  # of the thickness stresses, relative to E: the residual gets no smaller
@@ -22,14 +23,6 @@ LARGEST_TURN = np.radians(60.0)  # of the secant from step to step; more means t
 SHORTEST = 1e-4  # step, relative to the first
 
 
-def free_numbers(fixed: FloatArray) -> tuple[IntArray, IntArray]:
-    """Unknown of each shell number, -1 where ``fixed (6 k,)`` is set, and the numbers that are unknown."""
-    free = np.flatnonzero(~np.asarray(fixed, dtype=bool).ravel())
-    unknown = np.full(np.size(fixed), -1, dtype=np.int32)
-    unknown[free] = np.arange(len(free), dtype=np.int32)
-    return unknown, free
-
-
 class ShellProblem:
     """``residual(q) = factor * load`` for the numbers that are not fixed (see ``fem.petsc.Problem``).
 
@@ -39,36 +32,32 @@ class ShellProblem:
     fixed : (6 k,) array of bool
     load : (6 k,) array, optional
         Outer forces at factor 1 [N]; they keep their direction.
-    path : (6 k,) array, optional
-        Displacements [m] at factor 1 of the numbers that are driven; zero where a number is not driven.
     mixed : bool
         Whether the tangent is that of mixed integration points.
     """
 
-    complementarity = False
+    complementarity, non_negative = False, slice(0)
 
     def __init__(
         self,
         shell: Shell,
         fixed: FloatArray,
         load: FloatArray | None = None,
-        path: FloatArray | None = None,
         *,
         mixed: bool = True,
     ) -> None:
         self.shell, self.mixed = shell, mixed
         self.load = np.zeros(shell.size) if load is None else load
         unknown, self.free = free_numbers(fixed)
-        driven = np.zeros(0) if path is None else path[self.free]
-        # a driven number stays an unknown, so that the first linear step moves everything along with it
-        self.driven, self.values = np.flatnonzero(driven), driven[driven != 0]
         self.size = len(self.free)
-        self.rows, self.columns = shell.entries(unknown)
-        self.rows = np.where(np.isin(self.rows, self.driven), -1, self.rows).astype(np.int32)
-        self.rows, self.columns = (np.append(v, self.driven).astype(np.int32) for v in (self.rows, self.columns))
+        self._set_pattern(*shell.entries(unknown))
         self.stiffness = float(np.abs(shell.tangent(np.zeros(shell.size))).mean())
         self.factor = 0.0
         self.forget()
+
+    def _set_pattern(self, rows: FloatArray, columns: FloatArray) -> None:
+        self.rows, self.columns, self.pattern = rows, columns, Pattern(self.size, rows, columns)
+        self._slots = self.pattern.slots(rows, columns)
 
     def forget(self) -> None:
         """Begin a new Newton solve: its first tangent is the plain one."""
@@ -82,31 +71,23 @@ class ShellProblem:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `fem.petsc.Problem`."""
-        r = (self.shell.residual(self.state(x)) - self.factor * self.load)[self.free]
-        r[self.driven] = self.stiffness * (x[self.driven] - self.factor * self.values)
-        return r
+        return (self.shell.residual(self.state(x)) - self.factor * self.load)[self.free]
 
-    def tangent(self, x: FloatArray) -> FloatArray:
+    def tangent(self, x: FloatArray) -> None:
         """See `fem.petsc.Problem`."""
+        self.pattern.values[:] = 0.0
+        add_up(self._slots, self.entries(x), self.pattern.values)
+
+    def entries(self, x: FloatArray) -> FloatArray:
+        """Entries of the tangent, in the order of ``rows`` and ``columns``."""
         q = self.state(x)
         values = self.shell.tangent(q, self._before)
         self._before = q if self.mixed else None
-        return np.append(values, np.full(len(self.driven), self.stiffness))
-
-    def support_forces(self, x: FloatArray) -> FloatArray:
-        """Forces ``(6 k,)`` [N] that hold the fixed and the driven numbers; zero elsewhere."""
-        force = self.shell.residual(self.state(x)) - self.factor * self.load
-        free = np.delete(self.free, self.driven)
-        force[free] = 0.0
-        return force
+        return values
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Full steps."""
         return 1.0
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """No bounds."""
-        return np.full(self.size, -np.inf), np.full(self.size, np.inf)
 
 
 @dataclass(frozen=True)
@@ -119,15 +100,12 @@ class Equilibrium:
         Load factor.
     q : (6 k,) array
         State [m].
-    reaction : (6 k,) array
-        Forces of the supports on the fixed numbers, zero elsewhere [N].
     iterations, halvings : int
         Newton iterations since the last state that was asked for, failed tries included, and how often a step was cut.
     """
 
     factor: float
     q: FloatArray
-    reaction: FloatArray
     iterations: int
     halvings: int
 
@@ -136,8 +114,6 @@ def load_steps(
     problem: ShellProblem,
     factors: Iterable[float],
     iterations: int = 25,
-    tolerance: float | None = None,
-    options: dict[str, Any] | None = None,
 ) -> Iterator[Equilibrium]:
     """Equilibrium at each load factor in turn, from the reference on.
 
@@ -149,22 +125,12 @@ def load_steps(
     factors : iterable of float
     iterations : int
         Newton iterations after which a step is given up.
-    tolerance : float, optional
-        Largest norm of the residual [N]; by default 1e-7 of the load's, or that of rounding errors. Needed where only
-        displacements are driven.
-    options : dict, optional
-        PETSc options with the prefix ``shell_``.
-
     Raises
     ------
     ConvergenceError
         When a step 1/256 as long as the one asked for fails.
     """
-    solver = NonlinearSolver(problem, options or {}, "shell_")
-    if tolerance is None:
-        tolerance = default_tolerance(problem)
-        if not problem.load[problem.free].any():
-            raise ValueError("nothing loads the shell; give the tolerance in newtons where displacements are driven")
+    solver, tolerance = NonlinearSolver(problem, {}, "shell_"), default_tolerance(problem)
     x, at = np.zeros(problem.size), 0.0
     try:
         for target in factors:
@@ -178,9 +144,7 @@ def load_steps(
                     spent, halvings, step = spent + iterations, halvings + 1, step / 2
                     if abs(step) < SMALLEST_STEP * abs(whole):
                         raise ConvergenceError(
-                            f"the shell found no equilibrium beyond load factor {at:.6g} on the way to {target:.6g}: "
-                            f"{error}; if the load has a limit there, follow the path by arc length or drive a "
-                            "displacement"
+                            f"no equilibrium beyond load factor {at:.6g} on the way to {target:.6g}: {error}"
                         ) from error
                     continue
                 at, spent = goal, spent + done
@@ -211,7 +175,7 @@ def _solve(
 
 
 def _equilibrium(problem: ShellProblem, x: FloatArray, iterations: int, halvings: int) -> Equilibrium:
-    return Equilibrium(problem.factor, problem.state(x), problem.support_forces(x), iterations, halvings)
+    return Equilibrium(problem.factor, problem.state(x), iterations, halvings)
 
 
 class ArcProblem(ShellProblem):
@@ -219,15 +183,15 @@ class ArcProblem(ShellProblem):
 
     def __init__(self, problem: ShellProblem) -> None:
         self.__dict__.update(problem.__dict__)
-        if len(self.driven):
-            raise ValueError("a path by arc length follows a load; it takes no driven displacements")
         self.size = len(self.free) + 1
         loaded = np.flatnonzero(self.load[self.free])
         self._load_column = -self.load[self.free][loaded]
         self._counts = (self.free % 6 < 3).astype(float)  # displacements, not directors
         last, row = np.int32(self.size - 1), np.arange(self.size - 1)
-        self.rows = np.concatenate([self.rows, loaded, np.full(self.size, last)]).astype(np.int32)
-        self.columns = np.concatenate([self.columns, np.full(len(loaded), last), row, [last]]).astype(np.int32)
+        self._set_pattern(
+            np.concatenate([self.rows, loaded, np.full(self.size, last)]).astype(np.int32),
+            np.concatenate([self.columns, np.full(len(loaded), last), row, [last]]).astype(np.int32),
+        )
 
     def begin(self, x: FloatArray, along: FloatArray, length: float) -> None:
         """Start a step at ``x (size,)`` of the given length [m] along the secant ``along (size,)``."""
@@ -244,10 +208,10 @@ class ArcProblem(ShellProblem):
         ahead = 0.0 if (x != self._start).any() else -self.stiffness * self._step
         return np.append(super().residual(x[:-1]), ahead)
 
-    def tangent(self, x: FloatArray) -> FloatArray:
-        """See `fem.petsc.Problem`."""
+    def entries(self, x: FloatArray) -> FloatArray:
+        """See `ShellProblem`."""
         self.factor = x[-1]
-        values = super().tangent(x[:-1])
+        values = super().entries(x[:-1])
         step = x - self._start
         step = step if step.any() else self._along
         plane = self.stiffness * step[:-1] * self._counts / self.length(step)
@@ -303,7 +267,7 @@ def follow(
             along, x = new - x, new
             length = min(length * float(np.clip(np.sqrt(DESIRED / done), 0.5, 1.5)), longest)
             arc.factor = x[-1]
-            yield Equilibrium(float(x[-1]), arc.state(x), arc.support_forces(x[:-1]), spent, halvings)
+            yield Equilibrium(float(x[-1]), arc.state(x), spent, halvings)
             halvings, spent, steps = 0, 0, steps - 1
     finally:
         solver.destroy()

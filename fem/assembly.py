@@ -1,4 +1,4 @@
-"""Compressed rows of a sparse matrix whose pattern may grow, and where entries lie in it."""
+"""From element contributions to global vectors and matrices: compressed rows whose pattern may grow, and sums."""
 
 from __future__ import annotations
 
@@ -28,28 +28,30 @@ class Pattern:
 
     def __init__(self, size: int, rows: IntArray, columns: IntArray) -> None:
         self.size = size
+        # MUMPS and the bounded solver expect a diagonal entry in every row, also where it is zero
         diagonal = np.arange(size, dtype=np.int64) * (size + 1)
         self._set(np.unique(np.concatenate([self._keys(rows, columns), diagonal])))
 
     def slots(self, rows: IntArray, columns: IntArray) -> IntArray:
         """Index into ``values`` of every entry, -1 for negative rows or columns; all must be in the pattern."""
-        keep = (rows >= 0) & (columns >= 0)
-        found = np.full(len(rows), -1, dtype=np.int32)
-        found[keep] = np.searchsorted(self.keys, rows[keep].astype(np.int64) * self.size + columns[keep])
-        return found
+        slots = np.full(len(rows), -1, dtype=np.int32)
+        slots[(rows >= 0) & (columns >= 0)] = np.searchsorted(self.keys, self._keys(rows, columns))
+        return slots
 
     def grow(self, rows: IntArray, columns: IntArray) -> IntArray | None:
         """Store these entries too; returns where each old entry has moved to, or None if nothing was new."""
         wanted = np.unique(self._keys(rows, columns))
         place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+        # `searchsorted` may point behind the last key, hence the minimum above; such a key is new anyway
         new = wanted[self.keys[place] != wanted]
         if not len(new):
             return None
         old = self.keys
-        self._set(np.sort(np.concatenate([old, new]), kind="stable"))
+        self._set(np.sort(np.concatenate([old, new]), kind="stable"))  # merges two sorted runs in linear time
         return np.searchsorted(self.keys, old).astype(np.int32)
 
     def _keys(self, rows: IntArray, columns: IntArray) -> NDArray[np.int64]:
+        # one sortable number per place; 64 bits, because the square of the size passes 2^31 from 46,341 unknowns on
         keep = (rows >= 0) & (columns >= 0)
         return rows[keep].astype(np.int64) * self.size + columns[keep]
 
@@ -63,6 +65,23 @@ class Pattern:
 @njit(cache=True)
 def add_up(slots, values, out):
     """Add every value to its slot of the compressed rows."""
+    # entries that share a slot add up, which indexing with `slots` would not do
     for k in range(slots.size):
         if slots[k] >= 0:
             out[slots[k]] += values[k]
+
+
+def pairs(rows: IntArray, columns: IntArray) -> tuple[IntArray, IntArray]:
+    """Rows and columns ``(entries,)`` of element matrices, from two index arrays that broadcast against each other."""
+    first, second = np.broadcast_arrays(rows, columns)
+    return first.ravel().astype(np.int32), second.ravel().astype(np.int32)
+
+
+def shifted(index: IntArray, offset: int) -> IntArray:
+    """Unknowns of a part as unknowns of the whole; fixed ones stay fixed."""
+    return np.where(index >= 0, index + offset, -1).astype(np.int32)
+
+
+def gather(dofs: IntArray, values: FloatArray, size: int) -> FloatArray:
+    """Sum element values into a vector ``(size,)``; those of fixed unknowns (index -1) fall into a slot that is cut."""
+    return np.asarray(np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:], dtype=float)

@@ -6,11 +6,11 @@ import pytest
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.fem.shell.solve import ShellProblem, load_steps
 from softjaw.fem.shell.thin_walled import supported
-from softjaw.fem.shell.wall_material import WallMaterial, faces, largest, wall_material
+from softjaw.fem.shell.wall_material import WallMaterial, faces, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell
+from tests.fem.shell.shell_path import ShellProblem, load_steps
 
 FLASK = Revolution(
     np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3
@@ -145,13 +145,22 @@ def pinched(symmetry, support="standing", surface="flask"):
     return mesh, body, load.ravel(), mesh.number[np.abs(mesh.theta).argmin(), j]
 
 
+def reaction(body, q, load=0.0):
+    """Force of the whole body's support and weak springs on it in the equilibrium under ``load``."""
+    mesh = body.shell.mesh
+    held = body.fixed & ~mesh.symmetric
+    force = np.where(held, body.shell.residual(q) - load, -body.shell.springs * q).reshape(-1, 6)
+    return np.where([*mesh.symmetry, False], 0.0, force[:, :3].sum(axis=0)) / mesh.share
+
+
 def test_quarter_half_and_whole_are_the_same():
     found = []
     for symmetry in (WHOLE, HALF_Y, HALF_X, QUARTER):
         mesh, body, load, node = pinched(symmetry)
         (state,) = load_steps(ShellProblem(body.shell, body.fixed, load), [1.0])
-        found.append([*body.shell.displacement(state.q)[node], *largest(body.shell, state.q).values()])
-        assert np.abs(body.reaction(state.q)).max() < 1e-7
+        worst = [v for f in faces(body.shell, state.q) for v in (f.von_mises.max(), np.abs(f.principal_strain).max())]
+        found.append([*body.shell.displacement(state.q)[node], *worst])
+        assert np.abs(reaction(body, state.q)).max() < 1e-7
         assert body.shell.node_area.sum() / mesh.share == pytest.approx(0.024, rel=0.1)
     for other in found[1:]:
         assert other == pytest.approx(found[0], rel=1e-5, abs=1e-9)
@@ -185,7 +194,7 @@ def test_the_support_carries_what_is_left_over(support):
     load = np.zeros((len(mesh.X), 6))
     load[:, 2] = 1e-3 * body.shell.node_area / body.shell.node_area.sum()
     q = LinearShell(body.shell, body.fixed).solve(load.ravel())
-    assert body.reaction(q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
+    assert reaction(body, q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
     rise = body.shell.displacement(q)[:, 2].mean()
     assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
 
@@ -225,19 +234,12 @@ def test_a_tube_under_pressure():
     assert low == pytest.approx(-0.38 * p * R / 5e-4 / PET.young_modulus, rel=0.05)
 
 
-def test_a_hole_in_the_bottom_leaves_no_triangles():
-    mesh = body_mesh(SURFACES["flask"], 4e-4, COARSE, QUARTER, hole=0.0015)
-    assert len(np.unique(mesh.number)) == mesh.number.size
-    assert np.hypot(*mesh.outer[mesh.number[:, 0], :2].T) == pytest.approx(0.0015, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"symmetry": QUARTER}, "shifted along x"),
         ({"thickness": -1e-4}, "positive everywhere"),
         ({"thickness": 5e-3}, "round it more"),
-        ({"hole": 0.05}, "flat bottom that is larger"),
         ({"size": MeshSize(heights=(0.03, 0.5))}, "no point at 0.5 m"),
     ],
 )

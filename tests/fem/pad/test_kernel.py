@@ -44,7 +44,7 @@ def nodal(pad, r):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_patch(pad, name):
-    """Affine motion: no force inside, the front pulled by ``P e_z`` times its area, and ``sum r X = V P``."""
+    """Affine motion: no force inside, the contact face pulled by ``P e_z`` times its area, and ``sum r X = V P``."""
     law = LAWS[name]
     u = pad.nodes @ (AFFINE - np.eye(3)).T
     r, _, det = assembled(pad, law, u)
@@ -59,10 +59,10 @@ def test_patch(pad, name):
     assert np.abs(f[inside & (z > tol) & (z < SIZE[2] - tol)]).max() < 1e-13 * scale
     virial, volume = np.einsum("ni,nj->ij", f, pad.nodes), np.prod(SIZE)
     assert np.abs(virial - volume * P).max() < 1e-13 * volume * np.abs(P).max()
-    front = pad.node_area * ((x < SIZE[0] / 2 - tol) & (y < SIZE[1] / 2 - tol))[pad.front_nodes]
+    front = pad.node_area * ((x < SIZE[0] / 2 - tol) & (y < SIZE[1] / 2 - tol))[pad.contact_nodes]
     expected = front[:, None] * P[:, 2]
     inner = front > 0
-    assert np.abs(f[pad.front_nodes][inner] - expected[inner]).max() < 1e-13 * scale
+    assert np.abs(f[pad.contact_nodes][inner] - expected[inner]).max() < 1e-13 * scale
     assert det == pytest.approx(np.linalg.det(AFFINE), rel=1e-12)
 
 
@@ -103,7 +103,7 @@ def test_a_free_element_has_six_zero_modes(pad, name):
 
 def test_an_inverted_element_is_seen(pad):
     u = np.zeros_like(pad.nodes)
-    u[pad.front_nodes, 2] = -1.5 * SIZE[2]
+    u[pad.contact_nodes, 2] = -1.5 * SIZE[2]
     _, _, det = assembled(pad, LAWS["blatz_ko"], u)
     assert det < 0
     local = np.ascontiguousarray(u[pad.element_nodes].transpose(0, 2, 1))

@@ -19,7 +19,7 @@ from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 from tests.fem import reference
 
-TABLE = json.loads((Path(__file__).parents[1] / "data" / "contact_table.json").read_text())
+TABLE = json.loads((Path(__file__).parents[2] / "data" / "contact_table.json").read_text())
 CASES = {case["ratio"]: case for case in TABLE["cases"]}
 COARSE, FINE = (24, 12, 6), (48, 24, 12)
 SIZE = tuple(1e-3 * s for s in TABLE["pad"]["size_mm"])
@@ -31,7 +31,7 @@ MU = 0.8
 def pressed_states(ratio, elements, forces, symmetry=(True, True), contact="weighted", element="hex8"):
     pad = Pad(PadShape(SIZE, elements, element=element), FOAM, symmetry, contact)
     gap = reference.placed(EllipticCylinder(A, ratio * A, 0.2), reference.facing(A))
-    return pad, list(Press(pad, gap).ladder(forces))
+    return pad, list(Press(pad, gap).load_path(forces))
 
 
 def figures(ratio, elements, element="hex8"):
