@@ -106,7 +106,7 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
         from softjaw.study.patch.table import read_table
 
         return checked(read_table(path, reading), reading.flip_normals)
-    from softjaw.study.result.trial import trouble
+    from softjaw.study.result.guarded import trouble
 
     if why := trouble(lambda: _read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: is damaged ({why}); write it again")

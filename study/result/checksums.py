@@ -30,7 +30,7 @@ def of_array(values: Any) -> int:
 
 
 def of_parts(layout: Layout, row: int, values: Sequence[np.ndarray]) -> dict[str, int]:
-    """Checksum of every part of a row; ``values`` as from ``study.result.record.record``."""
+    """Checksum of every part of a row; ``values`` as from ``study.result.write.record``."""
     places = layout.places(row)
 
     def data(i: int) -> bytes:
@@ -109,28 +109,15 @@ def rows_of(file: GuardedFile, layout: Layout) -> Iterator[tuple[int, int, list[
     """
     found = {d.path: file.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
     views = [_mapped(file, found[c.path], c.dtype) for c in layout.columns]
-    codes = file.values(found[f"{ROOT}/status/code"]).ravel()
-    sums = {part: _sums(file, layout, part) for part in layout.parts} if layout.version > 3 else {}
-    whole = None if sums else file.values(found[f"{ROOT}/status/crc"]).ravel()
-    if sums:
-        state = _sums(file, layout, STATE)
-        codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
+    sums = {part: _sums(file, layout, part) for part in layout.parts}
+    codes, state = file.values(found[f"{ROOT}/status/code"]).ravel(), _sums(file, layout, STATE)
+    codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
     for row in np.flatnonzero(codes != MISSING):
         pairs = zip(views, layout.places(row), strict=True)
         values = [None if place is None else view[place] for view, place in pairs]
-        if whole is not None:
-            good = _of_whole(layout, values) == whole[row]
-        else:
-            own = of_parts(layout, row, values)
-            good = all(own[part] == stored[row] for part, stored in sums.items())
+        own = of_parts(layout, row, values)
+        good = all(own[part] == stored[row] for part, stored in sums.items())
         yield int(row), int(codes[row]), values if good else None
-
-
-def _of_whole(layout: Layout, values: Sequence[Any]) -> int:
-    """Checksum of a row in a file of version 3: all of it but its timings."""
-    pairs = zip(layout.columns, values, strict=True)
-    counted = (np.asarray(v, c.dtype) for c, v in pairs if v is not None and not c.key.startswith("work/"))
-    return zlib.crc32(b"".join(v.tobytes() for v in counted))
 
 
 def _sums(file: GuardedFile, layout: Layout, part: str) -> np.ndarray:

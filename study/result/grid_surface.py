@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import NOBODY, Surface
+from softjaw.study.result.vtkhdf import NOBODY, Surface
 
 ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]

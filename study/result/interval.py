@@ -18,7 +18,7 @@ from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
+    from softjaw.study.result.write import ResultWriter
 
 FloatArray = NDArray[np.float64]
 NAMES = {"e_n": "m", "quality": ""}

@@ -228,7 +228,7 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     assert "Traceback" not in errors
     assert "4 of 12 cases done, 8 failed, 0 missing" in output
     with open_result(folder / "out.hdf") as result:
-        messages, quality = result.messages[:, :, 0], result.map("quality", "ccm")[:, :, 0]
+        messages, quality = result.messages[:, :, 0], result.read("quality/ccm")[:, :, 0]
     small, large, middle, beside = 0, 1, 0, 1
     assert np.isfinite(quality[large, middle]).all()
     good, ended, above = messages[small, middle]

@@ -67,7 +67,7 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     path = force_file(tmp_path / "force.hdf")
     with open_result(path) as result:
         lines = fig7.quantities(Data(result))
-        e_n = 1e3 * result.map("e_n", "ccm")[0, 0]
+        e_n = 1e3 * result.read("e_n/ccm")[0, 0]
     _, force = lines["force"]
     assert force["pcm"] == pytest.approx(np.full(4, 0.8))
     assert force["ccm"] == pytest.approx(np.full(4, 0.7))
@@ -185,7 +185,7 @@ def test_the_command_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_pat
 @pytest.mark.long
 @pytest.mark.launches
 def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, data, tmp_path):
-    off = data("fig5-candidate").result.fingers("frame_origin")[0, 0, 0, 0]
+    off = data("fig5-candidate").result.read("fingers/frame_origin")[0, 0, 0, 0]
     assert np.hypot(*off[:2]) > 0.015  # of pads that reach 25 mm to both sides
     for name, index in (("fig5-candidate", (0, 0, 0)), ("fig4-curvature", (0, 0, 0, 1))):
         known = {m: fig5.stored_surface(data(name), index, 0, m) for m in fig5.MODELS}

@@ -15,9 +15,10 @@ import h5py
 import pytest
 
 from softjaw.study.environment import launch_environment
+from softjaw.study.result.checksums import rows_of
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.lock import holder
-from softjaw.study.result.store import open_result, rows_of
+from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]

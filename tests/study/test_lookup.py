@@ -13,7 +13,7 @@ import pytest
 
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
-from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.store import StoredAxis
 from tests.study.formula_results import (
     ANGLES,
     FORCES,

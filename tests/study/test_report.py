@@ -18,9 +18,9 @@ from softjaw.study.case.result import CaseResult
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import StoredAxis, open_result
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.scene.objects import EllipticCylinder, Sphere
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene, shape_outline

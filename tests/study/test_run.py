@@ -121,8 +121,8 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
     assert (once(states, path) == FAILED).sum() == 5
     with open_result(path) as result:
         assert result.messages.ravel()[9] == "no contact at this force"
-        assert np.isnan(result.map("e_n", "ccm").ravel()[[9, 25, 26]]).all()
-        assert result.map("e_n", "ccm").ravel()[10] > 0
+        assert np.isnan(result.read("e_n/ccm").ravel()[[9, 25, 26]]).all()
+        assert result.read("e_n/ccm").ravel()[10] > 0
     assert once(study, 0, path)[0] == 6
     assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []

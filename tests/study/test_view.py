@@ -19,9 +19,9 @@ from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.grid_surface import Cells, Wall, areas, between, coloured, cut
 from softjaw.study.result.store import open_result
+from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.data import Data
 from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of

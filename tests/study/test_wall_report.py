@@ -15,12 +15,13 @@ from softjaw.study.case import model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
-from softjaw.study.result import window
+from softjaw.study.result import derived
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import dataset
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.data import Data
@@ -67,7 +68,7 @@ def write(path, scene, results):
             writer.write(row, record(layout, results[row]))
         else:
             writer.fail(row, "the wall gave way")
-    window.finalise(writer, scene)
+    derived.finalise(writer, scene)
     writer.close()
     return path
 

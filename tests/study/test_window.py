@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softjaw.study.result.window import first_crossing
+from softjaw.study.result.derived import first_crossing
 
 FORCES = [1.0, 2.0, 4.0, 8.0]
 

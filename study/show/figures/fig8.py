@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.result.grid import NOBODY
+from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.data import WIDE, Data, number
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.outline import read_scene, shape_outline

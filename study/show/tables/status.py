@@ -12,7 +12,7 @@ import numpy as np
 from softjaw.study.quantities import PARTS, STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
-from softjaw.study.result.reading import place_text
+from softjaw.study.result.store import place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
@@ -115,10 +115,10 @@ def reasons(result: Any, width: int = PAPER) -> list[str]:
 
 def time_split(result: Any) -> list[str]:
     """Where the seconds of all cases went; nothing where no time was measured."""
-    total = float(np.nansum(result.work("seconds_total")))
+    total = float(np.nansum(result.read("work/seconds_total")))
     if not total:
         return []
-    shares = {part: float(np.nansum(result.work(f"seconds_{part}"))) / total for part in PARTS}
+    shares = {part: float(np.nansum(result.read(f"work/seconds_{part}"))) / total for part in PARTS}
     words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
     return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.vtkhdf import write_grid
+from softjaw.study.result.vtkhdf import NOBODY, write_grid
 from softjaw.study.show.view.model import View
 from softjaw.study.show.view.pads import Pad, pads
 

@@ -10,9 +10,9 @@ import numpy as np
 from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import NOBODY, Surface
 from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.outline import read_scene
 from softjaw.study.show.tables.ranking import nearest

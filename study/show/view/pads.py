@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.result.grid import corners_of
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.vtkhdf import corners_of
 from softjaw.study.show.data import Data
 
 LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]

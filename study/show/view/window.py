@@ -10,8 +10,8 @@ import numpy as np
 import pyvista as pv
 
 from softjaw.study.pictures import COLOURS, INK, span
-from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.report.contact import COMPONENTS, body, weaker
 from softjaw.study.show.stored_surface import stored_surface
 from softjaw.study.show.tables.ranking import nearest
