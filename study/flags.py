@@ -59,7 +59,7 @@ class Flag(IntFlag):
     JUMPED = 1 << 18, "jumped", (
         "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"
     )  # fmt: skip
-    # of no file: derived where a file tells the window of forces
+    # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's weight"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
 

@@ -14,7 +14,7 @@ from softjaw.study.flags import flag_definitions
 MODELS = ("ccm", "pcm", "pcm_projected")
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("missing", "done", "failed")  # of a case, by these codes:
+STATES = ("not computed", "complete", "failed")  # of a case, by these codes:
 MISSING, DONE, FAILED = range(3)
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
@@ -346,7 +346,7 @@ TABLE = (
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
-WINDOW = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
+FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
 
 

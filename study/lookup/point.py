@@ -9,7 +9,7 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
-from softjaw.study.quantities import MAIN, WINDOW
+from softjaw.study.quantities import FORCE_RANGE, MAIN
 from softjaw.study.result.layout import MISSING
 from softjaw.study.units import shown_text
 
@@ -148,7 +148,7 @@ class GraspPoint:
         lines = [", ".join(words)]
         if self.reason:
             return f"{lines[0]}: {self.reason}"
-        for name in (n for n in (*MAIN, *WINDOW) if self.map.source.has(n)):
+        for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
             lines.append(f"  {name:<13} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]

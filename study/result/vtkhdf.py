@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from softjaw.study.quantities import DONE, FINGERS, MISSING, ON_OBJECT
+from softjaw.study.quantities import DONE, FINGERS, MISSING, ON_OBJECT, STATES
 from softjaw.study.result.datasets import Dataset
 from softjaw.study.writing import beside
 
@@ -78,7 +78,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
     yield made("CellData/part", (cells,), "u1", 0, "", "0 object, 1 and 2 pads of the fingers")
     text = "candidate, counted over stations and angles; -1 none"
     yield made("CellData/candidate", (cells,), "<i4", NOBODY, "", text)
-    text = "0 missing, 1 done, 2 failed, -1 no candidate"
+    text = ", ".join([*(f"{code} {state}" for code, state in enumerate(STATES)), "-1 no candidate"])
     yield made("CellData/status", (steps * cells,), "i1", MISSING, "", text)
     if layout.front[0]:
         yield made("CellData/pressure", (steps * cells,), "<f4", np.nan, "Pa", "contact pressure")

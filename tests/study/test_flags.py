@@ -24,7 +24,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
-from softjaw.study.show.tables.show_text import FLAGS_WIDTH
+from softjaw.study.show.tables.show import FLAGS_WIDTH
 
 ROOT = Path(__file__).parents[2]
 BITWISE = (ast.BitOr, ast.BitAnd)

@@ -52,7 +52,7 @@ def test_the_smoke_scene_runs_as_it_is(once, shared_path):
     path = shared_path / "smoke.hdf"
     code, output, errors = once(run, "smoke", path)
     assert (code, errors) == (0, "")
-    assert "4 of 4 cases done, 0 failed, 0 missing" in output
+    assert "4 of 4 cases complete, 0 failed, 0 not computed" in output
     with open_result(path) as result:
         assert (result.status == DONE).all()
         e_n = {model: result.read(f"e_n/{model}") for model in ("ccm", "pcm")}
@@ -74,7 +74,7 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
     overrides = [word for value in ONE[name] for word in ("--set", value)]
     code, output, errors = once(run, name, path, *COARSE, *overrides)
     assert (code, errors) == (0, ""), output
-    assert ", 0 failed, 0 missing" in output
+    assert ", 0 failed, 0 not computed" in output
     with open_result(path) as result:
         assert (result.status == DONE).all()
         F_N, S = (result.read(f"{name}/{name}") for name in ("F_N", "S"))
@@ -92,7 +92,7 @@ def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared
     words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]
     code, output, errors = once(run, name, path, *COARSE, *words)
     assert (code, errors) == (0, ""), output
-    assert ", 0 failed, 0 missing" in output
+    assert ", 0 failed, 0 not computed" in output
     with open_result(path) as result:
         assert (result.status == DONE).all()
         indentation = 1e3 * result.read("indentation/indentation")

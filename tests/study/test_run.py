@@ -51,7 +51,7 @@ def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, unin
     path = shared_path / "ranks.hdf"
     code, output, errors = once(study, ranks, path)
     assert code == 0, errors
-    assert "36 of 36 cases done" in output
+    assert "36 of 36 cases complete" in output
     assert once(differing, path, uninterrupted) == []
     assert not list(shared_path.glob("*.lock"))
     assert not list(shared_path.glob("*.part"))

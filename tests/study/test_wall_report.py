@@ -29,8 +29,7 @@ from softjaw.study.show.outline import read_scene
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
 from softjaw.study.show.tables.ranking import borne_level, judged, ranking
-from softjaw.study.show.tables.show import as_csv, as_json, best
-from softjaw.study.show.tables.show_text import as_text
+from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 from softjaw.study.show.view.model import view_of
 from tests.study.sealing import sealed
 
@@ -146,12 +145,12 @@ def test_show_has_indentations_stress_and_the_window_of_forces(can):
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
-    assert names.split()[-3:] == ["indentation", "stress", "window"]
+    assert names.split()[-3:] == ["stress", "force", "range"]
     assert units.split()[-4:] == ["[mm]", "[kPa]", "[N]", "flags"]
     assert "safety" in units
     assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
     assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
-    assert "window: normal forces" in text
+    assert "force range: normal forces" in text
     # 3 N dents both stations deeper than 1.5 mm
     assert as_text(strong).count("too strong") == 3
     told = json.loads(as_json(strong))

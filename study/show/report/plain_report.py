@@ -9,8 +9,7 @@ from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
 from softjaw.study.show.data import Data
 from softjaw.study.show.report.verdict import CAVEAT, meaning, subtitle, verdict, warnings
-from softjaw.study.show.tables.show import best
-from softjaw.study.show.tables.show_text import as_text
+from softjaw.study.show.tables.show import as_text, best
 
 TOP, MOST_REASONS, MOST_PLACES, WIDTH = 5, 10, 3, 120
 READING = """How to read the file
