@@ -13,15 +13,15 @@ DEGREES_90 = "more than 90 deg from the contact normal"
 class Flag(IntFlag):
     """What the reader of a case should know; flags add up.
 
-    ``word`` is what a column of a table has room for, ``sentence`` what a message says of it (without a semicolon,
-    which parts sentences), ``more`` what its definition in the file adds.
+    ``word`` is what a column of a table has room for, ``sentence`` what a message says of it, ``more`` what
+    its definition in the file adds.
     """
 
     word: str
     sentence: str
     more: str
 
-    def __new__(cls, bit: int, word: str, sentence: str, more: str = "") -> Flag:
+    def __new__(cls, bit: int, word: str = "", sentence: str = "", more: str = "") -> Flag:
         """A bit with its texts."""
         made = int.__new__(cls, bit)
         made._value_ = bit
@@ -39,7 +39,7 @@ class Flag(IntFlag):
     OVERHANG = 1 << 6, "overhang", f"some loaded faces of a patch are turned {DEGREES_90}"
     WINDING = 1 << 7, "winding", "some faces are wound against their normals, which were taken"
     NOT_ANTIPODAL = 1 << 8, "not antipodal", "contacts more than 5 deg from antipodal"
-    NODAL = 1 << 9, "nodal", "solved with nodal gaps, because weighted ones had no solution"
+    NODAL = 1 << 9, "nodal", "mortar contact did not converge, node-to-surface contact used"
     SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
@@ -54,7 +54,7 @@ class Flag(IntFlag):
         "the pads push the object along its axis with more than friction can hold, so it slides out"
     )  # fmt: skip
     YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the indentation stays"
-    NO_FIT = 1 << 16, "no fit", "a limit surface could not be fitted, the ellipsoid from three motions stands in"
+    NO_FIT = 1 << 16, "no fit", "limit surface fit failed, three-motion ellipsoid used"
     UNSTABLE = 1 << 17, "unstable", "the foam lost ellipticity, strains may localise"
     JUMPED = 1 << 18, "jumped", (
         "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"

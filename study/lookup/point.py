@@ -69,12 +69,12 @@ class GraspPoint:
 
     @property
     def e_n(self) -> Any:
-        """Eccentricity parameter of the weaker finger, curved model [m]."""
+        """Eccentricity parameter of the weaker finger, CCM [m]."""
         return self.value("e_n")
 
     @property
     def quality(self) -> Any:
-        """Grasp quality, curved model [-]."""
+        """Grasp quality, CCM [-]."""
         return self.value("quality")
 
     @property
@@ -142,7 +142,7 @@ class GraspPoint:
         """What people want to know at one point, in a few lines."""
         if self.shape:
             return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
-        axes, station, angle, force = self.map.axes, *self.place[0]
+        axes, (station, angle, force) = self.map.axes, self.place[0].tolist()
         turn = [] if self.map.by_poses else [f"angle {shown_text(angle, 'rad', 5)}"]
         words = [f"{axes[0].name} {shown_text(station, axes[0].units, 5)}", *turn, f"force {force:.5g} N"]
         lines = [", ".join(words)]

@@ -29,7 +29,7 @@ def of_array(values: Any) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
 
 
-def of_parts(layout: Layout, row: int, values: Sequence[np.ndarray]) -> dict[str, int]:
+def of_parts(layout: Layout, row: int, values: Sequence[Any]) -> dict[str, int]:
     """Checksum of every part of a row; ``values`` as from ``study.result.write.record``."""
     places = layout.places(row)
 
@@ -76,7 +76,7 @@ def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_wa
 
 def of_session(session: np.void) -> int:
     """Checksum of a row of the provenance, without the checksum that it holds."""
-    return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names if name != "crc"))
+    return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names or () if name != "crc"))
 
 
 def of_header(file: GuardedFile, layout: Layout) -> int:

@@ -93,7 +93,7 @@ def _of_force_range(scene: Scene) -> list[Derived]:
     found = []
     if scene.object.mass is not None:
         found.append(Derived(
-            LOW, "N", "smallest force that holds the object", "Normal force per finger at which safety_factor (curved)"
+            LOW, "N", "smallest force that holds the object", "Normal force per finger at which safety_factor (CCM)"
             " passes 1, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them holds it.",
             over,
         ))  # fmt: skip
@@ -125,7 +125,8 @@ def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArr
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
     from softjaw.study.case.wall import thin_body
 
-    limits = {"indentation": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
+    dent: float | None = getattr(scene.object, "allowed_dent", None)
+    limits = {"indentation": dent, "wall_stress": thin_body(scene.object).material.yield_strength}
     values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
     known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)

@@ -120,7 +120,7 @@ class Layout:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Friction models in the order they are shown: curved, the planar one that the scene prefers, the other."""
+        """Friction models in the order they are shown: ccm, the planar one that the scene prefers, the other."""
         return tuple(dict.fromkeys((MODELS[0], self.planar, *MODELS)))
 
     @property

@@ -24,7 +24,7 @@ FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to
 def open(file: str | Path) -> xr.Dataset:
     """A result file as a dataset, whole in memory; the file is closed.
 
-    Every value is checked against its checksum. A case that failed or is not computed yet has NaN everywhere;
+    Every value is checked against its checksum. A case that failed or is not computed has NaN everywhere;
     ``status`` and ``message`` tell which and why. Contact patches and fields are read by `read_patch` and `read_field`.
 
     Parameters

@@ -79,7 +79,7 @@ class Result:
 
     def __enter__(self) -> Result:
         """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
-        self._quiet = np.errstate(all="ignore")
+        self._quiet: Any = np.errstate(all="ignore")
         self._quiet.__enter__()
         return self
 
@@ -93,7 +93,7 @@ class Result:
         self.file.close()
 
     def read(self, path: str) -> np.ndarray:
-        """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/flat``."""
+        """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/pcm``."""
         dataset = self._checked(path)
         self._compare(self._part.get(f"{ROOT}/{path}", ""))
         return self._believable(path, self.file.values(dataset))
@@ -119,7 +119,7 @@ class Result:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """State of every case when it was read first: 0 missing, 1 done, 2 failed."""
+        """State of every case when it was read first: 0 not computed, 1 complete, 2 failed."""
         codes = self.codes
         if codes.max() > FAILED:
             raise self._damaged(f"a case has the state {codes.max()}, which does not exist")

@@ -28,7 +28,7 @@ OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those tha
 ABOUT = (
     "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
     " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that indent its wall"
-    " stand in it. Curved contact model, SI units; NaN: no value. Filled when no case is missing any more."
+    " stand in it. Curved contact model (CCM), SI units; NaN: no value. Filled when all cases are computed."
 )
 
 
@@ -83,7 +83,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
     if layout.front[0]:
         yield made("CellData/pressure", (steps * cells,), "<f4", np.nan, "Pa", "contact pressure")
     for q in maps_of(layout).values():
-        yield made(f"CellData/{q.name}", (steps * cells,), "<f4", np.nan, q.unit, f"{q.label}, curved")
+        yield made(f"CellData/{q.name}", (steps * cells,), "<f4", np.nan, q.unit, f"{q.label}, ccm")
     for name, values in shared_steps(layout.axes[-1].values, points, _advances(layout, cells)).items():
         yield made(f"Steps/{name}", values.shape, values.dtype.str, 0)
 

@@ -99,7 +99,7 @@ class ResultWriter:
         return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
 
     def read(self, path: str, index: Any = ()) -> np.ndarray:
-        """Any dataset, named below ``/study`` (``e_n/curved``) or from the root, or what it has at an index."""
+        """Any dataset, named below ``/study`` (``e_n/ccm``) or from the root, or what it has at an index."""
         return self._file[path if path.startswith("/") else f"{ROOT}/{path}"][index]
 
     def result(self) -> Result:

@@ -67,8 +67,9 @@ class Difference:
     @property
     def beyond(self) -> NDArray[np.object_]:
         """Whether a difference exceeds the errors of both, and `TIE` of the value; None where an error is unknown."""
-        known = np.isfinite(self.change) & np.isfinite(self.error)
-        return np.where(known, np.abs(self.change) > self.error + TIE * np.abs(self.values[0]), None)
+        found = (np.abs(self.change) > self.error + TIE * np.abs(self.values[0])).astype(object)
+        found[~(np.isfinite(self.change) & np.isfinite(self.error))] = None
+        return found
 
     @property
     def exceed(self) -> tuple[int, int]:
@@ -166,7 +167,7 @@ def _difference(pair: tuple[xr.Dataset, xr.Dataset], axes: tuple[AxisMatch, ...]
 
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
-    """Error of a map in its unit; None where the file has none, as for models but the curved."""
+    """Error of a map in its unit; None where the file has none, as for models other than CCM."""
     if map_row(name).by_model and model != "ccm":
         return None
     if f"{name}_interval" in ds:

@@ -19,7 +19,7 @@ from softjaw.study.show.tables.columns import csv_text, with_unit
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
 # Name, unit of every component, names of the components; of each finger, in the object's frame.
-FINGER = (
+FINGER: tuple[tuple[str, str | tuple[str, ...], tuple[str, ...]], ...] = (
     ("pose_origin", "m", XYZ),
     ("pose_rotation", "", NINE),
     ("frame_origin", "m", XYZ),
@@ -90,7 +90,7 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
 
 def as_json(ds: xr.Dataset, model: str = "ccm") -> str:
     """One object: file, units, meanings, and a list of cases; SI units, null where there is nothing."""
-    units = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
+    units: dict[str, Any] = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
     units |= {name: unit for name, unit, _ in FINGER}
     rows = []
     for case in cases(ds, model):
@@ -107,9 +107,9 @@ def as_csv(ds: xr.Dataset, model: str = "ccm") -> str:
     head += ["label", "state", "message", "flags", *(with_unit(*pair) for pair in maps.items())]
     for f in (1, 2):
         for name, unit, parts in FINGER:
-            each = [unit] * len(parts) if isinstance(unit, str) else unit
+            each = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
             names = [f"finger{f}.{name}.{part}" for part in parts] or [f"finger{f}.{name}"]
-            head += [with_unit(n, u) for n, u in zip(names, each or [unit], strict=True)]
+            head += [with_unit(n, u) for n, u in zip(names, each, strict=True)]
     return csv_text([head, *(_line(case, tuple(maps)) for case in cases(ds, model))])
 
 

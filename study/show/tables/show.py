@@ -106,10 +106,10 @@ def _level(ds: xr.Dataset, flags: np.ndarray, force: float | None) -> tuple[int,
     if force is not None:
         k = nearest(forces, force)
         return k, "" if np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
-    k = borne_level(ds.status.values, flags) if (flags & BORNE).any() else None
-    if k is None or k == len(forces) - 1:
+    borne = borne_level(ds.status.values, flags) if (flags & BORNE).any() else None
+    if borne is None or borne == len(forces) - 1:
         return len(forces) - 1, ""
-    return k, ", the highest that a grasp holds and its wall bears"
+    return borne, ", the highest that a grasp holds and its wall bears"
 
 
 def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:

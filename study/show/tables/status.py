@@ -58,7 +58,7 @@ def _cases(result: Any, state: int) -> list[dict[str, Any]]:
 
 def place(result: Any, row: int) -> str:
     """A case in words."""
-    return place_text(result.axes, result.labels, np.unravel_index(row, result.layout.shape))
+    return place_text(result.axes, result.labels, tuple(map(int, np.unravel_index(row, result.layout.shape))))
 
 
 def _place(result: Any, row: int) -> list[float]:

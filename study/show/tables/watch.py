@@ -45,8 +45,9 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
     sleep : callable
         Waits for so many seconds.
     """
-    console = Console(file=stream or sys.stdout, markup=False, emoji=False, highlight=False)
-    view = View(console)
+    stream = stream or sys.stdout
+    console = Console(file=stream, markup=False, emoji=False, highlight=False)
+    view = View(console, stream)
     try:
         with ExitStack() as stack:
             if console.is_terminal:
@@ -67,10 +68,10 @@ class View:
     ``code`` and ``last_words`` are those of a run that has ended; ``live`` draws over itself on a terminal.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, stream: TextIO) -> None:
         self.code, self.last_words = ENDED, list[str]()
         self.live: Live | None = None
-        self._console = console
+        self._console, self._stream = console, stream
         self._progress: Progress | None = None
         self._codes = np.zeros(0)
         self._failure, self._done = -1, ""
@@ -97,7 +98,7 @@ class View:
         self._failure = int(fresh[-1]) if fresh.size else self._failure
         self._codes = codes
         if self._progress is None:
-            self._progress = Progress(np.ones(codes.size), codes, self._console.file, live=False)
+            self._progress = Progress(np.ones(codes.size), codes, self._stream, live=False)
 
     def _drawn(self, result: Any, codes: np.ndarray, runner: str, line: str) -> Group:
         title = f" ({result.title})" if result.title else ""
