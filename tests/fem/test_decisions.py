@@ -120,7 +120,7 @@ ACCEPTED = {  # mesh, and its volume
 }
 REFUSED = {  # mesh, and a word of the refusal
     "open": ((CUBE[0], CUBE[1][1:]), "closed"),
-    "pcm": (FLAT_PIECE, "volume"),
+    "flat": (FLAT_PIECE, "volume"),
     "flat beside another": (union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])), "volume"),
     "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), "intersects"),
     "corners on another": (union(CUBE, shifted(OCTAHEDRON, 1.0)), "two pieces"),

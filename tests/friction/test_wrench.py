@@ -95,7 +95,7 @@ def test_screws_about_a_shifted_axis_are_centres_of_rotation():
         (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
         (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"),
         (lambda p: friction_limits(p, np.nan), "mu is nan"),
-        (lambda p: friction_limits(p, 0.5, "planar"), "choose one of curved, flat"),
+        (lambda p: friction_limits(p, 0.5, "planar"), "choose one of ccm, pcm"),
         (lambda p: friction_limits(p, 0.5, "unrolled"), "unrolled must hold"),
     ],
 )

@@ -75,7 +75,7 @@ def test_what_is_right_is_ok():
         (solved(messages=("coarse; slips", "")), {"note": "coarse"}, "remarked, but not expected: slips"),
         (solved(), {"note": "coarse"}, "'coarse' is not remarked"),
         (solved(checks=GOOD | {"force_balance": 1e-6}), {}, "force_balance is 1.0e-06"),
-        (solved(checks=GOOD | {"adhesion": np.nan}), {}, "tension is nan"),
+        (solved(checks=GOOD | {"adhesion": np.nan}), {}, "adhesion is nan"),
         (solved(checks=GOOD | {"min_det_f": -0.1}), {}, "an element is inverted"),
         (solved(checks=GOOD | {"ellipticity": -0.1}), {}, "lost ellipticity"),
         (solved(np.nan), {}, "a map is not finite: e_n"),

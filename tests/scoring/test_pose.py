@@ -207,7 +207,7 @@ def test_tilted_ellipsoids():
 
 
 @pytest.mark.parametrize(
-    ("axes1", "pcm"),
+    ("axes1", "flat"),
     [((0.8, 0.6, 0), False), ((0, 0.6, 0.1), False), ((0, 0, 0.1), False), ((0.5, 0, 0), False), ((0, 0, 0), True)],
 )
 def test_contacts_that_do_not_carry_every_load(axes1, flat):
