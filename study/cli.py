@@ -25,7 +25,7 @@ from softjaw.study.show.view.command import add_options as add_view_options
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 KINDS = {
     "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
-    "cup": "a thin-walled cup: dents, and the window of forces that hold it without spilling",
+    "cup": "a thin-walled cup: dents, and the range of forces that hold it without spilling",
     "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }

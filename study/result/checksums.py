@@ -9,7 +9,7 @@ A state has one of its own: a case whose state was lost is not taken for one tha
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -102,24 +102,6 @@ def closing_sum(file: GuardedFile, layout: Layout, name: str) -> int:
     return int(file.values(found)[layout.closing.index(name)])
 
 
-def rows_of(file: GuardedFile, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
-    """Every row that is done or failed: number, state, and values, or None where they do not match their checksums.
-
-    A state that does not match its own checksum is the one that the checksum is of.
-    """
-    found = {d.path: file.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
-    views = [_mapped(file, found[c.path], c.dtype) for c in layout.columns]
-    sums = {part: _sums(file, layout, part) for part in layout.parts}
-    codes, state = file.values(found[f"{ROOT}/status/code"]).ravel(), _sums(file, layout, STATE)
-    codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
-    for row in np.flatnonzero(codes != MISSING):
-        pairs = zip(views, layout.places(row), strict=True)
-        values = [None if place is None else view[place] for view, place in pairs]
-        own = of_parts(layout, row, values)
-        good = all(own[part] == stored[row] for part, stored in sums.items())
-        yield int(row), int(codes[row]), values if good else None
-
-
 def _sums(file: GuardedFile, layout: Layout, part: str) -> np.ndarray:
     return file.values(file.checked(f"{SUMS}/{part}", layout.shape, np.dtype("<u4"))).ravel()
 
@@ -144,10 +126,3 @@ def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
     lead = (*layout.shape[:-3], len(chosen), layout.shape[-1])
     lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)
     return np.where(slot < 0, -1, lines)
-
-
-def _mapped(file: GuardedFile, dataset: Any, dtype: np.dtype) -> np.ndarray:
-    """A dataset's values, which are read when they are asked for, unless it was repacked."""
-    if dataset.chunks or not dataset.size:
-        return file.values(dataset).astype(dtype)
-    return np.memmap(file.path, dtype, "r", dataset.id.get_offset(), dataset.shape)

@@ -150,7 +150,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path,
     assert code == 75
     left = (once(states, path) == MISSING).sum()
     assert left > 0
-    assert f"{left} missing" in output
+    assert f"{left} not computed" in output
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
@@ -225,7 +225,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     told, (code, _, errors), first = once(second)
     assert told.returncode == 0
     assert "running now: host " in told.stdout
-    assert " missing" in told.stdout
+    assert " not computed" in told.stdout
     assert code == 4
     assert "in use by another run (host " in errors
     assert first == 75

@@ -1,4 +1,4 @@
-"""The window of safe forces: where values first pass a limit between solved forces."""
+"""The safe force range: where values first pass a limit between solved forces."""
 
 import numpy as np
 import pytest

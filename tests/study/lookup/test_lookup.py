@@ -27,7 +27,7 @@ from tests.study.formula_results import (
     without_result,
 )
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
 ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
 

@@ -21,7 +21,7 @@ import pyvista as pv
 
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
-from tests.study.test_vtkhdf import steps_of
+from tests.study.result.test_vtkhdf import steps_of
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
 
