@@ -54,7 +54,7 @@ class GuardedFile:
         with self._told(path):
             found = self._node(path)
             if not isinstance(found, h5py.Dataset):
-                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is no dataset); restore it from a copy")
+                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is not a dataset); restore it from a copy")
             plist = found.id.get_create_plist()
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = found.size * max(found.dtype.itemsize, 1) if found.shape is not None else 0
@@ -69,7 +69,7 @@ class GuardedFile:
             found = self.plain(path)
             if found.ndim != 1 or not h5py.check_string_dtype(found.dtype):
                 raise StudyError(
-                    OTHER_FILE, f"{self.path}: damaged ({path} is no list of texts); restore it from a copy"
+                    OTHER_FILE, f"{self.path}: damaged ({path} is not a list of texts); restore it from a copy"
                 )
             return [text_of(text) for text in found[()].tolist()]
 
@@ -106,7 +106,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
         The file cannot be read as a file of this ``kind``, another program holds it, or HDF5 does not survive it.
     """
     if path.exists() and not path.is_file():
-        raise StudyError(OTHER_FILE, f"{path}: is no regular file; name a {kind}")
+        raise StudyError(OTHER_FILE, f"{path}: is not a regular file; name a {kind}")
 
     def attempt() -> None:
         file = h5py.File(path, "r")  # not closed: that has to work on half of a structure, and the process ends anyway
@@ -118,7 +118,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
     try:
         file = GuardedFile(path, h5py.File(path, "r"))
     except FileNotFoundError as error:
-        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
+        raise StudyError(OTHER_FILE, f"{path}: no such file") from error
     except BROKEN as error:
         if "unable to lock file" in str(error):
             text = f"{path}: another program holds it open for writing; close it there"

@@ -170,7 +170,7 @@ def test_a_file_that_was_moved_or_replaced_is_noticed(tmp_path):
     with pytest.raises(StudyError, match="was replaced by another file") as refusal:
         standing.check()
     assert refusal.value.code == CANNOT_WRITE
-    with pytest.raises(StudyError, match=r"cannot be written any more \(No space.*the same command goes on"):
+    with pytest.raises(StudyError, match=r"cannot be written any more \(No space.*the same command again"):
         with standing.writing():
             raise OSError("No space left on device")
 
