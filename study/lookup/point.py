@@ -115,6 +115,7 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
+        # here: values alone need neither numba nor scipy, which take longer to load than a look-up
         from softjaw.lsfit.ellipsoid import Ellipsoid
         from softjaw.lsfit.form import exponents
         from softjaw.lsfit.quartic import Quartic
@@ -150,7 +151,7 @@ class GraspPoint:
             return f"{lines[0]}: {self.reason}"
         for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
-            lines.append(f"  {name:<13} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
+            lines.append(f"  {name:<14} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 
