@@ -103,7 +103,7 @@ import glob, os, sys
 
 os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
 sys.path += sorted(glob.glob("/usr/lib/petscdir/petsc3*/*-real/lib/python3/dist-packages"))
-import clarabel, h5py, hypothesis, jinja2, matplotlib, mpi4py, numba, numpy, petsc4py.lib, plotly, pydantic, pytest, pyvista
+import clarabel, h5py, hypothesis, jinja2, matplotlib, mpi4py, numba, numpy, petsc4py.lib, plotly, pydantic, pytest, pyvista, rich
 import scipy, skfem, trimesh, xarray
 import softjaw.study.cli
 

@@ -24,7 +24,7 @@ def line(file: Path) -> tuple[str, np.ndarray, list[np.ndarray]]:
     """How the wall of the first candidate was simulated, its forces [N], and the panels' values over them [mm]."""
     with open_result(file) as result:
         forces = np.asarray(result.axes[-1].values)
-        values = [1e3 * np.asarray(result.map(name, "ccm" if name == "e_n" else "")) for name, _ in PANELS]
+        values = [1e3 * np.asarray(result.read(f"{name}/{'ccm' if name == 'e_n' else name}")) for name, _ in PANELS]
         level = int(result.read("effects/object_level").ravel()[0])
     return EFFECTS["object"][level], forces, [v.reshape(-1, len(forces))[0] for v in values]
 

@@ -19,14 +19,13 @@ from softjaw.study.environment import keep_compiled_loops, pin_threads
 from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError, complain, first_rank
 from softjaw.study.run.memory import is_out_of_memory, no_room
 from softjaw.study.show.figures.command import add_options as add_figure_options
-from softjaw.study.show.tables.watch import add_options as add_watch_options
 from softjaw.study.show.view.command import add_choice
 from softjaw.study.show.view.command import add_options as add_view_options
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 KINDS = {
     "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
-    "cup": "a thin-walled cup: dents, and the window of forces that hold it without spilling",
+    "cup": "a thin-walled cup: dents, and the range of forces that hold it without spilling",
     "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
@@ -196,7 +195,7 @@ def program() -> Program:
             epilog=f"example:\n  {ranks}softjaw {example}",
         )  # fmt: skip
         made[name].set_defaults(command=getattr(commands, name))
-    for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", add_watch_options),
+    for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", _add_watch_options),
                               ("view", add_view_options), ("figure", add_figure_options), ("patch", _add_patch_options),
                               ("scale", _add_scale_options)):  # fmt: skip
         add_options(made[name])
@@ -205,6 +204,21 @@ def program() -> Program:
     made["completion"].set_defaults(program=parser)
     made["completion"].add_argument("shell", choices=SHELLS, help="the shell that is to learn softjaw's words")
     return parser
+
+
+def _add_watch_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
+    parser.add_argument("--every", type=_seconds, default=2.0, metavar="S", help="seconds between looks (default 2)")
+    parser.description = (
+        f"{parser.description} Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are"
+        " not computed. Ctrl-C ends the view, not the run."
+    )
+
+
+def _seconds(text: str) -> float:
+    if not 0.1 <= (value := float(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
+    return value
 
 
 def _add_init_options(parser: argparse.ArgumentParser) -> None:

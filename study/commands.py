@@ -133,8 +133,7 @@ def compare(options: Namespace) -> int:
     """Print two maps side by side."""
     from softjaw.study.result.read import open
     from softjaw.study.show.tables.columns import terminal_width
-    from softjaw.study.show.tables.compare import compare
-    from softjaw.study.show.tables.compare_text import comparison_csv, comparison_json, comparison_text
+    from softjaw.study.show.tables.compare import compare, comparison_csv, comparison_json, comparison_text
 
     one, other = map(open, options.files)
     found = compare(one, other, options.quantity, options.model)

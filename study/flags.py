@@ -13,15 +13,15 @@ DEGREES_90 = "more than 90 deg from the contact normal"
 class Flag(IntFlag):
     """What the reader of a case should know; flags add up.
 
-    ``word`` is what a column of a table has room for, ``sentence`` what a message says of it (without a semicolon,
-    which parts sentences), ``more`` what its definition in the file adds.
+    ``word`` is what a column of a table has room for, ``sentence`` what a message says of it, ``more`` what
+    its definition in the file adds.
     """
 
     word: str
     sentence: str
     more: str
 
-    def __new__(cls, bit: int, word: str, sentence: str, more: str = "") -> Flag:
+    def __new__(cls, bit: int, word: str = "", sentence: str = "", more: str = "") -> Flag:
         """A bit with its texts."""
         made = int.__new__(cls, bit)
         made._value_ = bit
@@ -54,12 +54,12 @@ class Flag(IntFlag):
         "the pads push the object along its axis with more than friction can hold, so it slides out"
     )  # fmt: skip
     YIELDS = 1 << 15, "yields", "the wall's stress is above its yield strength, the indentation stays"
-    NO_FIT = 1 << 16, "no fit", "a limit surface could not be fitted, the ellipsoid from three motions stands in"
+    NO_FIT = 1 << 16, "no fit", "limit surface fit failed, three-motion ellipsoid used"
     UNSTABLE = 1 << 17, "unstable", "the foam lost ellipticity, strains may localise"
     JUMPED = 1 << 18, "jumped", (
         "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"
     )  # fmt: skip
-    # of no file: derived where a file tells the window of forces
+    # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's weight"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
 

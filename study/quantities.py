@@ -15,7 +15,7 @@ MODELS = ("ccm", "pcm", "pcm_projected")
 MODEL_NAMES = dict(zip(MODELS, ("CCM", "PCM", "PCM scaled by F_N"), strict=True))  # in legends and captions
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("missing", "done", "failed")  # of a case, by these codes:
+STATES = ("not computed", "complete", "failed")  # of a case, by these codes:
 MISSING, DONE, FAILED = range(3)
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
@@ -43,7 +43,7 @@ INDICATORS = {
     "sheet": "mean deflection of the backing plate under an even pressure over that of the pad",
     "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
     "wrench": "mean share of the three dropped components in the friction wrench",
-    "limit_surface": "radial fit error of the fitted limit surface, curved model, of the finger where it is larger",
+    "limit_surface": "radial fit error of the fitted limit surface, CCM, of the finger where it is larger",
     "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
     " finger where it is larger",
 }
@@ -135,7 +135,7 @@ TABLE = (
              "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs="graspit"),
     Quantity("fit_error", (), "", "fit error of the fitted limit surface",
              "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
-             "377 motions that it was not fitted to; curved model, of the finger where it is larger.", rank=10),
+             "377 motions that it was not fitted to; CCM, of the finger where it is larger.", rank=10),
     Quantity("fit_error_ellipsoid", (), "", "fit error of the ellipsoid from three motions",
              "As fit error, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
@@ -160,7 +160,7 @@ TABLE = (
              "Largest torque about the contact normal that the contact carries while it transmits no force in its "
              "plane; tau_z_max comes with such a force where the patch is not symmetric, and is larger: up to 2 "
              "max(a, b) / (a + b) times where a pad bears on two ends with loads a and b, because its origin lies "
-             "between them. Curved model, of the weaker finger."),
+             "between them. CCM, of the weaker finger."),
     Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
@@ -177,8 +177,8 @@ TABLE = (
              "joins the contacts and each normal."),
     Quantity("flags", (), "", "flags of the case", flag_definitions()),
     *(
-        Quantity(f"{name}_overestimate{suffix}", (), "", f"{what}: {model} over curved model",
-                 f"1 - curved / {model} of {name}_max: the share of the planar model's claim that the curved contact"
+        Quantity(f"{name}_overestimate{suffix}", (), "", f"{what}: {model} over ccm",
+                 f"1 - ccm / {model} of {name}_max: the share of the planar model's claim that the curved contact"
                  f" cannot carry ({note}); of the finger where it is largest.")
         for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
         for suffix, model, note in (
@@ -188,7 +188,7 @@ TABLE = (
         )
     ),
     Quantity("e_n_error", (), "", "relative error of e_n",
-             "Difference of e_n (curved) between the mesh and one with half as many elements per direction, over its "
+             "Difference of e_n (CCM) between the mesh and one with half as many elements per direction, over its "
              "value.", needs="two meshes", relative_to="e_n"),
     Quantity("quality_error", (), "", "relative error of quality", "As e_n_error.", needs="two scores",
              relative_to="quality"),
@@ -296,7 +296,7 @@ TABLE = (
              "Means over the 377 motions: |P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle "
              "between gradient and motion.", "limit_surface"),
     Quantity("matrix_6d", (*F, "wrench", "wrench_2"), "", "matrix of the fitted 6-D ellipsoid",
-             "A of w A w = 1 in w = (f_x, f_y, f_z, tau_x / rho, tau_y / rho, tau_z / rho) / (mu S), curved model; of"
+             "A of w A w = 1 in w = (f_x, f_y, f_z, tau_x / rho, tau_y / rho, tau_z / rho) / (mu S), CCM; of"
              " the directions that the contact resists.", "limit_surface", needs="six components"),
     Quantity("rank_6d", F, "", "directions that the contact resists",
              "Of the six; 3 for a planar contact.", "limit_surface", needs="six components"),
@@ -309,14 +309,14 @@ TABLE = (
              " rim to the top; the angle runs slowest.", "wall", needs="wall"),
     # large arrays
     Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
-             "Friction (f_x, f_y, tau_z) of the curved model in the contact frame, for turns about the points of a"
+             "Friction (f_x, f_y, tau_z) of the CCM in the contact frame, for turns about the points of a"
              " square grid of ten contact lengths a side about the origin, x first.", "fingers", needs="cor grid"),
     Quantity("wrench", (*FM, "sample", "component"), "N, N, N m", "wrenches of sampled motions",
              "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
              " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
              needs="samples", among="sampled"),
     *(
-        Quantity(name, ("variation",), unit, f"{name} of changed probes", "Curved model, of the candidates in"
+        Quantity(name, ("variation",), unit, f"{name} of changed probes", "CCM, of the candidates in"
                  " probes/candidate solved again with one thing changed; the dimension's attribute lists what.",
                  "probes", needs="probes", among="probe")
         for name, unit in (("e_n", "m"), ("quality", ""))
@@ -347,7 +347,7 @@ TABLE = (
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
-WINDOW = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
+FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
 
 
@@ -364,10 +364,10 @@ def map_row(name: str) -> Quantity:
 def definitions(listed: Iterable[Quantity]) -> str:
     """One text that says what every one of these quantities is; stored in each result file."""
     lines = [
-        "Friction models: 'curved' lets every face resist in its own plane (curved contact model, Xu, Alt, Zhang,",
+        "Friction models: 'ccm', the curved contact model, lets every face resist in its own plane (Xu, Alt, Zhang,",
         "Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a",
-        "Curved Contact Area Friction Model); 'flat' lays all faces into one plane and keeps the pressure sum S, the",
-        "paper's planar model; 'projected' is the planar model with the physical normal force F_N.",
+        "Curved Contact Area Friction Model); 'pcm', the paper's planar contact model, lays all faces into one plane",
+        "and keeps the pressure sum S; 'pcm_projected' is the planar model with the physical normal force F_N.",
         "NaN: not there; status/code and status/message say why. All values are SI.",
         "",
     ]

@@ -35,9 +35,8 @@ DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "shtab": {"study/commands.py"},
     "h5py": {
-        "study/result/store.py",
         "study/result/skeleton.py",
-        "study/result/result_writer.py",
+        "study/result/write.py",
         "study/result/guarded.py",
         "study/result/vtkhdf.py",
         "study/accuracy/cost_study.py",
@@ -187,7 +186,7 @@ def test_a_forbidden_import_is_noticed(path, source, name):
     ("path", "source"),
     [
         ("fem/petsc.py", "import petsc4py\nfrom petsc4py import PETSc"),
-        ("study/result/store.py", "import h5py, numpy as np\nfrom mpi4py import MPI"),
+        ("study/result/write.py", "import h5py, numpy as np\nfrom mpi4py import MPI"),
         ("friction/frame.py", "from softjaw.friction.patch import ContactPatch\nfrom numba import njit\nimport math"),
     ],
 )

@@ -80,10 +80,11 @@ def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
     """Relative change of the quality of every case for a mu larger by its half-width; ``quality`` is over all cases."""
     share = scene.uncertainty.mu / scene.friction.mu
     change = np.full(quality.shape, facing_change_by_mu(share))
-    tilted = np.argwhere((result.map("misalignment") > FACING) & (quality > 0))
+    tilted = np.argwhere((result.read("misalignment/misalignment") > FACING) & (quality > 0))
     if not len(tilted):
         return change
-    read = {name: result.fingers(name) for name in ("frame_origin", "frame_axes", "pose_rotation", "pose_origin")}
+    names = ("frame_origin", "frame_axes", "pose_rotation", "pose_origin")
+    read = {name: result.read(f"fingers/{name}") for name in names}
     semi_axes = result.read("limit_surface/semi_axes")[..., 0, :]
     arms, torques = lengths(scene, build_object(scene.object))
     known: dict[bytes, float] = {}  # images of one grasp have the same surfaces

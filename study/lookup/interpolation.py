@@ -12,7 +12,6 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +58,9 @@ def plain(name: str, units: str, values: ArrayLike, exact: bool = False) -> Node
     order = np.argsort(x)
     if len(x) == 1:
         x, order = _point(float(x[0])), np.zeros(2, np.int64)
-    return Nodes(name, units, x if len(order) > len(values) else x[order], order, np.zeros(len(x), bool), exact=exact)
+    else:
+        x = x[order]
+    return Nodes(name, units, x, order, np.zeros(len(x), bool), exact=exact)
 
 
 def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: bool = False) -> Nodes:
@@ -89,7 +90,8 @@ def _point(x: float) -> FloatArray:
     return np.array([x - slack, x + slack])
 
 
-class Corners(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Corners:
     """Where ``m`` points lie: flat indices of the eight nodes around each, their weights, and the share of the cell.
 
     The first corner is the cell's lower one; bit ``2 - a`` of a corner's number tells whether it is the upper one along

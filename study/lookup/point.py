@@ -9,7 +9,7 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
-from softjaw.study.quantities import MAIN, WINDOW
+from softjaw.study.quantities import FORCE_RANGE, MAIN
 from softjaw.study.result.layout import MISSING
 from softjaw.study.units import shown_text
 
@@ -69,12 +69,12 @@ class GraspPoint:
 
     @property
     def e_n(self) -> Any:
-        """Eccentricity parameter of the weaker finger, curved model [m]."""
+        """Eccentricity parameter of the weaker finger, CCM [m]."""
         return self.value("e_n")
 
     @property
     def quality(self) -> Any:
-        """Grasp quality, curved model [-]."""
+        """Grasp quality, CCM [-]."""
         return self.value("quality")
 
     @property
@@ -141,15 +141,15 @@ class GraspPoint:
         """What people want to know at one point, in a few lines."""
         if self.shape:
             return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
-        axes, station, angle, force = self.map.axes, *self.place[0]
+        axes, (station, angle, force) = self.map.axes, self.place[0].tolist()
         turn = [] if self.map.by_poses else [f"angle {shown_text(angle, 'rad', 5)}"]
         words = [f"{axes[0].name} {shown_text(station, axes[0].units, 5)}", *turn, f"force {force:.5g} N"]
         lines = [", ".join(words)]
         if self.reason:
             return f"{lines[0]}: {self.reason}"
-        for name in (n for n in (*MAIN, *WINDOW) if self.map.source.has(n)):
+        for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
             units, error = self.map.quantities[name][0], self.error(name)
-            lines.append(f"  {name:<13} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
+            lines.append(f"  {name:<14} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 

@@ -14,7 +14,7 @@ import numpy as np
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, shortened
 from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
-from softjaw.study.result.trial import trouble
+from softjaw.study.result.guarded import trouble
 from softjaw.study.scene.problems import Problem, shown
 
 ENDINGS = (".csv", ".vtu", ".vtp")

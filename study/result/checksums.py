@@ -9,7 +9,7 @@ A state has one of its own: a case whose state was lost is not taken for one tha
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,8 @@ def of_array(values: Any) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
 
 
-def of_parts(layout: Layout, row: int, values: Sequence[np.ndarray]) -> dict[str, int]:
-    """Checksum of every part of a row; ``values`` as from ``study.result.record.record``."""
+def of_parts(layout: Layout, row: int, values: Sequence[Any]) -> dict[str, int]:
+    """Checksum of every part of a row; ``values`` as from ``study.result.write.record``."""
     places = layout.places(row)
 
     def data(i: int) -> bytes:
@@ -76,7 +76,7 @@ def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_wa
 
 def of_session(session: np.void) -> int:
     """Checksum of a row of the provenance, without the checksum that it holds."""
-    return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names if name != "crc"))
+    return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names or () if name != "crc"))
 
 
 def of_header(file: GuardedFile, layout: Layout) -> int:
@@ -100,37 +100,6 @@ def closing_sum(file: GuardedFile, layout: Layout, name: str) -> int:
     """The stored checksum of something that is filled after all rows, by its name in ``layout.closing``."""
     found = file.checked(f"{SUMS}/{CLOSING}", (len(layout.closing),), np.dtype("<u4"))
     return int(file.values(found)[layout.closing.index(name)])
-
-
-def rows_of(file: GuardedFile, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
-    """Every row that is done or failed: number, state, and values, or None where they do not match their checksums.
-
-    A state that does not match its own checksum is the one that the checksum is of.
-    """
-    found = {d.path: file.checked(d.path, d.shape, d.dtype) for d in layout.datasets}
-    views = [_mapped(file, found[c.path], c.dtype) for c in layout.columns]
-    codes = file.values(found[f"{ROOT}/status/code"]).ravel()
-    sums = {part: _sums(file, layout, part) for part in layout.parts} if layout.version > 3 else {}
-    whole = None if sums else file.values(found[f"{ROOT}/status/crc"]).ravel()
-    if sums:
-        state = _sums(file, layout, STATE)
-        codes = np.select([state == crc for crc in OF_STATE.values()], list(OF_STATE), codes)
-    for row in np.flatnonzero(codes != MISSING):
-        pairs = zip(views, layout.places(row), strict=True)
-        values = [None if place is None else view[place] for view, place in pairs]
-        if whole is not None:
-            good = _of_whole(layout, values) == whole[row]
-        else:
-            own = of_parts(layout, row, values)
-            good = all(own[part] == stored[row] for part, stored in sums.items())
-        yield int(row), int(codes[row]), values if good else None
-
-
-def _of_whole(layout: Layout, values: Sequence[Any]) -> int:
-    """Checksum of a row in a file of version 3: all of it but its timings."""
-    pairs = zip(layout.columns, values, strict=True)
-    counted = (np.asarray(v, c.dtype) for c, v in pairs if v is not None and not c.key.startswith("work/"))
-    return zlib.crc32(b"".join(v.tobytes() for v in counted))
 
 
 def _sums(file: GuardedFile, layout: Layout, part: str) -> np.ndarray:
@@ -157,10 +126,3 @@ def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
     lead = (*layout.shape[:-3], len(chosen), layout.shape[-1])
     lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)
     return np.where(slot < 0, -1, lines)
-
-
-def _mapped(file: GuardedFile, dataset: Any, dtype: np.dtype) -> np.ndarray:
-    """A dataset's values, which are read when they are asked for, unless it was repacked."""
-    if dataset.chunks or not dataset.size:
-        return file.values(dataset).astype(dtype)
-    return np.memmap(file.path, dtype, "r", dataset.id.get_offset(), dataset.shape)

@@ -12,7 +12,6 @@ import numpy as np
 from softjaw.study.quantities import BY_KEY, FIRST, MISSING, MODELS, Quantity, map_row
 
 MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
-MESSAGE_3 = 240  # as files of version 3 have them
 ROOT = "/study"
 SUMS = f"{ROOT}/checksums"  # a dataset for each part of a row, and these two:
 STATE, CLOSING = "code", "closing"  # of the states; of what is filled after all rows
@@ -71,7 +70,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", shape, np.dtype(dtype), fill)
         elif q.group != "status":
             yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.group == "patch", q.among)
-    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{layout.message}"), b"")
+    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
 
 
 def datasets_of(layout: Any) -> Iterator[Dataset]:
@@ -109,10 +108,6 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
 def _checksums(layout: Any) -> Iterator[Dataset]:
     """Checksums of the parts of every row, of its state, and of what is filled after all rows."""
     u4 = np.dtype("<u4")
-    if layout.version == 3:
-        about = {"long_name": "crc32 of the row, timings left out", "units": ""}
-        yield Dataset(f"{ROOT}/status/crc", layout.shape, u4, 0, about, layout.names)
-        return
     for part in layout.parts:
         about = {"long_name": f"crc32 of the case's {part}", "units": ""}
         yield Dataset(f"{SUMS}/{part}", layout.shape, u4, 0, about, layout.names)

@@ -1,4 +1,7 @@
-"""What is filled once, after all cases: each kind of study adds its own datasets; then comes the grid."""
+"""What is filled once, after all cases: axes of curvature studies, safe force ranges, intervals; then comes the grid.
+
+The safe force range of a candidate is enough to hold the object's weight, and not so much that its wall is damaged.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,20 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from softjaw.study.case.margin import MARGIN
 from softjaw.study.case.sweep import axes
-from softjaw.study.result import interval, window
-from softjaw.study.result.layout import Derived
+from softjaw.study.result import interval
+from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.result.vtkhdf import fill_grid
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
+    from softjaw.study.result.write import ResultWriter
+
+FloatArray = NDArray[np.float64]
+LOW, HIGH = "force_low", "force_high"
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 PREDICTED, MEASURED, HELD_OUT = "e_n_error_predicted", "e_n_error_on_probes", "e_n_error_held_out"
@@ -32,15 +41,13 @@ MEANING = {
 
 def derived(scene: Scene) -> list[Derived]:
     """Everything that is derived for a scene."""
-    return [*_of_sweep(scene), *window.derived(scene), *interval.derived(scene), *_of_target(scene)]
+    return [*_of_sweep(scene), *_of_force_range(scene), *interval.derived(scene), *_of_target(scene)]
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
     """Fill it, by one rank, after all cases; what a target of accuracy chose is written by who chose it."""
-    from softjaw.study.result.grid import fill_grid
-
     _fill_sweep(writer, scene)
-    window.finalise(writer, scene)
+    _fill_force_range(writer, scene)
     interval.finalise(writer, scene)
     fill_grid(writer)
 
@@ -78,3 +85,80 @@ def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
     a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
     writer.write_derived("b_over_a", b / a)
     writer.write_derived("apex_curvature", a / b**2)
+
+
+def _of_force_range(scene: Scene) -> list[Derived]:
+    """Bounds of the safe force range, as far as the scene asks for them."""
+    over = tuple(axis.name for axis in axes(scene)[:-1])
+    found = []
+    if scene.object.mass is not None:
+        found.append(Derived(
+            LOW, "N", "smallest force that holds the object", "Normal force per finger at which safety_factor (CCM)"
+            " passes 1, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them holds it.",
+            over,
+        ))  # fmt: skip
+    if getattr(scene.object, "wall", None) is not None:
+        found.append(Derived(
+            HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the indentation passes"
+            " object.allowed_dent_mm or the stress the yield strength, between the solved forces by straight lines, and"
+            " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that. NaN where the"
+            " wall was taken as rigid.", over,
+        ))  # fmt: skip
+    return found
+
+
+def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
+    """Fill the bounds, by one rank, after all cases."""
+    wanted = [d.name for d in _of_force_range(scene)]
+    if not wanted:
+        return
+    forces = np.asarray(scene.load.normal_force)
+    done = writer.codes().reshape(writer.layout.shape) == DONE
+    if LOW in wanted:
+        factor = np.where(done, writer.read("safety_factor/ccm"), np.nan)
+        writer.write_derived(LOW, first_crossing(forces, factor, 1.0))
+    if HIGH in wanted:
+        writer.write_derived(HIGH, _largest(writer, scene, forces, done))
+
+
+def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
+    """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
+    from softjaw.study.case.wall import thin_body
+
+    dent: float | None = getattr(scene.object, "allowed_dent", None)
+    limits = {"indentation": dent, "wall_stress": thin_body(scene.object).material.yield_strength}
+    values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
+    known = np.isfinite(values["indentation"])
+    solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
+    crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
+    return np.fmin.reduce([solved, *crossings])
+
+
+def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
+    """Force at which values first pass a limit, by straight lines from 0 at no force; NaN where they never do.
+
+    A solved value within `MARGIN` of the limit has passed it.
+
+    Parameters
+    ----------
+    forces : (k,) array
+        Ascending [N].
+    values : (..., k) array
+        NaN where there is none; what comes after is not used.
+    limit : float
+
+    Examples
+    --------
+    >>> first_crossing([1.0, 2.0], [[0.5, 1.5], [0.5, 0.9]], 1.0).tolist()
+    [1.5, nan]
+    """
+    x = np.concatenate([[0.0], np.asarray(forces, float)])
+    values = np.asarray(values, float)
+    y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
+    known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
+    above = known & (y >= limit * (1.0 - MARGIN))
+    k = np.maximum(above.argmax(axis=-1), 1)[..., None]
+    low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
+    share = np.clip((limit - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    found = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
+    return np.where(above.any(axis=-1), found, np.nan)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
+import resource
+import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,8 +16,10 @@ import h5py
 import numpy as np
 
 from softjaw.study.messages import IN_USE, OTHER_FILE, StudyError, printable
-from softjaw.study.result.trial import trouble
 
+SECONDS = 20  # of CPU
+ROOM = 2**30  # bytes beyond what this process has already
+NO_MEMORY = 3
 DEFLATE = 1000  # no data get smaller by more than this
 # what h5py raises for damage: its own errors have no class of their own
 BROKEN = (RuntimeError, OSError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError)
@@ -48,7 +54,7 @@ class GuardedFile:
         with self._told(path):
             found = self._node(path)
             if not isinstance(found, h5py.Dataset):
-                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is no dataset); restore it from a copy")
+                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is not a dataset); restore it from a copy")
             plist = found.id.get_create_plist()
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = found.size * max(found.dtype.itemsize, 1) if found.shape is not None else 0
@@ -63,7 +69,7 @@ class GuardedFile:
             found = self.plain(path)
             if found.ndim != 1 or not h5py.check_string_dtype(found.dtype):
                 raise StudyError(
-                    OTHER_FILE, f"{self.path}: damaged ({path} is no list of texts); restore it from a copy"
+                    OTHER_FILE, f"{self.path}: damaged ({path} is not a list of texts); restore it from a copy"
                 )
             return [text_of(text) for text in found[()].tolist()]
 
@@ -100,7 +106,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
         The file cannot be read as a file of this ``kind``, another program holds it, or HDF5 does not survive it.
     """
     if path.exists() and not path.is_file():
-        raise StudyError(OTHER_FILE, f"{path}: is no regular file; name a {kind}")
+        raise StudyError(OTHER_FILE, f"{path}: is not a regular file; name a {kind}")
 
     def attempt() -> None:
         file = h5py.File(path, "r")  # not closed: that has to work on half of a structure, and the process ends anyway
@@ -112,7 +118,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
     try:
         file = GuardedFile(path, h5py.File(path, "r"))
     except FileNotFoundError as error:
-        raise StudyError(OTHER_FILE, f"{path}: there is no such file") from error
+        raise StudyError(OTHER_FILE, f"{path}: no such file") from error
     except BROKEN as error:
         if "unable to lock file" in str(error):
             text = f"{path}: another program holds it open for writing; close it there"
@@ -151,3 +157,48 @@ def reason(error: Exception) -> str:
 def text_of(value: Any) -> str:
     """Text of an attribute or a fixed-length string, with nothing in it that a terminal would obey."""
     return printable(value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value))
+
+
+def trouble(attempt: Callable[[], object]) -> str:
+    """How an attempt ended that must not be repeated here, in words; empty if it came to an end, even by an exception.
+
+    It costs a few milliseconds, and as much again as the attempt itself.
+    """
+    try:
+        child = os.fork()
+    except OSError:  # no process to be had: then without the trial
+        return ""
+    if child == 0:
+        code = NO_MEMORY
+        try:
+            _limit()
+            attempt()
+            code = 0
+        except MemoryError:
+            pass
+        except BaseException as error:  # told by the parent, which meets it too
+            code = NO_MEMORY if "alloc" in str(error).lower() else 0
+        finally:
+            os._exit(code)
+    status = os.waitpid(child, 0)[1]
+    if os.WIFSIGNALED(status):
+        slow = os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
+        return f"reading it does not end within {SECONDS} s" if slow else "the library that reads it crashes on it"
+    return f"reading it takes more than {ROOM >> 30} GiB" if os.WEXITSTATUS(status) == NO_MEMORY else ""
+
+
+def _limit() -> None:
+    """Let this process be quiet, short and small."""
+    faulthandler.disable()
+    silent = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)
+    os.dup2(silent, 2)
+    for wanted in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(wanted, signal.SIG_DFL)
+    limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: SECONDS}
+    if sys.platform == "linux":
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        limits[resource.RLIMIT_AS] = pages * resource.getpagesize() + ROOM
+    for kind, value in limits.items():
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))

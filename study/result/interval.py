@@ -18,7 +18,7 @@ from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
+    from softjaw.study.result.write import ResultWriter
 
 FloatArray = NDArray[np.float64]
 NAMES = {"e_n": "m", "quality": ""}
@@ -62,14 +62,14 @@ def derived(scene: Scene) -> list[Derived]:
     made = []
     for name, units in NAMES.items():
         text = (
-            f"Half-width around {name} (curved) within which about 95 of 100 cases lie: root of the sum of squares of"
+            f"Half-width around {name} (CCM) within which about 95 of 100 cases lie: root of the sum of squares of"
             f" the parts {', '.join(own.parts)}, times the value."
         )
         made.append(Derived(interval(name), units, f"half-width of the uncertainty interval of {name}", text, over))
         for of in own.parts:
             signed = of in SIGNED and of in known
             rule = RULES[_rule(of, known)]
-            text = f"Relative change of {name} (curved) by {WORDS[of]}"
+            text = f"Relative change of {name} (CCM) by {WORDS[of]}"
             text += ", positive where it grows with it. " if signed else ", without sign. "
             made.append(
                 Derived(part(name, of, signed), "", f"part of {of} in the interval of {name}", text + rule, over)

@@ -29,26 +29,24 @@ from softjaw.study.quantities import (
 from softjaw.study.quantities import DONE as DONE
 from softjaw.study.quantities import FAILED as FAILED
 from softjaw.study.quantities import MISSING as MISSING
-from softjaw.study.result.datasets import CLOSING, MESSAGE, MESSAGE_3, Column, Dataset, columns_of, datasets_of
+from softjaw.study.result.datasets import CLOSING, Column, Dataset, columns_of, datasets_of
 from softjaw.study.result.datasets import ROOT as ROOT
-from softjaw.study.result.grid import grid_datasets
+from softjaw.study.result.vtkhdf import grid_datasets
 
-PROGRAM, VERSION = "softjaw", 4
-READABLE = (3, 4)  # 3 has one checksum for a whole row, and none of its state, its timings and what is not in rows
+PROGRAM, VERSION = "softjaw", 5
 LABEL, SESSIONS, REPORT = 80, 256, 8192
-SESSION_3 = np.dtype(
+SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
      ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
-     ("command", "S400"), ("petsc_options", "S400")]
+     ("command", "S400"), ("petsc_options", "S400"), ("crc", "<u4")]
 )  # fmt: skip
-SESSION = np.dtype([*((name, SESSION_3[name]) for name in SESSION_3.names or ()), ("crc", "<u4")])
 
 
 @dataclass(frozen=True)
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``surface`` is the object as `study.result.grid.Surface`, None where the file shows none.
+    ``surface`` is the object as `study.result.vtkhdf.Surface`, None where the file shows none.
     """
 
     digest: str
@@ -80,7 +78,7 @@ class Layout:
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
     candidates ``probes``. ``surface`` counts the points and triangles of the
-    object, ``front`` the faces along and across a pad, as `study.result.grid` shows them; zeros where it does not.
+    object, ``front`` the faces along and across a pad, as `study.result.vtkhdf` shows them; zeros where it does not.
     """
 
     axes: tuple[Any, ...]
@@ -97,17 +95,6 @@ class Layout:
     front: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
-    version: int = VERSION
-
-    @property
-    def message(self) -> int:
-        """Bytes of a message."""
-        return MESSAGE if self.version > 3 else MESSAGE_3
-
-    @property
-    def session(self) -> np.dtype:
-        """Type of a row of the provenance."""
-        return SESSION if self.version > 3 else SESSION_3
 
     @cached_property
     def parts(self) -> dict[str, tuple[int, ...]]:
@@ -133,7 +120,7 @@ class Layout:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Friction models in the order they are shown: curved, the planar one that the scene prefers, the other."""
+        """Friction models in the order they are shown: ccm, the planar one that the scene prefers, the other."""
         return tuple(dict.fromkeys((MODELS[0], self.planar, *MODELS)))
 
     @property
@@ -172,8 +159,7 @@ class Layout:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
         if self.probes:
             parts |= {"probe": len(self.probes), "variation": len(self.variations)}
-        if self.version > 3:
-            parts[CLOSING] = len(self.closing)
+        parts[CLOSING] = len(self.closing)
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
     @cached_property
@@ -204,7 +190,7 @@ class Layout:
         """Size of the file, rounded up generously for what HDF5 adds."""
         datasets = (*self.datasets, *self.grid)
         count = len(datasets) + len(self.axes) + 16
-        return sum(d.nbytes for d in datasets) + SESSIONS * self.session.itemsize + REPORT + 4096 * count + 2**16
+        return sum(d.nbytes for d in datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
 
     @property
     def chosen(self) -> dict[str, tuple[int, ...]]:
@@ -236,7 +222,7 @@ class Layout:
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
-def layout_from_options(axes: Sequence[Any], text: str, version: int = VERSION) -> Layout:
+def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
     """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
     try:
         options = json.loads(text)
@@ -258,7 +244,7 @@ def layout_from_options(axes: Sequence[Any], text: str, version: int = VERSION) 
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
         return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
-                      front, probes, variations, version)  # fmt: skip
+                      front, probes, variations)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

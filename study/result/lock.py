@@ -138,7 +138,7 @@ class Standing:
             raise self._lost(str(error)) from error
 
     def _lost(self, reason: str) -> StudyError:
-        safe = "what was stored before is kept, and the same command goes on when the place can be written again"
+        safe = "stored results are kept; make the place writable, then run the same command again to resume"
         return StudyError(CANNOT_WRITE, f"{self.path}: cannot be written any more ({reason}); {safe}")
 
     def _now(self) -> tuple[int, int]:

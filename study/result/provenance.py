@@ -64,7 +64,7 @@ def versions(mpi_library: str) -> str:
         known.append(f"PETSc {'.'.join(map(str, sys.modules['petsc4py.PETSc'].Sys.getVersion()))}")
     if "h5py" in sys.modules:
         known.append(f"HDF5 {sys.modules['h5py'].version.hdf5_version}")
-    blas = getattr(np.__config__, "CONFIG", {}).get("Build Dependencies", {}).get("blas", {})
+    blas = getattr(getattr(np, "__config__", None), "CONFIG", {}).get("Build Dependencies", {}).get("blas", {})
     threads = os.environ.get("OMP_NUM_THREADS", "all")
     known.append(f"BLAS {blas.get('name', '?')} {blas.get('version', '')} ({threads} threads)")
     return ", ".join(known)

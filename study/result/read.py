@@ -14,9 +14,8 @@ import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, TABLE, Quantity
-from softjaw.study.result.layout import DONE
-from softjaw.study.result.reading import Result, StoredAxis
-from softjaw.study.result.store import open_result
+from softjaw.study.result.layout import DONE, VERSION
+from softjaw.study.result.store import Result, StoredAxis, open_result
 
 XYZ = ("x", "y", "z")
 FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to be read with the rest
@@ -25,7 +24,7 @@ FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to
 def open(file: str | Path) -> xr.Dataset:
     """A result file as a dataset, whole in memory; the file is closed.
 
-    Every value is checked against its checksum. A case that failed or is not computed yet has NaN everywhere;
+    Every value is checked against its checksum. A case that failed or is not computed has NaN everywhere;
     ``status`` and ``message`` tell which and why. Contact patches and fields are read by `read_patch` and `read_field`.
 
     Parameters
@@ -37,7 +36,7 @@ def open(file: str | Path) -> xr.Dataset:
     -------
     xarray.Dataset
         Dimensions: swept keys, ``station`` [m], ``angle`` [rad], ``normal_force`` [N], then where they apply ``finger``
-        (1, 2), ``model`` (curved, flat, projected), ``component`` and others. Every variable has ``units``,
+        (1, 2), ``model`` (ccm, pcm, pcm_projected), ``component`` and others. Every variable has ``units``,
         ``long_name`` and ``definition``; the dataset's attributes hold scene, options and provenance.
 
     Raises
@@ -164,9 +163,9 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
     """A quantity of all cases; of one that some candidates have alone, over these."""
     names = result.layout.names
     if q.group == "maps" and q.by_model:
-        values = np.stack([result.map(q.name, model) for model in MODELS], axis=-1)
+        values = np.stack([result.read(f"{q.name}/{model}") for model in MODELS], axis=-1)
     else:
-        values = result.map(q.name) if q.group == "maps" else result.read(q.key)
+        values = result.read(f"{q.name}/{q.name}" if q.group == "maps" else q.key)
     lead = (*names[:-3], q.among, names[-1]) if q.among else names
     if not q.among and values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
@@ -204,7 +203,7 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
 def _attributes(result: Result) -> dict[str, Any]:
     layout, scene = result.layout, result.scene_attributes
     return {
-        "title": result.title, "file": str(result.path), "layout_version": layout.version, "digest": result.digest,
+        "title": result.title, "file": str(result.path), "layout_version": VERSION, "digest": result.digest,
         "scene": result.scene, "scene_file": scene.get("file", ""),
         "overrides": tuple(filter(None, str(scene.get("overrides", "")).split("\n"))),
         "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,

@@ -19,16 +19,25 @@ import numpy as np
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.messages import CANNOT_WRITE, StudyError
 from softjaw.study.quantities import FIRST, MODELS
-from softjaw.study.result import checksums, grid
+from softjaw.study.result import checksums, vtkhdf
 from softjaw.study.result.datasets import CLOSING, SUMS
 from softjaw.study.result.guarded import GuardedFile, reason
-from softjaw.study.result.layout import LABEL, PROGRAM, REPORT, ROOT, SESSIONS, Dataset, Header, Layout
+from softjaw.study.result.layout import (
+    LABEL,
+    PROGRAM,
+    REPORT,
+    ROOT,
+    SESSION,
+    SESSIONS,
+    VERSION,
+    Dataset,
+    Header,
+    Layout,
+)
 from softjaw.study.result.provenance import SAMPLING
-from softjaw.study.result.record import text_bytes
-from softjaw.study.result.vtkhdf import head
+from softjaw.study.result.vtkhdf import LIBVER
 from softjaw.study.writing import remove
 
-LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")
 EVEN = 1e-6  # relative difference of steps that makes an axis uneven
 TEXTS = {
@@ -79,7 +88,7 @@ def _reserve(path: Path, need: int) -> None:
 
 
 def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
-    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=layout.version)
+    file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
     study = file.create_group(ROOT)
     study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
     study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the front, before its value is known
@@ -108,20 +117,19 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
 
 def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> None:
     """Checksums of what stands in the new file already."""
-    if layout.version > 3:
-        file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
-        for i, name in enumerate(layout.closing):
-            file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
+    file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
+    for i, name in enumerate(layout.closing):
+        file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
 
 
 def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
-    root = file.create_group(grid.PATH)
-    root.attrs["about"] = f"{header.title}. {grid.ABOUT}"
-    head(root, layout.shape[-1])
+    root = file.create_group(vtkhdf.PATH)
+    root.attrs["about"] = f"{header.title}. {vtkhdf.ABOUT}"
+    vtkhdf.head(root, layout.shape[-1])
     for dataset in layout.grid:
         file.require_group(dataset.path.rpartition("/")[0])
         _create_dataset(file, dataset)
-    for path, values in grid.skeleton(layout, header.surface).items():
+    for path, values in vtkhdf.skeleton(layout, header.surface).items():
         file[path][...] = values
 
 
@@ -136,7 +144,7 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
-    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, layout.session))
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
     labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))
@@ -149,6 +157,11 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
         study["wrenches/candidate"][...] = layout.sampled
     if layout.probes:
         study["probes/candidate"][...] = layout.probes
+
+
+def text_bytes(text: str, length: int) -> bytes:
+    """UTF-8 of at most ``length`` bytes, on one line, without a broken last letter."""
+    return " ".join(text.split()).encode()[:length].decode(errors="ignore").encode()
 
 
 def report_bytes(text: str) -> np.ndarray:
@@ -216,7 +229,7 @@ def _plot(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
     plot = _plot(layout, range(len(layout.shape)))
-    first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": "grasp map, curved model"}
+    first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": "grasp map, curved contact model"}
     found: dict[str, dict[str, Any]] = {"map": {**_plot(layout, layout.seen), **first}}
     for q in layout.quantities:
         if q.group != "maps":
@@ -225,8 +238,7 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
         signal = several if q.by_model else {"signal": q.name}
         found[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
     found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
-    collections = ["axes", "candidates", "provenance", *{q.group for q in layout.quantities} - {"status"}]
+    collections = ["axes", "candidates", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]
     collections += ["derived"] * bool(layout.derived)
-    collections += ["checksums"] * (layout.version > 3)
     found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
     return found

@@ -1,4 +1,4 @@
-"""The door to result files: creates a result file, fills it in parallel, reads it without trusting it.
+"""Result files: opened without being trusted, every dataset checked before it is read. Needs neither MPI nor PETSc.
 
 Crash safety: one process writes the whole skeleton, closes it, and renames it into place; after that all ranks do
 nothing but independent writes to allocated space, in the order values, checksum, state. A killed process can
@@ -8,26 +8,277 @@ solved again.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
+import time
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result import checksums
-from softjaw.study.result.checksums import broken_rows, broken_states
-from softjaw.study.result.guarded import GuardedFile, opened
-from softjaw.study.result.layout import MISSING, VERSION, Header, Layout
-from softjaw.study.result.reading import Result
-from softjaw.study.result.result_writer import ResultWriter
-from softjaw.study.result.skeleton import create
+from softjaw.study.result.guarded import opened, text_of
+from softjaw.study.result.layout import (
+    FAILED,
+    LABEL,
+    MISSING,
+    PROGRAM,
+    ROOT,
+    SESSION,
+    SESSIONS,
+    VERSION,
+    Layout,
+    layout_from_options,
+)
+from softjaw.study.result.lock import holder
+from softjaw.study.units import shown_text
 
-__all__ = ["ResultWriter", "create", "open_result", "rows_of", "torn_rows", "verify"]
+BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
+
+
+class StoredAxis(NamedTuple):
+    """One axis of the maps, as read from a file."""
+
+    name: str
+    values: np.ndarray
+    units: str
+    long_name: str
+    options: tuple[str, ...] = ()  # texts that the values stand for
+
+
+class Result:
+    """A result file, opened by ``study.result.store.open_result``; every dataset is checked before it is read.
+
+    ``axes`` lists the axes of all maps: sweeps first, then station, angle and normal force; ``layout`` is the
+    layout that follows from them. Rows are flat indices over the axes. What does not match its checksum is refused,
+    unless the result is read ``unchecked``.
+    """
+
+    def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
+        self.path, self.file = path, file
+        root, study = file.attributes(), file.attributes(ROOT)
+        if root.get("program") != PROGRAM:
+            raise ValueError("it does not name its program")
+        self.version = root.get("layout_version", "")
+        if self.version != str(VERSION):
+            raise StudyError(OTHER_FILE, _other_version(path, self.version))
+        self.axes = tuple(self._axis(text_of(name)) for name in study["axes"])
+        self.layout = layout_from_options(self.axes, study["options"])
+        if len(self.axes) < 3 or min(self.layout.shape) < 1:
+            raise ValueError("its axes are not those of a study")
+        self.title = str(study.get("title", ""))
+        self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
+        self._known = {d.path: d for d in self.layout.datasets}
+        self._part = {column.path: column.part for column in self.layout.columns}
+        self._trusted: set[str] = set(self.layout.parts) if unchecked else set()
+        self._unchecked = unchecked
+        if not unchecked and str(checksums.of_header(file, self.layout)) != study.get("checksum"):
+            raise self._damaged("axes, scene or definitions do not match their checksum")
+
+    def __enter__(self) -> Result:
+        """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
+        self._quiet: Any = np.errstate(all="ignore")
+        self._quiet.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        """Close the file."""
+        self._quiet.__exit__(*error)
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+
+    def read(self, path: str) -> np.ndarray:
+        """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/pcm``."""
+        dataset = self._checked(path)
+        self._compare(self._part.get(f"{ROOT}/{path}", ""))
+        return self._believable(path, self.file.values(dataset))
+
+    def patch(self, row: int) -> dict[str, np.ndarray]:
+        """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
+        names = [path.rpartition("/")[2] for path in self._known if path.startswith(f"{ROOT}/patch/")]
+        found = {name: self.file.values(self._checked(f"patch/{name}"), row) for name in names}
+        if not self._unchecked and self.status.flat[row] != MISSING:
+            index = np.unravel_index(row, self.layout.shape)
+            stored = self.file.values(self._checked("checksums/patch"), index)
+            if checksums.of_array(b"".join(values.tobytes() for values in found.values())) != stored:
+                raise self._damaged(f"the patch of case {row} does not match its checksum")
+        return found
+
+    def derived(self, name: str) -> np.ndarray:
+        """A dataset that was filled after all rows."""
+        return self._believable(f"derived/{name}", self._closing(f"derived/{name}"))
+
+    def row(self, *index: int) -> int:
+        """Flat row of a case from its index along each axis."""
+        return int(np.ravel_multi_index(index, self.layout.shape))
+
+    @cached_property
+    def status(self) -> np.ndarray:
+        """State of every case when it was read first: 0 not computed, 1 complete, 2 failed."""
+        codes = self.codes
+        if codes.max() > FAILED:
+            raise self._damaged(f"a case has the state {codes.max()}, which does not exist")
+        if not self._unchecked:
+            under_way = self.killed or bool(holder(self.path))
+            wrong = checksums.broken_states(self.file, self.layout, codes.ravel(), under_way)
+            self._refuse(self._still(wrong, codes), "the state")
+        return codes
+
+    @property
+    def codes(self) -> np.ndarray:
+        """State of every case as the file has it now, whether it is right or wrong."""
+        return self.file.values(self._checked("status/code"))
+
+    @property
+    def messages(self) -> np.ndarray:
+        """Message of every case that is not missing, as text."""
+        return np.where(self.status == MISSING, "", _texts(self.read("status/message")))
+
+    @property
+    def scene(self) -> str:
+        """The effective scene as TOML text."""
+        return self._string("scene")
+
+    @property
+    def scene_attributes(self) -> dict[str, Any]:
+        """Digest, file name, overrides and PETSc options of the scene."""
+        return self.file.attributes(f"{ROOT}/scene")
+
+    @property
+    def definitions(self) -> str:
+        """What every quantity means."""
+        return self._string("definitions")
+
+    @property
+    def report(self) -> str:
+        """Best grasps, failures and how to read the file, as plain text; says so where the study is not finished."""
+        return text_of(self._closing("report").item().strip(b"\0 "))
+
+    @property
+    def labels(self) -> np.ndarray:
+        """Names of the candidates, ``(stations, angles)``."""
+        found = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL}"))
+        return _texts(self.file.values(found))
+
+    @property
+    def sessions(self) -> list[dict[str, Any]]:
+        """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
+        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION))
+        used = [row for row in rows if row["crc"] or row["start"]]
+        if not self._unchecked and any(row["crc"] != checksums.of_session(row) for row in used):
+            raise self._damaged("a session does not match its checksum")
+        fields = [(name, *kind) for name, kind in (SESSION.fields or {}).items() if name != "crc"]
+        return [
+            {name: text_of(row[name]) if kind.kind == "S" else int(row[name]) for name, kind, *_ in fields}
+            for row in rows
+            if row["start"]
+        ]
+
+    @property
+    def killed(self) -> bool:
+        """Whether the last session has no end: it is running, or was killed."""
+        sessions = self.sessions
+        return bool(sessions and not sessions[-1]["stop"])
+
+    def _compare(self, part: str) -> None:
+        """Refuse the file if a part of its rows does not match its checksums; once for each part."""
+        if self._unchecked or not part or part in self._trusted:
+            return
+        rows = np.flatnonzero(self.status != MISSING)
+        wrong = checksums.broken_rows(self.file, self.layout, part, rows)
+        self._trusted.add(part)
+        self._refuse(self._still(wrong, self.status), f"'{part}'")
+
+    def _still(self, wrong: np.ndarray, codes: np.ndarray) -> np.ndarray:
+        """Those of some rows that a run has not begun anew since their states were read; of the others, now missing."""
+        begun = wrong[self.codes.flat[wrong] != codes.flat[wrong]] if wrong.size else wrong
+        codes.flat[begun] = MISSING
+        return np.setdiff1d(wrong, begun)
+
+    def _refuse(self, rows: np.ndarray, what: str) -> None:
+        if rows.size:
+            some = f"{', '.join(map(str, rows[:5]))}{', ...' if rows.size > 5 else ''}"
+            cases = f"case {some}" if rows.size == 1 else f"{rows.size} cases ({some})"
+            raise self._damaged(f"{what} of {cases} does not match its checksum")
+
+    def _believable(self, path: str, found: np.ndarray) -> np.ndarray:
+        if found.dtype.kind == "f" and (np.isfinite(found) & (np.abs(found) > BEYOND)).any():
+            raise self._damaged(f"{path} has values beyond {BEYOND:g}")
+        return found
+
+    def _closing(self, name: str) -> np.ndarray:
+        """What is filled after all rows, by its name in ``layout.closing``."""
+        for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
+            dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
+            found = np.asarray(self.file.values(dataset))
+            if self._unchecked or checksums.of_array(found) == checksums.closing_sum(self.file, self.layout, name):
+                return found
+            time.sleep(patience)
+        raise self._damaged(f"{name} does not match its checksum")
+
+    def _damaged(self, what: str) -> StudyError:
+        cure = "restore it from a copy, or run the scene again, which solves damaged cases anew"
+        return StudyError(OTHER_FILE, f"{self.path}: damaged ({what}); {cure}")
+
+    def _checked(self, path: str) -> Any:
+        expected = self._known.get(f"{ROOT}/{path}")
+        if expected is None:
+            raise KeyError(f"{path} is no dataset of this file; it has {', '.join(sorted(self._known))}")
+        return self.file.checked(expected.path, expected.shape, expected.dtype)
+
+    def _axis(self, name: str) -> StoredAxis:
+        path = f"{ROOT}/axes/{name}"
+        found, attributes = self.file.plain(path), self.file.attributes(path)
+        if found.ndim != 1 or found.dtype != np.dtype("<f8"):
+            raise ValueError(f"axis '{name}' is no list of numbers")
+        units = str(attributes.get("units", ""))
+        values = self.file.values(found)
+        if not (np.abs(values) < BEYOND).all():
+            raise ValueError(f"axis '{name}' has values that are no numbers")
+        label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
+        options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
+        if options and len(options) != len(values):
+            raise ValueError(f"axis '{name}' has {len(values)} values and {len(options)} options")
+        return StoredAxis(name, values, units, label, options)
+
+    def _text(self, name: str) -> Any:
+        found = self.file.plain(f"{ROOT}/{name}")
+        if found.shape != () or found.dtype.kind != "S":
+            raise self._damaged(f"{ROOT}/{name} is no text")
+        return found
+
+    def _string(self, name: str) -> str:
+        return text_of(self.file.values(self._text(name)).strip(b"\0 "))
+
+
+def _texts(found: np.ndarray) -> np.ndarray:
+    """Texts of an array of fixed-length strings."""
+    return np.array([text_of(text) for text in found.ravel().tolist()], dtype=str).reshape(found.shape)
+
+
+def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
+    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
+    words = []
+    label = "" if axes[-3].units else f'"{labels[tuple(index[-3:-1])]}"'
+    for axis, i in zip(axes, index, strict=True):
+        if label and axis.name in ("station", "angle"):
+            words += [label] * (axis.name == "station")
+        else:
+            value = axis.options[i] if axis.options else shown_text(axis.values[i], axis.units, 5)
+            words.append(f"{axis.name} {value}")
+    return ", ".join(words)
+
+
+def _other_version(path: Path, version: str) -> str:
+    """What is said of a file whose layout this program does not read."""
+    if version.isdecimal() and int(version) < VERSION:
+        return f"{path}: written by an older version (layout {version}, expected {VERSION}); run the scene again"
+    return f"{path}: its layout has version {version or 'none'}, expected {VERSION}; take the softjaw that wrote it"
 
 
 def open_result(path: str | Path, unchecked: bool = False) -> Result:
@@ -51,48 +302,11 @@ def _go_through(result: Result) -> None:
             getattr(result, name)
 
 
-def verify(path: Path, layout: Layout, header: Header) -> None:
-    """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
-    from softjaw.study.scene.text import differences
-
-    os.close(os.open(path, os.O_RDWR))
-    with open_result(path) as result:
-        if result.digest != header.digest:
-            text = (
-                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]}:"
-                f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
-            )
-            raise StudyError(OTHER_FILE, text)
-        # How the object was cut into triangles may differ in the last bit on another machine; the file's own counts.
-        same = replace(layout, surface=result.layout.surface)
-        old = result.version != str(VERSION)
-        if old or result.layout.shape != layout.shape or result.layout.options() != same.options():
-            text = f"{path}: made by a version that stored other values; it can be read, but not gone on with"
-            raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
-        for dataset in (*result.layout.datasets, *result.layout.grid):
-            if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
-                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file with -o"
-                raise StudyError(OTHER_FILE, text)
-        codes = result.codes.ravel()
-        wrong = broken_states(result.file, layout, codes, result.killed)
-        if lost := int(np.sum(codes[wrong] == MISSING)):
-            text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
-            raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")
-
-
-def rows_of(path: Path, layout: Layout) -> Iterator[tuple[int, int, list[Any] | None]]:
-    """Every row of a file that is done or failed; see `study.result.checksums.rows_of`."""
-    with h5py.File(path, "r") as file:
-        yield from checksums.rows_of(GuardedFile(path, file), layout)
-
-
 def torn_rows(path: Path, layout: Layout) -> list[int]:
     """Rows that are marked done or failed but do not match their checksums."""
-    if layout.version == 3:
-        return [row for row, _, values in rows_of(path, layout) if values is None]
     with open_result(path, unchecked=True) as result:
         codes = result.codes.ravel()
         marked = np.flatnonzero(codes != MISSING)
-        torn = [broken_rows(result.file, layout, part, marked) for part in layout.parts]
-        states = broken_states(result.file, layout, codes, under_way=False)
+        torn = [checksums.broken_rows(result.file, layout, part, marked) for part in layout.parts]
+        states = checksums.broken_states(result.file, layout, codes, under_way=False)
     return sorted({*np.concatenate(torn).tolist(), *(set(states.tolist()) & set(marked.tolist()))})

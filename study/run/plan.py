@@ -214,7 +214,7 @@ def _seconds(layout: Layout, path: Path) -> Any:
     from softjaw.study.result.store import open_result
 
     with open_result(path) as result:
-        return result.work("seconds_total").ravel() if result.layout.shape == layout.shape else None
+        return result.read("work/seconds_total").ravel() if result.layout.shape == layout.shape else None
 
 
 def _free(path: Path) -> int:

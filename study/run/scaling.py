@@ -116,7 +116,7 @@ def measured_ladders(result: Any) -> list[Ladder]:
     from softjaw.study.scene import parse_scene
 
     scene = parse_scene(result.scene, check_files=False)
-    seconds = result.work("seconds_total").ravel()
+    seconds = result.read("work/seconds_total").ravel()
     found = []
     for unit in sweep.units(scene, lambda point: point.axis_symmetry):
         times = seconds[list(unit.rows[0])]

@@ -22,7 +22,9 @@ from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, Stu
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, Standing
-from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.ladder import Climber, give_up, settle
 from softjaw.study.run.memory import limited_memory
 from softjaw.study.run.plan import Plan, by_cost

@@ -112,7 +112,7 @@ def writing_share(scene: Path, folder: Path) -> float:
     from mpi4py import MPI
 
     from softjaw.study import pipeline
-    from softjaw.study.result import store
+    from softjaw.study.result import write
     from softjaw.study.run import session as run
     from softjaw.study.run.plan import make_plan
     from softjaw.study.scene import load_scene
@@ -129,15 +129,15 @@ def writing_share(scene: Path, folder: Path) -> float:
 
         return wrapped
 
-    original = store.ResultWriter._store, store.ResultWriter.count_attempt, run.create
-    store.ResultWriter._store, store.ResultWriter.count_attempt, run.create = map(timed, original)
+    original = write.ResultWriter._store, write.ResultWriter.count_attempt, run.create
+    write.ResultWriter._store, write.ResultWriter.count_attempt, run.create = map(timed, original)
     try:
         loaded, start = load_scene(scene), time.perf_counter()
         work = run.Work(pipeline.solve_unit, pipeline.image)
         run.run_study(make_plan(loaded, str(scene)), work, folder / "writing.hdf", MPI.COMM_SELF)
         return spent[0] / (time.perf_counter() - start)
     finally:
-        store.ResultWriter._store, store.ResultWriter.count_attempt, run.create = original
+        write.ResultWriter._store, write.ResultWriter.count_attempt, run.create = original
 
 
 def main() -> None:

@@ -20,8 +20,8 @@ from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.patch_reader import Reading, read_patch
+from softjaw.study.result.guarded import trouble
 from softjaw.study.result.store import open_result
-from softjaw.study.result.trial import trouble
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.show.tables.columns import csv_text
 from tests.fuzz.lies import LIES

@@ -26,7 +26,7 @@ FACES, FORCES = 6, 3
 def fake_plan(digest="scene", stations=6, derived=True):
     """Stations x two angles x three forces; both angles of an even station are one unit."""
     from softjaw.study.result.layout import Derived, Header, Layout
-    from softjaw.study.result.reading import StoredAxis
+    from softjaw.study.result.store import StoredAxis
     from softjaw.study.run.plan import Plan
 
     axes = (

@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 
 from softjaw.study.result.layout import Derived, Header, Layout
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.result.store import create
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import StoredAxis
 from tests.study.sealing import sealed
 
 SCENE = """

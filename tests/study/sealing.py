@@ -10,7 +10,7 @@ from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING, STATE, SUMS
 from softjaw.study.result.guarded import GuardedFile
 from softjaw.study.result.layout import ROOT
-from softjaw.study.result.reading import Result
+from softjaw.study.result.store import Result
 
 
 def sealed(path):

@@ -208,9 +208,9 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     code, output, errors = once(run, 2, folder, *[word for value in study for word in ("--set", value)])
     assert code == 6, errors
     assert "Traceback" not in errors
-    assert "4 of 12 cases done, 8 failed, 0 missing" in output
+    assert "4 of 12 cases complete, 8 failed, 0 not computed" in output
     with open_result(folder / "out.hdf") as result:
-        messages, quality = result.messages[:, :, 0], result.map("quality", "ccm")[:, :, 0]
+        messages, quality = result.messages[:, :, 0], result.read("quality/ccm")[:, :, 0]
     small, large, middle, beside = 0, 1, 0, 1
     assert np.isfinite(quality[large, middle]).all()
     good, ended, above = messages[small, middle]

@@ -173,7 +173,7 @@ def test_examples_are_words_that_the_program_takes_and_name_files_that_exist(exa
 def test_status_tells_programs_the_state_of_every_case(finished, capsys):
     assert main(["status", str(finished), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert (told["cases"], told["done"], told["failed"], told["missing"], told["running"]) == (36, 35, 1, 0, None)
+    assert [told[key] for key in ("cases", "complete", "failed", "not_computed", "running")] == [36, 35, 1, 0, None]
     assert told["failures"] == [
         {"row": 9, "station": 0.02, "angle": np.pi / 2, "normal_force": 1.0, "message": "no contact at this force"}
     ]
@@ -181,7 +181,7 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
     assert [s["reason"] for s in told["sessions"]] == ["complete"]
     assert main(["status", str(finished), "--csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
-    assert [row["state"] for row in rows].count("done") == 35
+    assert [row["state"] for row in rows].count("complete") == 35
     failed = {"row": "9", "state": "failed", "message": "no contact at this force", "station [m]": "0.02"}
     assert rows[9].items() >= failed.items()
 
@@ -209,7 +209,7 @@ def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypat
 def test_status_tells_counts_reasons_and_sessions(finished, capsys):
     assert main(["status", str(finished)]) == 0
     text = capsys.readouterr().out
-    assert "35 of 36 cases done, 1 failed, 0 missing" in text
+    assert "35 of 36 cases complete, 1 failed, 0 not computed" in text
     assert "failed 1 x no contact at this force\n      at station 20 mm, angle 90 deg, normal_force 1 N\n" in text
     assert "session 1: 20" in text
     assert text.rstrip().endswith("complete")

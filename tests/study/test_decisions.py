@@ -114,7 +114,7 @@ def test_a_interval_of_a_probe_is_that_of_its_images(seed):
 @given(st.lists(st.sampled_from([0.5, 1.0, 1.5]), min_size=1, max_size=5), seeds)
 def test_a_window_ends_at_the_same_force(values, seed):
     """Values that just reach the limit, also where they fall again or the forces end."""
-    from softjaw.study.result.window import first_crossing
+    from softjaw.study.result.derived import first_crossing
 
     forces = 1.0 + np.arange(len(values))
     one = first_crossing(forces, values, 1.0)

@@ -19,11 +19,12 @@ from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences,
 from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
-from softjaw.study.show.tables.show_text import FLAGS_WIDTH
+from softjaw.study.show.tables.show import FLAGS_WIDTH
 
 ROOT = Path(__file__).parents[2]
 BITWISE = (ast.BitOr, ast.BitAnd)
@@ -149,7 +150,7 @@ def all_flags(solved, tmp_path_factory):
 
 def test_a_stored_message_tells_every_flag_to_its_end(all_flags):
     with open_result(all_flags) as result:
-        assert int(result.map("flags").item()) == OF_FILE
+        assert int(result.read("flags/flags").item()) == OF_FILE
         assert result.messages.item() == flag_sentences(OF_FILE)
 
 

@@ -12,12 +12,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from softjaw.study.environment import launch_environment
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.lock import holder
-from softjaw.study.result.store import open_result, rows_of
+from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
@@ -51,10 +52,9 @@ def done_rows(path):
         if shutil.which(tool[0]):
             assert subprocess.run([*tool, path], capture_output=True, timeout=60).returncode == 0
     with open_result(path) as result:
-        layout = result.layout
-    rows = [(row, values) for row, state, values in rows_of(path, layout) if state == DONE]
-    assert not [row for row, values in rows if values is None]
-    return {row for row, _ in rows}
+        layout, codes = result.layout, result.codes.ravel()
+    assert torn_rows(path, layout) == []
+    return set(np.flatnonzero(codes == DONE).tolist())
 
 
 def count_done(path):

@@ -170,7 +170,7 @@ def test_a_file_that_was_moved_or_replaced_is_noticed(tmp_path):
     with pytest.raises(StudyError, match="was replaced by another file") as refusal:
         standing.check()
     assert refusal.value.code == CANNOT_WRITE
-    with pytest.raises(StudyError, match=r"cannot be written any more \(No space.*the same command goes on"):
+    with pytest.raises(StudyError, match=r"cannot be written any more \(No space.*the same command again"):
         with standing.writing():
             raise OSError("No space left on device")
 
@@ -209,7 +209,7 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(once, shared_path, 
     assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
     assert messages[13].startswith(text)
     assert messages[14].startswith(f"not tried, because a lower force of this candidate failed: {text}")
-    assert "32 of 36 cases done, 4 failed" in output
+    assert "32 of 36 cases complete, 4 failed" in output
     assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, once(whole, shared_path)) == []
 

@@ -51,7 +51,7 @@ def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, unin
     path = shared_path / "ranks.hdf"
     code, output, errors = once(study, ranks, path)
     assert code == 0, errors
-    assert "36 of 36 cases done" in output
+    assert "36 of 36 cases complete" in output
     assert once(differing, path, uninterrupted) == []
     assert not list(shared_path.glob("*.lock"))
     assert not list(shared_path.glob("*.part"))
@@ -121,8 +121,8 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
     assert (once(states, path) == FAILED).sum() == 5
     with open_result(path) as result:
         assert result.messages.ravel()[9] == "no contact at this force"
-        assert np.isnan(result.map("e_n", "ccm").ravel()[[9, 25, 26]]).all()
-        assert result.map("e_n", "ccm").ravel()[10] > 0
+        assert np.isnan(result.read("e_n/ccm").ravel()[[9, 25, 26]]).all()
+        assert result.read("e_n/ccm").ravel()[10] > 0
     assert once(study, 0, path)[0] == 6
     assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []
@@ -150,7 +150,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path,
     assert code == 75
     left = (once(states, path) == MISSING).sum()
     assert left > 0
-    assert f"{left} missing" in output
+    assert f"{left} not computed" in output
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
@@ -225,7 +225,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
     told, (code, _, errors), first = once(second)
     assert told.returncode == 0
     assert "running now: host " in told.stdout
-    assert " missing" in told.stdout
+    assert " not computed" in told.stdout
     assert code == 4
     assert "in use by another run (host " in errors
     assert first == 75

@@ -8,9 +8,9 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import StoredAxis
+from softjaw.study.result.write import ResultWriter, record
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)

@@ -9,7 +9,7 @@ import xarray as xr
 
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
-from softjaw.study.result.grid import NOBODY
+from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.figures.contacts import outline
 from softjaw.study.show.grasps import WIDE, field, forces, number, place

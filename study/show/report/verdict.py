@@ -34,8 +34,8 @@ from softjaw.study.show.grasps import (
 from softjaw.study.show.tables.certainty import sure
 from softjaw.study.show.tables.certainty import verdict as judgement
 from softjaw.study.show.tables.ranking import largest, passed_over
+from softjaw.study.show.tables.show import as_text
 from softjaw.study.show.tables.show import best as best_table
-from softjaw.study.show.tables.show_text import as_text
 
 LEAST = 1e-4  # relative error below which only a bound is given
 NBSP = "\u00a0"

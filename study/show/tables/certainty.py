@@ -53,7 +53,7 @@ class Sure:
 
 
 def sure(ds: Any, name: str, k: int) -> Sure | None:
-    """``quality`` or ``e_n`` (curved) of all candidates at a force level; None where a file knows no error of it."""
+    """``quality`` or ``e_n`` (CCM) of all candidates at a force level; None where a file knows no error of it."""
     values = ds[name].sel(model="ccm").values[..., k].ravel()
     shares = {full: full.removeprefix(f"{name}_") for full in ds.attrs["derived"]}
     own, common = np.zeros(values.shape), dict[str, FloatArray]()

@@ -1,4 +1,4 @@
-"""Text that fits a terminal: aligned columns under heads of two lines, and lines that are broken between words."""
+"""Text that fits a terminal: tables with heads of two lines, lines that are broken between words, and CSV."""
 
 from __future__ import annotations
 
@@ -9,17 +9,23 @@ import textwrap
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
-GAP = "  "
-PAPER = 80  # letters in a line of a text that is kept
+from rich.console import Console
+from rich.table import Table as Grid
+
+GAP = 2
+PAPER = 80  # characters in a line of a text that is kept
 
 
 def terminal_width() -> int:
-    """Letters in a line of the terminal, or ``COLUMNS``; where the output is no terminal, `PAPER`."""
+    """Characters in a line of the terminal, or ``COLUMNS``; where the output is no terminal, `PAPER`."""
     return shutil.get_terminal_size().columns
 
 
 def wrapped(text: str, width: int, indent: str = "", more: str = "") -> str:
-    """A text broken into lines of up to ``width`` letters: the first after ``indent``, the rest after ``more`` too."""
+    """A text broken into lines of up to ``width`` characters: the first after ``indent``, the rest after ``more`` too.
+
+    Words are never broken, so that file names can be copied.
+    """
     return textwrap.fill(
         text, max(width, 40), initial_indent=indent, subsequent_indent=indent + more,
         break_long_words=False, break_on_hyphens=False,
@@ -32,48 +38,35 @@ def hanging(text: str, width: int) -> str:
     return "\n".join(wrapped(line, width, more=" " * (14 if line.startswith("  ") else 2)) for line in lines)
 
 
-def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = ()) -> list[str]:
-    """Rows of equal length as lines with aligned columns; those numbered in ``left`` begin at the left.
+def aligned(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Collection[int] = ()) -> list[str]:
+    """Lines of a table; cells and heads may have several lines, columns numbered in ``left`` begin at the left.
 
-    >>> aligned([["a", "1"], ["bc", "23"]], left=[0])
-    ['a    1', 'bc  23']
+    >>> aligned(["a", "b"], [["1", "bc"], ["23", "d"]], left=[1])
+    [' a  b', ' 1  bc', '23  d']
     """
-    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    grid = Grid(box=None, pad_edge=False, padding=(0, GAP, 0, 0))
+    for i, head in enumerate(heads):
+        grid.add_column(head, justify="left" if i in left else "right", no_wrap=True)
+    for row in rows:
+        grid.add_row(*row)
+    wide = Console(file=io.StringIO(), width=10_000, markup=False, emoji=False, highlight=False, color_system=None)
+    with wide.capture() as drawn:
+        wide.print(grid)
+    return [line.rstrip() for line in drawn.get().splitlines()]
 
-    def padded(row: Sequence[str]) -> Iterable[str]:
-        for i, (cell, size) in enumerate(zip(row, sizes, strict=True)):
-            yield cell.ljust(size) if i in left else cell.rjust(size)
 
-    return [GAP.join(padded(row)).rstrip() for row in rows]
+def head(name: str, unit: str) -> str:
+    r"""Head of a column, the unit below the name.
 
-
-def two_lines(name: str, unit: str) -> tuple[str, str]:
-    """Head of a column, the unit below the name.
-
-    >>> two_lines("e_n", "mm"), two_lines("rank", "")
-    (('e_n', '[mm]'), ('', 'rank'))
+    >>> head("e_n", "mm"), head("rank", "")
+    ('e_n\n[mm]', 'rank')
     """
-    return (name, f"[{unit}]") if unit else ("", name)
+    return f"{name}\n[{unit}]" if unit else name
 
 
-def fitting(rows: Sequence[Sequence[str]], drop: Sequence[int], width: int) -> list[int]:
-    """Numbers of the columns that fit into ``width`` letters: without the first ones of ``drop`` where need be.
-
-    >>> fitting([["12345", "123", "1"]], drop=[1, 0], width=9)
-    [0, 2]
-    """
-    sizes = [max(map(len, column)) + len(GAP) for column in zip(*rows, strict=True)]
-    room, out = width + len(GAP) - sum(sizes), []
-    for i in drop:
-        if room >= 0:
-            break
-        out.append(i)
-        room += sizes[i]
-    for i in reversed(out[:-1]):  # a wide column that had to go may have made room for narrow ones
-        if sizes[i] <= room:
-            out.remove(i)
-            room -= sizes[i]
-    return [i for i in range(len(sizes)) if i not in out]
+def with_unit(name: str, unit: str) -> str:
+    """Name of a column in one line: ``e_n [m]``."""
+    return f"{name} [{unit}]" if unit else name
 
 
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:
@@ -105,8 +98,3 @@ def digits(value: float) -> str:
     ('2.000', '0.01235', '31000', '2.000e-07')
     """
     return f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{value:#.4g}".rstrip(".")
-
-
-def with_unit(name: str, unit: str) -> str:
-    """Name of a column in one line: ``e_n [m]``."""
-    return f"{name} [{unit}]" if unit else name

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,12 +14,12 @@ from softjaw.study.flags import flags_in
 from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, maps_in, values_of
-from softjaw.study.show.tables.columns import cell
+from softjaw.study.show.tables.columns import csv_text, with_unit
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
 # Name, unit of every component, names of the components; of each finger, in the object's frame.
-FINGER = (
+FINGER: tuple[tuple[str, str | tuple[str, ...], tuple[str, ...]], ...] = (
     ("pose_origin", "m", XYZ),
     ("pose_rotation", "", NINE),
     ("frame_origin", "m", XYZ),
@@ -92,7 +90,7 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
 
 def as_json(ds: xr.Dataset, model: str = "ccm") -> str:
     """One object: file, units, meanings, and a list of cases; SI units, null where there is nothing."""
-    units = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
+    units: dict[str, Any] = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
     units |= {name: unit for name, unit, _ in FINGER}
     rows = []
     for case in cases(ds, model):
@@ -105,26 +103,22 @@ def as_json(ds: xr.Dataset, model: str = "ccm") -> str:
 def as_csv(ds: xr.Dataset, model: str = "ccm") -> str:
     """One line for each case, SI units in the header, empty where there is nothing."""
     maps = {name: unit for name, unit in maps_in(ds).items() if name != "flags"}
-    head = [_head(axis.name, axis.units) for axis in axes_of(ds)]
-    head += ["label", "state", "message", "flags", *(_head(*pair) for pair in maps.items())]
+    head = [with_unit(axis.name, axis.units) for axis in axes_of(ds)]
+    head += ["label", "state", "message", "flags", *(with_unit(*pair) for pair in maps.items())]
     for f in (1, 2):
         for name, unit, parts in FINGER:
-            each = [unit] * len(parts) if isinstance(unit, str) else unit
+            each = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
             names = [f"finger{f}.{name}.{part}" for part in parts] or [f"finger{f}.{name}"]
-            head += [_head(n, u) for n, u in zip(names, each or [unit], strict=True)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    for case in cases(ds, model):
-        flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
-        numbers = [*(float(case["maps"][name]) for name in maps), *flat]
-        lead = [*case["place"].values(), cell(case["label"]), case["state"], cell(case["message"]), case["flags"]]
-        writer.writerow([*lead, *("" if np.isnan(v) else repr(v) for v in numbers)])
-    return text.getvalue().rstrip("\n")
+            head += [with_unit(n, u) for n, u in zip(names, each, strict=True)]
+    return csv_text([head, *(_line(case, tuple(maps)) for case in cases(ds, model))])
 
 
-def _head(name: str, unit: Any) -> str:
-    return f"{name} [{unit}]" if unit else name
+def _line(case: dict[str, Any], maps: tuple[str, ...]) -> list[Any]:
+    """A case as a line of CSV."""
+    flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
+    numbers = [*(float(case["maps"][name]) for name in maps), *flat]
+    lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"]]
+    return [*lead, *(None if np.isnan(v) else repr(v) for v in numbers)]
 
 
 def _plain(value: Any) -> Any:

@@ -16,10 +16,10 @@ NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 
 def judged(ds: Any) -> IntArray:
-    """Flags of all cases, with `Flag.TOO_WEAK` and `Flag.TOO_STRONG` where a case lies outside its window of forces.
+    """Flags of all cases, with `Flag.TOO_WEAK` and `Flag.TOO_STRONG` where a case lies outside its safe force range.
 
     A force is too weak where the grasp does not hold the object's weight, and too strong above ``force_high``. Files
-    that derive no window have their own flags only.
+    that derive no such range have their own flags only.
     """
     flags = ds["flags"].values.copy()
     if "force_low" in ds:

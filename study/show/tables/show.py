@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from rich.cells import cell_len
 
-from softjaw.study.flags import BORNE, LOST, OF_FILE
-from softjaw.study.quantities import TABLE, WINDOW
+from softjaw.study.flags import BORNE, LOST, OF_FILE, flag_words, flags_in
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.certainty import sure, verdict
-from softjaw.study.show.tables.columns import csv_text, with_unit
+from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
 from softjaw.study.show.tables.ranking import borne_level, judged, nearest, passed_over, ranking
-from softjaw.study.show.tables.show_text import Columns, alike
-from softjaw.study.show.tables.show_text import as_text as as_text
+from softjaw.study.units import shown, shown_unit
+
+Columns = tuple[tuple[str, str], ...]  # names and units
+RANGE = "force range"
+RANGE_MEANS = "normal forces that hold the object, if its mass is given, and leave its wall undamaged; as far as solved"
+ERROR, ERROR_MEANS = "+-", "error estimate of the column before it, from two meshes"
+INTERVAL_MEANS = (
+    "half-width of the uncertainty interval (95 %) of the column before it; [uncertainty] in the scene lists its parts"
+)
+NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
+FLAGS_WIDTH, LABEL_WIDTH = 18, 28
 
 
 @dataclass(frozen=True)
@@ -39,7 +50,7 @@ class Table:
 def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
     """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N].
 
-    The default is the highest level, or the highest at which a grasp is within its window of forces where there is one.
+    The default is the highest level, or the highest at which a grasp is within its safe force range where there is one.
     With ``whole_lines`` images of one grasp, which share a line of `as_text`, count as one.
     """
     axes, flags = axes_of(ds), judged(ds)
@@ -53,7 +64,7 @@ def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines:
     order = done[ranking(score[done], flags[done])]
     labels = np.broadcast_to(ds.label.values, shape).ravel()
     named = [("label", "")] if ds.attrs["poses"] else []
-    maps |= {(name, "N"): ds[name].values.ravel() for name in WINDOW if name in ds}
+    maps |= {(name, "N"): ds[name].values.ravel() for name in FORCE_RANGE if name in ds}
     titles = (("rank", ""), *((axis.name, axis.units) for axis in axes[:-1]), *named, *maps, ("flags", ""))
 
     def row(rank: int, i: int) -> tuple[Any, ...]:
@@ -95,10 +106,10 @@ def _level(ds: xr.Dataset, flags: np.ndarray, force: float | None) -> tuple[int,
     if force is not None:
         k = nearest(forces, force)
         return k, "" if np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
-    k = borne_level(ds.status.values, flags) if (flags & BORNE).any() else None
-    if k is None or k == len(forces) - 1:
+    borne = borne_level(ds.status.values, flags) if (flags & BORNE).any() else None
+    if borne is None or borne == len(forces) - 1:
         return len(forces) - 1, ""
-    return k, ", the highest that a grasp holds and its wall bears"
+    return borne, ", the highest that a grasp holds and its wall bears"
 
 
 def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
@@ -136,9 +147,9 @@ def as_json(table: Table) -> str:
 
 def as_csv(table: Table) -> str:
     """One line for each grasp, SI units in the header."""
-    head = [with_unit(name, units) for name, units in table.columns]
+    names = [with_unit(name, units) for name, units in table.columns]
     # flags as text, as they are; None is an empty cell
-    return csv_text([head, *([None if _plain(v) is None else v for v in row] for row in table.rows)])
+    return csv_text([names, *([None if _plain(v) is None else v for v in row] for row in table.rows)])
 
 
 def _plain(value: Any) -> Any:
@@ -146,3 +157,179 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int):
         return value & OF_FILE
     return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def as_text(table: Table, width: int = PAPER) -> str:
+    """Aligned columns, lengths in mm and angles in degrees; images of one grasp share a line, flags are words.
+
+    Columns that do not fit into ``width`` characters are hidden, and named below.
+    """
+    if not table.rows:
+        return table.title
+    told = _for_people(table)
+    names, heads, body = [name for name, _ in told.columns], [_head(*column) for column in told.columns], _body(told)
+    kept = _fitting([heads, *body], names, width)
+    left = [k for k, i in enumerate(kept) if names[i] in ("flags", "label")]
+    lines = aligned([heads[i] for i in kept], [[row[i] for i in kept] for row in body], left)
+    hidden = [name for i, name in enumerate(names) if i not in kept]
+    verdict = [wrapped(table.verdict, width, more="  ")] * bool(table.verdict)
+    return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(told, hidden, width)])
+
+
+def _fitting(cells: Sequence[Sequence[str]], names: Sequence[str], width: int) -> list[int]:
+    """Numbers of the columns that fit into ``width`` characters, without the least important ones where need be."""
+    columns = zip(*cells, strict=True)
+    sizes = [GAP + max(cell_len(line) for cell in column for line in cell.split("\n")) for column in columns]
+    kept = list(range(len(names)))
+    for name in least(names):
+        if sum(sizes[i] for i in kept) <= width + GAP:
+            break
+        kept.remove(names.index(name))
+    return kept
+
+
+def least(names: Sequence[str]) -> list[str]:
+    """Columns that a narrow terminal does without, the first ones first; those of the two first maps stay.
+
+    >>> least(["quality", "quality_error", "fit_error", "e_n", "e_n_error", "e_n_pcm", "f_x_max", "f_x_max_error"])
+    ['fit_error', 'f_x_max_error', 'f_x_max', 'e_n_pcm', 'quality_error']
+    """
+    main = [name for name in reversed(MAIN[2:]) if name in names]
+    errors = [f"{name}_error" for name in main if f"{name}_error" in names]
+    planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
+    return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *(n for n in ("quality_error",) if n in names)]
+
+
+def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:
+    """What the words of the table mean, and which columns it does not show."""
+    names = [name for name, _ in table.columns]
+    marks = int(np.bitwise_or.reduce([row[names.index("flags")] for row in table.rows]))
+    told = [f"{flag.word}: {flag.sentence}" for flag in flags_in(marks)]
+    told += [f"{RANGE}: {RANGE_MEANS}"] * (RANGE in names)
+    kinds = {_kind(name) for name in names}
+    meanings = {"interval": INTERVAL_MEANS, "error": f"{ERROR_MEANS}{', in %' * ('interval' in kinds)}"}
+    told += [f"{ERROR}: {text}" for kind, text in meanings.items() if kind in kinds] or [NO_ERRORS]
+    if hidden:
+        told.append(f"columns hidden to fit {width} characters: {', '.join(hidden)} (use --csv or --json for all)")
+    return [wrapped(text, width, more="  ") for text in told]
+
+
+def _kind(name: str) -> str:
+    """What a column says of the map before it, its ``error`` or ``interval``; empty for all other columns.
+
+    >>> _kind("e_n_error"), _kind("e_n_interval"), _kind("fit_error")
+    ('error', 'interval', '')
+    """
+    of, _, kind = name.rpartition("_")
+    return kind if kind in ("error", "interval") and f"maps/{of}" in BY_KEY else ""
+
+
+def _head(name: str, units: str) -> str:
+    """What stands above a column."""
+    if kind := _kind(name):
+        return head(ERROR, shown_unit(units) or "%" * (kind == "error"))
+    q = BY_KEY.get(f"maps/{name}")
+    return head(q.symbol if q and q.symbol else name, shown_unit(units))
+
+
+def _body(table: Table) -> list[list[str]]:
+    """Cells of every line; images of one grasp share one."""
+    names = [name for name, _ in table.columns]
+    groups: list[list[tuple[Any, ...]]] = []
+    for row in table.rows:
+        if groups and alike(row, groups[-1][-1], table.columns):
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    body: list[list[str]] = []
+    for group in groups:
+        cells = [_cells(row, table.columns) for row in group]
+        for name in {"rank", "angle"} & set(names):
+            cells[0][names.index(name)] = _several([row[names.index(name)] for row in cells])
+        body.append([*cells[0][:-1], _stacked(cells[0][-1])])
+    return body
+
+
+def _stacked(flags: str) -> str:
+    r"""Flags in as many narrow lines as they take, each flag in one piece.
+
+    >>> _stacked("hole, not antipodal, too weak")
+    'hole,\nnot antipodal,\ntoo weak'
+    """
+    whole = textwrap.wrap(flags.replace(" ", "\xa0").replace(",\xa0", ", "), FLAGS_WIDTH, break_long_words=False)
+    return "\n".join(whole).replace("\xa0", " ")
+
+
+def _several(texts: list[str]) -> str:
+    """Some values in one cell.
+
+    >>> _several(["0", "90"]), _several(["0", "60", "120"])
+    ('0, 90', '0..120')
+    """
+    return ", ".join(texts) if len(texts) < 3 else f"{texts[0]}..{texts[-1]}"
+
+
+def _for_people(table: Table) -> Table:
+    """Both bounds of the safe force range in one column of text; explicit poses by number and label alone."""
+    if ("label", "") in table.columns:
+        kept = [i for i, (name, _) in enumerate(table.columns) if name != "angle"]
+        columns = tuple(
+            ("pose" if table.columns[i][0] == "station" else table.columns[i][0], table.columns[i][1]) for i in kept
+        )
+        table = replace(table, columns=columns, rows=tuple(tuple(row[i] for i in kept) for row in table.rows))
+    at = [i for i, (name, _) in enumerate(table.columns) if name in FORCE_RANGE]
+    if not at:
+        return table
+
+    def merged(row: tuple[Any, ...], one: Any) -> tuple[Any, ...]:
+        return (*row[: at[0]], one, *row[at[-1] + 1 :])
+
+    names = [table.columns[i][0] for i in at]
+    rows = tuple(merged(row, _range_text(dict(zip(names, (row[i] for i in at), strict=True)))) for row in table.rows)
+    return replace(table, columns=merged(table.columns, (RANGE, "N")), rows=rows)
+
+
+def _range_text(bounds: dict[str, float]) -> str:
+    """The safe force range as people read it.
+
+    >>> _range_text({"force_low": 0.8, "force_high": 2.5}), _range_text({"force_high": 2.5})
+    ('0.8..2.5', '..2.5')
+    >>> _range_text({"force_low": 3.0, "force_high": 2.5}), _range_text({"force_low": np.nan})
+    ('none', '-')
+    """
+    low, high = (bounds.get(name, np.nan) for name in FORCE_RANGE)
+    if np.isnan([*bounds.values()]).all():
+        return "-"
+    if "force_low" in bounds and "force_high" in bounds and not low <= high:
+        return "none"
+    return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high))
+
+
+def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
+    """A row as people read it; what stands before the quality are coordinates."""
+    first = [name for name, _ in columns].index("quality")
+    pairs = zip(row, columns, strict=True)
+    return [_cell(value, name, units, i < first) for i, (value, (name, units)) in enumerate(pairs)]
+
+
+def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
+    if name == "flags":
+        return flag_words(value)
+    if not isinstance(value, float):
+        text = str(value)
+        return text if len(text) <= LABEL_WIDTH else f"{text[: LABEL_WIDTH - 3]}..."
+    if np.isnan(value):
+        return "-"
+    value, kind = shown(value, units), _kind(name)
+    if kind:
+        return f"{value * (100 if kind == 'error' and not units else 1):.2g}"
+    if coordinate:
+        return f"{value:.5g}"
+    return f"{value:.2g}" if name == "fit_error" else digits(value)
+
+
+def alike(row: tuple[Any, ...], other: tuple[Any, ...], columns: Columns) -> bool:
+    """Whether two grasps differ in their angle only, as far as a line of text tells."""
+    kept = [i for i, (name, _) in enumerate(columns) if name not in ("rank", "angle")]
+    one, two = _cells(row, columns), _cells(other, columns)
+    return all(one[i] == two[i] for i in kept)

@@ -1,18 +1,18 @@
-"""What a result file holds so far: done, failed with reasons, missing, and how each session ended."""
+"""What a result file holds so far: complete cases, failed ones with reasons, the rest, and how each session ended."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
-from softjaw.study.quantities import PARTS, STATES
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.flags import flag_sentences, flags_in
+from softjaw.study.quantities import DONE, FAILED, MISSING, PARTS, STATES
 from softjaw.study.result.lock import holder
-from softjaw.study.result.reading import place_text
+from softjaw.study.result.store import place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
@@ -22,34 +22,32 @@ MOST_REASONS, MOST_PLACES = 12, 3
 def status_text(result: Any, width: int = PAPER) -> str:
     """Answer of ``softjaw status``; the file may be growing meanwhile."""
     runner = holder(result.path)
-    missing = int(np.sum(result.status == MISSING))
-    state = f"running now: {runner}" if runner else "the same 'softjaw run' goes on from here" if missing else ""
-    told = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
-    return "\n".join([*told, *sessions(result, bool(runner), width)])
+    open_cases = np.any(result.status == MISSING)
+    state = f"running now: {runner}" if runner else "run the same command again to resume" if open_cases else ""
+    lines = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
+    return "\n".join([*lines, *sessions(result, bool(runner), width)])
 
 
 def status_json(result: Any) -> str:
     """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
-    status = result.status
-    total = {name: int(np.sum(status == code)) for code, name in enumerate(STATES)}
-    told = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
-    told |= {"cases": int(status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    told |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
-    return json.dumps(told, indent=2)
+    total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
+    about = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
+    about |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    about |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
+    return json.dumps(about, indent=2)
 
 
 def status_csv(result: Any) -> str:
     """One line for each case, in the order of the file: state, message and place, SI units in the header."""
-    head = ["row", "state", "message", *(with_unit(axis.name, axis.units) for axis in result.axes)]
+    names = ["row", "state", "message", *(with_unit(axis.name, axis.units) for axis in result.axes)]
     status, messages = result.status.ravel(), result.messages.ravel()
     rows = ([row, STATES[int(status[row])], str(messages[row]), *_place(result, row)] for row in range(status.size))
-    return csv_text([head, *rows])
+    return csv_text([names, *rows])
 
 
 def _cases(result: Any, state: int) -> list[dict[str, Any]]:
     """Cases in one state that have a message."""
-    messages = result.messages.ravel()
-    names = [axis.name for axis in result.axes]
+    messages, names = result.messages.ravel(), [axis.name for axis in result.axes]
     found = []
     for row in map(int, np.flatnonzero((result.status.ravel() == state) & (messages != ""))):
         label = "" if result.axes[-3].units else str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]])
@@ -60,7 +58,7 @@ def _cases(result: Any, state: int) -> list[dict[str, Any]]:
 
 def place(result: Any, row: int) -> str:
     """A case in words."""
-    return place_text(result.axes, result.labels, np.unravel_index(row, result.layout.shape))
+    return place_text(result.axes, result.labels, tuple(map(int, np.unravel_index(row, result.layout.shape))))
 
 
 def _place(result: Any, row: int) -> list[float]:
@@ -76,32 +74,26 @@ def summary(result: Any) -> str:
 
     width = terminal_width()
     table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
-    missing = int(np.sum(result.status == MISSING))
-    more = f"; {missing} cases are missing, the same command goes on" if missing else ""
-    return "\n".join(
-        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}{more}"]
-    )
+    again = "; run the same command again to resume" if np.any(result.status == MISSING) else ""
+    lines = [counts(result), *reasons(result, width), *time_split(result), *table]
+    return "\n".join([*lines, f"results are in {result.path}{again}"])
 
 
 def counts(result: Any) -> str:
     """How many cases are in which state."""
-    status = result.status
-    done, failed = int(np.sum(status == DONE)), int(np.sum(status == FAILED))
     title = f" ({result.title})" if result.title else ""
-    missing = status.size - done - failed
-    return f"{result.path}{title}:\n  {done} of {status.size} cases done, {failed} failed, {missing} missing"
+    missing, done, failed = (int(np.sum(result.status == state)) for state in (MISSING, DONE, FAILED))
+    cases = f"{done} of {result.status.size} cases {STATES[DONE]}, {failed} {STATES[FAILED]}"
+    return f"{result.path}{title}:\n  {cases}, {missing} {STATES[MISSING]}"
 
 
 def reasons(result: Any, width: int = PAPER) -> list[str]:
-    """Messages of failed cases, then notes on solved ones, the most frequent first and with some of their places."""
-    status, messages = result.status.ravel(), result.messages.ravel()
+    """Reasons of failed cases, then notes on solved ones, the most frequent first and with some of their places."""
     lines = []
     for state, title in ((FAILED, "failed"), (DONE, "note")):
         where: dict[str, list[int]] = {}
-        for row in np.flatnonzero((status == state) & (messages != "")):
-            # a solved case may have several notes, a failed one has one reason
-            for text in messages[row].split("; ") if state == DONE else [messages[row]]:
-                where.setdefault(text, []).append(int(row))
+        for text, row in _reasons(result, state):
+            where.setdefault(text, []).append(row)
         texts = sorted(where, key=lambda text: -len(where[text]))
         for text in texts[:MOST_REASONS]:
             places = [place(result, row) for row in where[text][:MOST_PLACES]]
@@ -113,26 +105,37 @@ def reasons(result: Any, width: int = PAPER) -> list[str]:
     return lines
 
 
+def _reasons(result: Any, state: int) -> Iterator[tuple[str, int]]:
+    """Reasons and rows of the cases in a state: of solved ones their flags, and what the message adds to these."""
+    messages = result.messages.ravel()
+    rows = np.flatnonzero((result.status.ravel() == state) & (messages != ""))
+    flags = np.nan_to_num(result.read("flags/flags")).astype(int).ravel() if state == DONE and rows.size else None
+    for row in map(int, rows):
+        marks = 0 if flags is None else int(flags[row])
+        yield from ((flag.sentence, row) for flag in flags_in(marks))
+        if more := str(messages[row]).removeprefix(flag_sentences(marks)).removeprefix("; "):
+            yield more, row
+
+
 def time_split(result: Any) -> list[str]:
     """Where the seconds of all cases went; nothing where no time was measured."""
-    total = float(np.nansum(result.work("seconds_total")))
+    total = float(np.nansum(result.read("work/seconds_total")))
     if not total:
         return []
-    shares = {part: float(np.nansum(result.work(f"seconds_{part}"))) / total for part in PARTS}
+    shares = {part: float(np.nansum(result.read(f"work/seconds_{part}"))) / total for part in PARTS}
     words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
     return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
 
 
 def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
     """One line for each time the study was started."""
-    found: Sequence[dict[str, Any]] = result.sessions
     lines = []
-    for i, s in enumerate(found):
-        last = i == len(found) - 1
-        reason = s["reason"] if s["stop"] else "running" if last and running else "ended without a word (killed?)"
-        wall = _between(s["start"], s["stop"])
+    for i, s in enumerate(result.sessions, start=1):
+        now = running and i == len(result.sessions)
+        reason = s["reason"] if s["stop"] else "running" if now else "ended without a word (killed?)"
         ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
-        lines.append(wrapped(f"session {i + 1}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
+        wall = _between(s["start"], s["stop"])
+        lines.append(wrapped(f"session {i}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
     return lines
 
 

@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-import argparse
-import math
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
+
+import numpy as np
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.text import Text
+
+from softjaw.study.messages import DONE as ENDED
+from softjaw.study.messages import SOME_FAILED, STOPPED
+from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
+from softjaw.study.result.lock import holder
+from softjaw.study.result.read import dataset
+from softjaw.study.result.store import open_result
+from softjaw.study.run.progress import Progress, duration
+from softjaw.study.show.tables.show import best
+from softjaw.study.show.tables.status import place, reasons
+from softjaw.study.units import shown_text
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Describe the words after ``softjaw watch``."""
-    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    parser.add_argument("--every", type=_seconds, default=2.0, metavar="S", help="seconds between looks (default 2)")
-    parser.description = (
-        f"{parser.description} Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are"
-        " missing. Ctrl-C ends the view, not the run."
-    )
-
-
-def _seconds(text: str) -> float:
-    if not 0.1 <= (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
-    return value
+BAR = 40
 
 
 def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callable[[float], None] = time.sleep) -> int:
@@ -43,14 +45,104 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
     sleep : callable
         Waits for so many seconds.
     """
-    from softjaw.study.show.tables.watch_view import View
-
     stream = stream or sys.stdout
-    view = View(stream, live=stream.isatty())
+    console = Console(file=stream, markup=False, emoji=False, highlight=False)
+    view = View(console, stream)
     try:
-        while (code := view.look(path)) is None:
-            sleep(every)
+        with ExitStack() as stack:
+            if console.is_terminal:
+                view.live = stack.enter_context(Live(console=console, auto_refresh=False))
+            while view.look(path):
+                sleep(every)
     except KeyboardInterrupt:
-        stream.write("\nno longer watching; the run goes on\n")
+        console.print("no longer watching; the run goes on")
         return INTERRUPTED
-    return code
+    for line in view.last_words:
+        console.print(line, soft_wrap=True)
+    return view.code
+
+
+class View:
+    """What is drawn, and what of it has to be remembered from look to look.
+
+    ``code`` and ``last_words`` are those of a run that has ended; ``live`` draws over itself on a terminal.
+    """
+
+    def __init__(self, console: Console, stream: TextIO) -> None:
+        self.code, self.last_words = ENDED, list[str]()
+        self.live: Live | None = None
+        self._console, self._stream = console, stream
+        self._progress: Progress | None = None
+        self._codes = np.zeros(0)
+        self._failure, self._done = -1, ""
+
+    def look(self, path: Path) -> bool:
+        """Open the file and draw what it holds; whether a run is working on it."""
+        runner = holder(path)  # asked first: what a run writes before it ends is then read below
+        with open_result(path) as result:
+            codes = result.status.ravel()
+            self._remember(codes)
+            line = self._progress.line(codes) if runner and self._progress else _counts(codes)
+            if self.live:
+                self.live.update(self._drawn(result, codes, runner, line), refresh=True)
+            elif line.partition(" done")[0] != self._done:
+                self._console.print(f"[{time.strftime('%H:%M:%S')}] {line}", soft_wrap=True)
+                self._done = line.partition(" done")[0]
+            if not runner:
+                self._end(result, codes)
+        return bool(runner)
+
+    def _remember(self, codes: np.ndarray) -> None:
+        before = self._codes if self._codes.size else np.full(codes.shape, MISSING)
+        fresh = np.flatnonzero((codes == FAILED) & (before != FAILED))
+        self._failure = int(fresh[-1]) if fresh.size else self._failure
+        self._codes = codes
+        if self._progress is None:
+            self._progress = Progress(np.ones(codes.size), codes, self._stream, live=False)
+
+    def _drawn(self, result: Any, codes: np.ndarray, runner: str, line: str) -> Group:
+        title = f" ({result.title})" if result.title else ""
+        bar = ProgressBar(total=codes.size, completed=int(np.sum(codes != MISSING)), width=BAR)
+        lines = [line, *([f"{runner}{_since(result)}"] if runner else []), best_so_far(result, codes)]
+        if self._failure >= 0:
+            lines += [f"failed last: {result.messages.ravel()[self._failure]}, at {place(result, self._failure)}"]
+        return Group(Text(f"{result.path}{title}"), bar, *map(Text, lines))
+
+    def _end(self, result: Any, codes: np.ndarray) -> None:
+        """Exit code and last words of a run that has ended."""
+        missing = int(np.sum(codes == MISSING))
+        if missing:
+            words = f"the run has ended with {missing} cases {STATES[MISSING]}; run the same command again to resume"
+            self.code, self.last_words = STOPPED, [words]
+            return
+        self.code = SOME_FAILED if np.any(codes == FAILED) else ENDED
+        shown = f"'softjaw show {result.path}' lists the best grasps"
+        self.last_words = ["complete", *reasons(result, self._console.width), shown]
+
+
+def _counts(codes: np.ndarray) -> str:
+    failed = int(np.sum(codes == FAILED))
+    return f"{int(np.sum(codes == DONE))}/{codes.size} done" + (f", {failed} failed" if failed else "")
+
+
+def _since(result: Any) -> str:
+    """How long the last session has been running."""
+    try:
+        began = datetime.fromisoformat(result.sessions[-1]["start"])
+    except (IndexError, ValueError):
+        return ""
+    return f", for {duration(max((datetime.now(UTC) - began).total_seconds(), 0.0))}"
+
+
+def best_so_far(result: Any, codes: np.ndarray) -> str:
+    """The best grasp at the highest force at which any is solved, in one line."""
+    solved = (codes.reshape(-1, result.layout.shape[-1]) == DONE).any(axis=0)
+    if not solved.any():
+        return "best so far: no case is complete yet"
+    table = best(dataset(result), float(result.axes[-1].values[np.flatnonzero(solved)[-1]]), top=1)
+    row = dict(zip((name for name, _ in table.columns), table.rows[0], strict=True))
+    where = [f'"{row["label"]}"'] if "label" in row else []
+    axes = result.axes[:-3] if where else result.axes[:-1]
+    where += [f"{axis.name} {shown_text(row[axis.name], axis.units, 5)}" for axis in axes]
+    numbers = [f"quality {row['quality']:.4g}", f"e_n {shown_text(row['e_n'], 'm')}"]
+    return f"best so far at {table.force:g} N: {', '.join(numbers)}, at {', '.join(where)}"

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.result.grid import NOBODY, quads_of
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.vtkhdf import write_grid
+from softjaw.study.result.vtkhdf import NOBODY, quads_of, write_grid
 from softjaw.study.show.grasps import Index, field, forces
 from softjaw.study.show.view.model import View, maps_of
 

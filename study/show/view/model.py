@@ -15,10 +15,10 @@ from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
 from softjaw.study.quantities import ALONG, AROUND, TABLE
-from softjaw.study.result.grid import NOBODY, Surface
 from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of, read_field, read_patch
+from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, candidate_of, field, forces, number, order, place, quantity, unravelled
 from softjaw.study.show.stored_surface import body, stored_surface, weaker

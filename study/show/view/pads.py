@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.case.contact import LOADED
-from softjaw.study.result.grid import corners_of
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.vtkhdf import corners_of
 from softjaw.study.show.grasps import Index, at
 
 LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]

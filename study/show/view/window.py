@@ -10,8 +10,8 @@ import numpy as np
 import pyvista as pv
 
 from softjaw.study.pictures import COLOURS, INK
-from softjaw.study.result.grid import NOBODY
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.grasps import Index, forces, label_of
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
 from softjaw.study.show.tables.ranking import nearest

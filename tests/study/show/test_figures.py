@@ -68,7 +68,7 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     path = force_file(tmp_path / "force.hdf")
     with open_result(path) as result:
         lines = studies.over_force(judge(dataset(result)))
-        e_n = 1e3 * result.map("e_n", "ccm")[0, 0]
+        e_n = 1e3 * result.read("e_n/ccm")[0, 0]
     _, force = lines["force"]
     assert force["pcm"] == pytest.approx(np.full(4, 0.8))
     assert force["ccm"] == pytest.approx(np.full(4, 0.7))

@@ -20,9 +20,9 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.read import dataset
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import StoredAxis, open_result
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.show.grasps import at, compared, grouped, images, judge, number, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report

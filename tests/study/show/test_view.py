@@ -16,10 +16,10 @@ from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid import NOBODY, corners_of
 from softjaw.study.result.grid_surface import Cells, Wall, areas, between, coloured, cut
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
+from softjaw.study.result.vtkhdf import NOBODY, corners_of
 from softjaw.study.show.grasps import judge, order
 from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of

@@ -16,20 +16,20 @@ from softjaw.study.case import model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
-from softjaw.study.result import window
+from softjaw.study.result import derived
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.grasps import at, judge
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
 from softjaw.study.show.tables.ranking import borne_level, judged, ranking
-from softjaw.study.show.tables.show import as_csv, as_json, best
-from softjaw.study.show.tables.show_text import as_text
+from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 from softjaw.study.show.view.model import View, read_scene, view_of
 from tests.study.sealing import sealed
 
@@ -67,7 +67,7 @@ def write(path, scene, results):
             writer.write(row, record(layout, results[row]))
         else:
             writer.fail(row, "the wall gave way")
-    window.finalise(writer, scene)
+    derived.finalise(writer, scene)
     writer.close()
     return path
 
@@ -143,12 +143,12 @@ def test_show_has_indentations_stress_and_the_window_of_forces(can):
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
-    assert names.split()[-3:] == ["indentation", "stress", "window"]
+    assert names.split()[-3:] == ["stress", "force", "range"]
     assert units.split()[-4:] == ["[mm]", "[kPa]", "[N]", "flags"]
     assert "safety" in units
     assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
     assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
-    assert "window: normal forces" in text
+    assert "force range: normal forces" in text
     # 3 N dents both stations deeper than 1.5 mm
     assert as_text(strong).count("too strong") == 3
     told = json.loads(as_json(strong))

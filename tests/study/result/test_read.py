@@ -16,8 +16,9 @@ from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.quantities import STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.read import FIELDS
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result
+from softjaw.study.result.write import ResultWriter, record
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, grid_axes, make, window, without_result
 

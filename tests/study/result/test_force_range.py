@@ -1,9 +1,9 @@
-"""The window of safe forces: where values first pass a limit between solved forces."""
+"""The safe force range: where values first pass a limit between solved forces."""
 
 import numpy as np
 import pytest
 
-from softjaw.study.result.window import first_crossing
+from softjaw.study.result.derived import first_crossing
 
 FORCES = [1.0, 2.0, 4.0, 8.0]
 

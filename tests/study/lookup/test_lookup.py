@@ -13,7 +13,7 @@ import pytest
 
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
-from softjaw.study.result.reading import StoredAxis
+from softjaw.study.result.store import StoredAxis
 from tests.study.formula_results import (
     ANGLES,
     FORCES,
@@ -27,7 +27,7 @@ from tests.study.formula_results import (
     without_result,
 )
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
 ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
 

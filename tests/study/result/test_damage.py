@@ -18,8 +18,9 @@ from softjaw.study.result import guarded
 from softjaw.study.result.derived import finalise
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import dataset
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.result.write import ResultWriter, record, verify
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.report.verdict import plain_report
@@ -268,7 +269,7 @@ def test_a_row_that_is_begun_anew_while_somebody_reads_is_missing(copy):
         file["study/status/code"][0, 0, 0] = MISSING
     with open_result(copy) as result:
         result.__dict__["status"] = codes  # read just before
-        assert result.map("e_n", "ccm")[0, 0, 1] > 0
+        assert result.read("e_n/ccm")[0, 0, 1] > 0
         assert result.status.ravel().tolist() == [MISSING, DONE, DONE, DONE]
 
 

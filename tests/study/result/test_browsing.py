@@ -21,7 +21,7 @@ import pyvista as pv
 
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
-from tests.study.test_vtkhdf import steps_of
+from tests.study.result.test_vtkhdf import steps_of
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
 
@@ -126,7 +126,7 @@ def test_xarray_has_coordinates_with_units(result, python):
     )
     value, units = answer([python, "-c", code, result]).split()
     with open_result(result) as read:
-        assert float(value) == read.map("e_n", "ccm")[2, 0, 1]
+        assert float(value) == read.read("e_n/ccm")[2, 0, 1]
     assert units == "m"
 
 
@@ -156,7 +156,7 @@ def test_pyvista_opens_the_result_file_itself(result):
     grid = pv.read(result)
     assert isinstance(grid, pv.UnstructuredGrid)
     with open_result(result) as read:
-        S, quality = read.fingers("S"), read.map("quality", "ccm")
+        S, quality = read.read("fingers/S"), read.read("quality/ccm")
     for k, (force, grid) in enumerate(steps_of(result)):
         assert force == k + 1
         load = grid["pressure"] * grid.compute_cell_sizes()["Area"]

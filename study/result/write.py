@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from softjaw.study.messages import CANNOT_WRITE, StudyError
-from softjaw.study.quantities import FIRST, MODELS
+from softjaw.study.case.result import CaseResult
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
+from softjaw.study.quantities import EFFECTS, FIRST, MODELS
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, STATE, SUMS
+from softjaw.study.result.datasets import CLOSING, MESSAGE, STATE, SUMS
 from softjaw.study.result.guarded import GuardedFile
-from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, Layout
-from softjaw.study.result.reading import Result
-from softjaw.study.result.record import blank, text_bytes
-from softjaw.study.result.skeleton import LIBVER, report_bytes
+from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, SESSION, Header, Layout
+from softjaw.study.result.skeleton import LIBVER, report_bytes, text_bytes
+from softjaw.study.result.store import Result, open_result
+from softjaw.study.scene.text import differences
 
 
 class ResultWriter:
@@ -64,7 +67,7 @@ class ResultWriter:
         self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
 
     def write(self, row: int, values: Sequence[np.ndarray]) -> None:
-        """Store a solved case; ``values`` as from ``study.result.record.record``."""
+        """Store a solved case; ``values`` as from ``record``."""
         self._store(row, values, DONE)
 
     def fail(self, row: int, message: str) -> None:
@@ -96,7 +99,7 @@ class ResultWriter:
         return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
 
     def read(self, path: str, index: Any = ()) -> np.ndarray:
-        """Any dataset, named below ``/study`` (``e_n/curved``) or from the root, or what it has at an index."""
+        """Any dataset, named below ``/study`` (``e_n/ccm``) or from the root, or what it has at an index."""
         return self._file[path if path.startswith("/") else f"{ROOT}/{path}"][index]
 
     def result(self) -> Result:
@@ -125,7 +128,7 @@ class ResultWriter:
         """Add a row to the provenance; by one rank."""
         used = self._sessions[()]["start"] != b""
         self.session = min(int(used.sum()), len(used) - 1)
-        self._sessions[self.session] = np.zeros((), self.layout.session)
+        self._sessions[self.session] = np.zeros((), SESSION)
         self.update_session(**fields)
 
     def update_session(self, **fields: Any) -> None:
@@ -148,3 +151,75 @@ def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarra
     place = dataset.id.get_space()
     place.select_hyperslab(index + (0,) * value.ndim, count)
     dataset.id.write(h5py.h5s.create_simple(count), place, np.ascontiguousarray(value).reshape(count))
+
+
+def blank(layout: Layout, message: str = "") -> list[np.ndarray]:
+    """A row without values, as a failed case leaves it."""
+    row = [np.full(c.shape, c.fill, c.dtype) for c in layout.columns]
+    row[-1] = np.array(text_bytes(message, MESSAGE), layout.columns[-1].dtype)
+    return row
+
+
+def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
+    """The row of a solved case, aligned with ``layout.columns``; what the result does not give stays empty.
+
+    Raises
+    ------
+    ValueError
+        A key or a shape that is not in ``study.quantities``: a bug of the caller, not a failed case.
+    """
+    given = _flattened(layout, result)
+    row = blank(layout, result.message)
+    for i, column in enumerate(layout.columns[:-1]):
+        if column.key not in given:
+            continue
+        value = np.asarray(given.pop(column.key), column.dtype)
+        if value.shape != column.shape:
+            raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.shape}")
+        row[i] = value
+    if given:
+        raise ValueError(f"a case gives {', '.join(sorted(given))}, which study.quantities does not list")
+    return row
+
+
+def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
+    given = dict(result.values)
+    for q in layout.quantities:
+        if q.group == "maps" and q.by_model and q.key in given:
+            values = np.asarray(given.pop(q.key), float)
+            if values.shape != (len(MODELS),):
+                raise ValueError(f"'{q.key}' of a case has shape {values.shape}, expected one for each of {MODELS}")
+            given.update({f"{q.key}/{model}": value for model, value in zip(MODELS, values, strict=True)})
+    if layout.patches and result.patch is not None:
+        given.update({f"patch/{name}": value for name, value in result.patch.items()})
+    for name, (level, indicator, reason) in result.effects.items():
+        index = EFFECTS.get(name, ()).index(level) if isinstance(level, str) else level
+        parts = {"level": index, "indicator": indicator, "reason": reason}
+        given.update({f"effects/{name}_{part}": value for part, value in parts.items()})
+    return given
+
+
+def verify(path: Path, layout: Layout, header: Header) -> None:
+    """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
+    os.close(os.open(path, os.O_RDWR))
+    with open_result(path) as result:
+        if result.digest != header.digest:
+            text = (
+                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]}:"
+                f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
+            )
+            raise StudyError(OTHER_FILE, text)
+        # How the object was cut into triangles may differ in the last bit on another machine; the file's own counts.
+        same = replace(layout, surface=result.layout.surface)
+        if result.layout.shape != layout.shape or result.layout.options() != same.options():
+            text = f"{path}: made by a version that stored other values; it can be read, but not gone on with"
+            raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
+        for dataset in (*result.layout.datasets, *result.layout.grid):
+            if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
+                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file with -o"
+                raise StudyError(OTHER_FILE, text)
+        codes = result.codes.ravel()
+        wrong = checksums.broken_states(result.file, layout, codes, result.killed)
+        if lost := int(np.sum(codes[wrong] == MISSING)):
+            text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
+            raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")

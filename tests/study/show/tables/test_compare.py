@@ -14,10 +14,8 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.cli import main
 from softjaw.study.lookup import GraspMap
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, RANK, USAGE, StudyError
-from softjaw.study.result.reading import StoredAxis
-from softjaw.study.result.store import open_result
-from softjaw.study.show.tables.compare import compare
-from softjaw.study.show.tables.compare_text import comparison_csv, comparison_json, comparison_text
+from softjaw.study.result.store import StoredAxis, open_result
+from softjaw.study.show.tables.compare import compare, comparison_csv, comparison_json, comparison_text
 from softjaw.study.show.tables.export import FINGER, MEANING, as_csv, as_json, cases
 from tests.study.formula_results import (
     FORCES,
@@ -128,7 +126,7 @@ def test_programs_get_every_common_case_in_si(pair):
     assert len(empty) == 1
     assert empty[0]["difference"] is None
     with open_result(pair[0]) as result:
-        assert data["cases"][0]["a"] == result.map("quality", "pcm")[1, 0, 1]
+        assert data["cases"][0]["a"] == result.read("quality/pcm")[1, 0, 1]
 
 
 @pytest.mark.parametrize(

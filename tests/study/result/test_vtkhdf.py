@@ -10,10 +10,9 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, StudyError
-from softjaw.study.result.grid import fill_grid
-from softjaw.study.result.record import record
-from softjaw.study.result.store import ResultWriter, create
-from softjaw.study.result.vtkhdf import write_grid
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.vtkhdf import fill_grid, write_grid
+from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from tests.study.view_files import GRID, PRESSURE, SCENE, SIZE, make, quality, solved
