@@ -10,7 +10,12 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 INK, SOFT, EMPTY = "#1d2429", "#6b747b", "#e7e9eb"
 MODEL_STYLE = {
@@ -51,8 +56,6 @@ _STYLE = {
 
 def style() -> Any:
     """Context in which all pictures of a study are drawn and saved."""
-    import matplotlib as mpl
-
     return mpl.rc_context(_STYLE)
 
 
@@ -60,9 +63,6 @@ def figure(
     width: float, height: float, rows: int = 1, columns: int = 1, gap: float = 0.08, **layout: Any
 ) -> tuple[Any, Any]:
     """A figure of so many inches and its axes, ``(rows, columns)`` ``gap`` inches apart; it needs no window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     made = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
     made.get_layout_engine().set(w_pad=gap)
@@ -110,8 +110,6 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
 
 def polygons(axes: Any, corners: Sequence[Any], values: np.ndarray, **look: Any) -> Any:
     """Polygons in the colours of ``values``."""
-    from matplotlib.collections import PolyCollection
-
     look = {"edgecolor": "face", "linewidth": 0.5, "rasterized": len(corners) > RASTER, **look}
     limits = look.pop("vmin", None), look.pop("vmax", None)
     drawn = PolyCollection(corners, array=np.ma.masked_invalid(values), **look)
@@ -132,8 +130,6 @@ def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = 
 
 def arrow(axes: Any, tail: np.ndarray, tip: np.ndarray) -> None:
     """An arrow that shows on light and dark ground."""
-    from matplotlib.patheffects import withStroke
-
     style = {"arrowstyle": "-|>", "color": INK, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tip, tail, arrowprops={**style, "path_effects": [withStroke(linewidth=4, foreground="white")]})
 

@@ -1,6 +1,6 @@
 """The paper on one page: press both fingers, read the contact patches, bound the friction, score the grasp.
 
-``solve_unit`` climbs the forces of one candidate; everything it computes goes into the ``CaseResult`` of each force.
+``solve_unit`` follows the load path of one candidate; all that it computes is in the ``CaseResult`` of each force.
 """
 
 from __future__ import annotations
@@ -75,15 +75,15 @@ def _probed(result: CaseResult, probing: Probing) -> CaseResult:
 
 def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
     """For every force the contacts of both fingers, or why there are none."""
-    ladder = solving.ladder(forces)
+    path = solving.load_path(forces)
     for k, force in enumerate(forces):
         try:
-            yield next(ladder)
+            yield next(path)
         except (ConvergenceError, CheckError) as error:
             good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
             yield CaseFailure(f"{error}; {good}")
             for _ in forces[k + 1 :]:
-                yield CaseFailure(f"not tried, because the ladder of forces ended at {force:g} N: {error}")
+                yield CaseFailure(f"not tried, because the load path ended at {force:g} N: {error}")
             return
 
 

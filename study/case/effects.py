@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.pad.backing_plate import relative_compliance
+from softjaw.fem.materials import Material, material
+from softjaw.fem.pad.backing_plate import Sheet, relative_compliance
 from softjaw.friction.patch import FloatArray
-from softjaw.study.case.build import pad_material, pad_shape, sheet
+from softjaw.study.case.build import pad_shape
 from softjaw.study.case.margin import surely_below
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
@@ -34,6 +35,17 @@ SURFACES = {
     "quartic": "convex quartic",
 }
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
+
+
+def pad_material(gripper: Gripper) -> Material:
+    """Foam of the pads."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
+
+
+def sheet(gripper: Gripper) -> Sheet:
+    """Plate behind each pad."""
+    return Sheet(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
 @dataclass(frozen=True)

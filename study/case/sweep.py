@@ -1,6 +1,6 @@
 """From a scene to its axes, its grasp candidates and the units of work that cover every case once.
 
-A unit is the ladder of forces of one candidate at one point of the sweep. Candidates that are images of each other
+A unit is the load path of one candidate at one point of the sweep. Candidates that are images of each other
 under the object's rotational symmetry are served by one unit. Cases are numbered like a C-ordered array over `axes`.
 """
 
@@ -34,7 +34,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Unit:
-    """One ladder of forces, and the rows that it fills.
+    """One load path, and the rows that it fills.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
     forces, count = len(scene.load.normal_force_n), scene.candidates.count
     for point, values in enumerate(product(*scene.sweep.values())):
         here = scene.with_values(dict(zip(scene.sweep, values, strict=True)))
-        places, cost = candidates(here), ladder_cost(here)
+        places, cost = candidates(here), path_cost(here)
         for group in groups(places, axis_symmetry(here)):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))
             served, turns = tuple(places[n] for n, _ in group), tuple(turn for _, turn in group)
@@ -122,8 +122,8 @@ def narrowness(scene: Scene, place: Candidate) -> float:
     return float(r.max() / max(np.interp(place.station, z, r), 0.1 * r.max()))
 
 
-def ladder_cost(scene: Scene) -> float:
-    """Work of one ladder in element solves: forces x elements x nodes per element, and the coarse mesh's share."""
+def path_cost(scene: Scene) -> float:
+    """Work of one load path in element solves: forces x elements x nodes per element, and the coarse mesh's share."""
     nodes = {"hex8": 1, "hex27": 8}[scene.gripper.element]
     coarse = 1 + (scene.accuracy.meshes - 1) / 8
     return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * coarse

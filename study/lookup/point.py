@@ -7,6 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.form import exponents
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.surface import LimitSurface
+from softjaw.lsfit.tilted import TiltedEllipsoid
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.quantities import MAIN, WINDOW
@@ -14,7 +19,6 @@ from softjaw.study.result.layout import MISSING
 from softjaw.study.units import shown_text
 
 if TYPE_CHECKING:
-    from softjaw.lsfit.surface import LimitSurface
     from softjaw.study.lookup import GraspMap
 
 STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
@@ -115,11 +119,6 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
-        from softjaw.lsfit.ellipsoid import Ellipsoid
-        from softjaw.lsfit.form import exponents
-        from softjaw.lsfit.quartic import Quartic
-        from softjaw.lsfit.tilted import TiltedEllipsoid
-
         if finger not in (1, 2):
             raise ValueError(f"finger is {finger!r}: expected 1 or 2")
         if self.shape or self.reason:

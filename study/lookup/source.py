@@ -13,6 +13,8 @@ import xarray as xr
 from softjaw.study.quantities import BY_KEY
 from softjaw.study.result.read import axes_of, maps_in, values_of
 from softjaw.study.result.reading import place_text
+from softjaw.study.scene import parse_scene
+from softjaw.study.scene.problems import SceneError
 from softjaw.study.units import UNITS, split_unit
 
 
@@ -98,9 +100,6 @@ def turning(source: Source) -> tuple[float, bool]:
     Half a turn of the gripper is the same grasp with the fingers exchanged, if both stand alike (roll 0). A scene that
     this version cannot read has a whole turn as its period.
     """
-    from softjaw.study.scene import parse_scene
-    from softjaw.study.scene.problems import SceneError
-
     try:
         scene = parse_scene(source.scene, check_files=False)
         scene = scene.with_values(source.point) if source.point else scene

@@ -6,6 +6,9 @@ import argparse
 from pathlib import Path
 
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.patch.answer import as_json, as_record, grasp_record, judge
+from softjaw.study.patch.reading import Reading, read_patch
+from softjaw.study.patch.text import as_text, write_picture
 
 PICTURES = (".png", ".svg")
 
@@ -22,10 +25,6 @@ def answer_text(options: argparse.Namespace) -> str:
     if options.picture and not options.picture.lower().endswith(PICTURES):
         text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
         raise StudyError(USAGE, f"{text}; for numbers write --json and lead the output into a file")
-    from softjaw.study.patch.answer import as_json, as_record, grasp_record, judge
-    from softjaw.study.patch.reading import Reading, read_patch
-    from softjaw.study.patch.text import as_text, write_picture
-
     reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
     files = [options.file, *([options.other] if options.other else [])]
     patches = [judge(read, options.mu, options.long_side) for read in [read_patch(file, reading) for file in files]]

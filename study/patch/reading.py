@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
 from softjaw.friction.orientation import slivers
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.result.trial import trouble
 from softjaw.study.scene.problems import Problem, closest
 
 ENDINGS = (".csv", ".vtu", ".vtp")
@@ -103,11 +107,9 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
         text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
         raise StudyError(USAGE, f"{text}; export the contact surface alone")
     if ending == ".csv":
-        from softjaw.study.patch.table import read_table
+        from softjaw.study.patch.table import read_table  # which takes the names of columns from here
 
         return checked(read_table(path, reading), reading.flip_normals)
-    from softjaw.study.result.trial import trouble
-
     if why := trouble(lambda: _read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: is damaged ({why}); write it again")
     return checked(_read_vtk(path, reading), reading.flip_normals)
@@ -196,9 +198,6 @@ def _read_vtk(path: Path, reading: Reading) -> Faces:
 
 def _grid(path: Path) -> Any:
     """The data set of a file as an unstructured grid; VTK's own complaints become one sentence."""
-    import pyvista as pv  # slow to import, and not needed for tables
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-
     # VTK writes its complaints past Python's streams
     before, complaints = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(complaints)
@@ -226,8 +225,6 @@ def _grid(path: Path) -> Any:
 
 def _corner_ids(path: Path, grid: Any) -> NDArray[np.int64]:
     """Point numbers around every cell ``(n, k)``, k = 3 or 4; triangles among quadrilaterals repeat the last."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
     kinds, points = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity)
     start = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
     sizes = np.diff(start)

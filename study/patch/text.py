@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.patch.answer import DEFINITIONS, FRICTION, SCORES, SURFACES, UNITS
+from softjaw.study import pictures
+from softjaw.study.messages import write_file
+from softjaw.study.patch.answer import DEFINITIONS, FRICTION, SCORES, SURFACES, UNITS, JudgedPatch
 from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
-from softjaw.study.writing import write_file
-
-if TYPE_CHECKING:
-    from softjaw.study.patch.answer import JudgedPatch
 
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
 PLANES = ((0, 1), (0, 2), (1, 2))
@@ -118,8 +116,6 @@ def write_picture(patches: Sequence[JudgedPatch], kind: str, path: Path) -> None
     StudyError
         With code 5 if the file cannot be written.
     """
-    from softjaw.study import pictures  # loads matplotlib, which the text does not need
-
     with pictures.style():
         drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))
         for row, judged in zip(axes, patches, strict=True):

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softjaw.study.case.sweep import axes
 from softjaw.study.result import interval, window
+from softjaw.study.result.grid import fill_grid
 from softjaw.study.result.layout import Derived
+from softjaw.study.result.result_writer import ResultWriter
 from softjaw.study.scene import Scene
-
-if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 PREDICTED, MEASURED, HELD_OUT = "e_n_error_predicted", "e_n_error_on_probes", "e_n_error_held_out"
@@ -37,8 +35,6 @@ def derived(scene: Scene) -> list[Derived]:
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
     """Fill it, by one rank, after all cases; what a target of accuracy chose is written by who chose it."""
-    from softjaw.study.result.grid import fill_grid
-
     _fill_sweep(writer, scene)
     window.finalise(writer, scene)
     interval.finalise(writer, scene)

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.build import build_object, has_wall, outer_surface
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.grid import NOBODY, Surface
+from softjaw.study.scene.problems import SceneError
 
 ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]
@@ -29,8 +31,6 @@ def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> S
     ValueError, OSError
         The object cannot be built, as when its mesh is not there.
     """
-    from softjaw.study.case.build import build_object, has_wall
-
     here = scene_at(scene, (0,) * (len(axes) - 3) if point is None else point)
     if here is None:
         return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
@@ -50,8 +50,6 @@ def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> S
 
 def scene_at(scene: Any, index: tuple[int, ...]) -> Any:
     """The scene with the values of one point of its sweep; None where these do not fit."""
-    from softjaw.study.scene.problems import SceneError
-
     try:
         return scene.with_values({key: found[i] for (key, found), i in zip(scene.sweep.items(), index, strict=False)})
     except (SceneError, IndexError):
@@ -220,8 +218,6 @@ def undeformed(shape: Any, angle: float) -> np.ndarray | None:
 
     ``angle`` is finger 1's about the axis [rad]. None for shapes without a wall that can be traced.
     """
-    from softjaw.study.case.build import outer_surface
-
     try:
         surface = outer_surface(shape)[0]
     except (AttributeError, OSError, ValueError):

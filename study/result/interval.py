@@ -5,7 +5,7 @@ What has a closed form is taken from it; errors of a few probes are carried to a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,8 @@ from softjaw.study.case.sweep import axes
 from softjaw.study.case.variations import by_formula, variations
 from softjaw.study.flags import LOST
 from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.result.result_writer import ResultWriter
 from softjaw.study.scene import Scene
-
-if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 NAMES = {"e_n": "m", "quality": ""}

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
 from softjaw.study.quantities import FIRST, MODELS
 from softjaw.study.result import checksums, grid
 from softjaw.study.result.datasets import CLOSING, SUMS
@@ -26,7 +26,6 @@ from softjaw.study.result.layout import LABEL, PROGRAM, REPORT, ROOT, SESSIONS, 
 from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.record import text_bytes
 from softjaw.study.result.vtkhdf import head
-from softjaw.study.writing import remove
 
 LIBVER = ("earliest", "v110")
 TEXT = h5py.string_dtype("utf-8")

@@ -53,7 +53,7 @@ def _go_through(result: Result) -> None:
 
 def verify(path: Path, layout: Layout, header: Header) -> None:
     """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
-    from softjaw.study.scene.text import differences
+    from softjaw.study.scene.text import differences  # who only reads results need not load all that checks scenes
 
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:

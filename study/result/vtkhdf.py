@@ -12,8 +12,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from softjaw.study.messages import beside
 from softjaw.study.result.grid import shared_steps, topology
-from softjaw.study.writing import beside
 
 LIBVER = ("earliest", "v110")
 Arrays = Mapping[str, np.ndarray]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softjaw.study.case.build import geometry
 from softjaw.study.case.margin import MARGIN
 from softjaw.study.case.sweep import axes
 from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.result.result_writer import ResultWriter
 from softjaw.study.scene import Scene
-
-if TYPE_CHECKING:
-    from softjaw.study.result.store import ResultWriter
 
 FloatArray = NDArray[np.float64]
 LOW, HIGH = "force_low", "force_high"
@@ -55,9 +52,10 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
 
 def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
-    from softjaw.study.case.wall import thin_body
-
-    limits = {"indentation": scene.object.allowed_dent, "wall_stress": thin_body(scene.object).material.yield_strength}
+    limits = {
+        "indentation": scene.object.allowed_dent,
+        "wall_stress": geometry().material_of(scene.object).yield_strength,
+    }
     values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
     known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)

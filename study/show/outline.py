@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.case.build import outer_surface
 from softjaw.study.result.grid_surface import scene_at
+from softjaw.study.scene import parse_scene
+from softjaw.study.scene.problems import SceneError
 
 
 def read_scene(text: str) -> Any:
     """The scene kept in a result file; None if this version cannot read it."""
-    from softjaw.study.scene import parse_scene
-    from softjaw.study.scene.problems import SceneError
-
     try:
         return parse_scene(text, check_files=False)
     except SceneError:
@@ -46,8 +46,6 @@ def shape_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray] | N
 
 def _stacked_outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
     """Heights and half widths of stacked sections along their wall."""
-    from softjaw.study.case.build import outer_surface
-
     surface = outer_surface(shape)[0]
     theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, 73), np.linspace(*surface.wall, 161), indexing="ij")
     place = surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)

@@ -13,6 +13,9 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+import jinja2
+from plotly.offline import get_plotlyjs
+
 Block = dict[str, Any]
 Section = tuple[str, str, list[Block]]
 FOLDER = "softjaw.study.show.templates"
@@ -88,9 +91,6 @@ def label(words: str) -> str:
 
 def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """The page of sections ``(anchor, heading, blocks)``, the first without a heading; empty ones are left out."""
-    import jinja2
-    from plotly.offline import get_plotlyjs
-
     made = jinja2.Environment(loader=jinja2.PackageLoader(*FOLDER.rsplit(".", 1)), autoescape=True)
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
     shown = [dict(zip(("anchor", "heading", "blocks"), s, strict=True)) for s in sections if s[2]]

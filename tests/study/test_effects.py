@@ -61,7 +61,7 @@ def test_friction_that_does_not_act_back_is_told_where_it_matters(moved, overrid
 
 
 def test_reasons_of_levels_that_no_target_chooses():
-    effects = [result.effects for _, ladder in solved(OVAL) for result in ladder]
+    effects = [result.effects for _, path in solved(OVAL) for result in path]
     for name, level, reason in (
         ("friction", "ccm", "never skipped, because it costs next to nothing"),
         ("limit_surface", "convex quartic", "never skipped, because it costs next to nothing"),

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, rows_of

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study import messages
 from softjaw.study.case.result import TimeLimitError
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import Standing
@@ -331,7 +331,7 @@ def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
 @pytest.mark.long
 @pytest.mark.launches
 @pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
-def test_more_ranks_than_cores_or_ladders(once, shared_path, stations, ranks):
+def test_more_ranks_than_cores_or_load_paths(once, shared_path, stations, ranks):
     path = shared_path / "many.hdf"
     code, _, errors = once(study, ranks, path, "--stations", stations)
     assert code == 0, errors

@@ -34,7 +34,7 @@ def grasps(first, last, count, forces="[1, 2]"):
 
 def values(results, name, force):
     """A map's values of the curved model ``(count,)``, or a finger's, of the first finger."""
-    found = np.array([ladder[force].values[name] for ladder in results])
+    found = np.array([path[force].values[name] for path in results])
     return found if found.ndim == 1 else found[:, 0]
 
 

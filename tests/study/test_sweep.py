@@ -207,9 +207,9 @@ def test_a_swept_roll_turns_the_pads():
 
 def test_finer_meshes_more_forces_and_better_elements_cost_more():
     base = parse_scene(CYLINDER)
-    assert sweep.ladder_cost(base) == 3 * 20 * 10 * 6
+    assert sweep.path_cost(base) == 3 * 20 * 10 * 6
     finer = [{"gripper.element": "hex27"}, {"accuracy.meshes": 2}]
-    assert [sweep.ladder_cost(base.with_values(v)) / sweep.ladder_cost(base) for v in finer] == [8, 1.125]
+    assert [sweep.path_cost(base.with_values(v)) / sweep.path_cost(base) for v in finer] == [8, 1.125]
 
 
 def test_the_bottle_has_70_candidates_and_35_units():

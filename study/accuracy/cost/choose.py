@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,9 @@ from softjaw.study.accuracy.cost.errors import KnobErrors, best_known, flagged, 
 from softjaw.study.accuracy.cost.knobs import Level
 from softjaw.study.accuracy.cost.measure import Measured, measure
 from softjaw.study.accuracy.cost.study import Costs, CostStudy, same, setting_of
+from softjaw.study.case.probes import Probe
 from softjaw.study.scene import Scene
 from softjaw.study.scene.text import value_text
-
-if TYPE_CHECKING:
-    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 NO_LOSS = ("load steps", "gap collocation", "effect: wrench", "effect: model size", "effect: fingers")

@@ -7,8 +7,12 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError
-from softjaw.study.writing import write_file
+from softjaw.study.accuracy.cost.page import cost_page, sentences
+from softjaw.study.accuracy.cost.study import Measuring, costs, load, new_study
+from softjaw.study.case.build import check_object
+from softjaw.study.case.probes import probes
+from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError, write_file
+from softjaw.study.scene.text import differences
 
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS")
 
@@ -19,10 +23,6 @@ def run(options: Namespace, scene: Any) -> None:
     path = Path(options.output or f"results/{Path(options.scene).stem}-cost.hdf")
     if path.suffix != ".hdf":
         raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in .hdf; write -o {path}.hdf")
-    from softjaw.study.accuracy.cost.study import Measuring, costs, load, new_study
-    from softjaw.study.case.build import check_object
-    from softjaw.study.case.probes import probes
-
     check_object(scene)
     found, what = probes(scene, options.candidates), costs(scene)
     title = getattr(scene.object, "name", None) or Path(options.scene).stem
@@ -42,8 +42,6 @@ def run(options: Namespace, scene: Any) -> None:
 
 def _conclude(study: Any, what: Any, path: Path) -> None:
     """Write page and picture, print the answer."""
-    from softjaw.study.accuracy.cost.page import cost_page, sentences
-
     if all(m.message for m in study.of(study.base)):
         text = f"no probe could be solved with the scene as it is: {study.of(study.base)[0].message}"
         raise StudyError(OTHER_FILE, text)
@@ -59,8 +57,6 @@ def _conclude(study: Any, what: Any, path: Path) -> None:
 
 def check_same(path: Path, old: Any, digest: str, scene: str, candidates: list[str]) -> None:
     """Refuse to go on with a study of another scene or other candidates."""
-    from softjaw.study.scene.text import differences
-
     other = "choose another file with -o, or move this one away"
     if old.digest != digest:
         raise StudyError(OTHER_FILE, f"{path}: made from another scene ({differences(old.scene, scene)}); {other}")

@@ -61,14 +61,14 @@ def solved(probe: Probe) -> SolvedProbe:
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in probe.unit.candidate.poses]
 
-    def climb() -> list[list[Contact]]:
+    def solve() -> list[list[Contact]]:
         solving = solver(scene, fingers, probe.unit.candidate.poses)
         try:
-            return [[c for c, *_ in outcome.contacts] for outcome in solving.ladder(probe.forces)]
+            return [[c for c, *_ in outcome.contacts] for outcome in solving.load_path(probe.forces)]
         finally:
             solving.destroy()
 
-    seconds, contacts = cpu_seconds(climb)
+    seconds, contacts = cpu_seconds(solve)
     return SolvedProbe(probe, obj, contacts, seconds / len(probe.forces))
 
 

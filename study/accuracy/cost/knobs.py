@@ -13,6 +13,7 @@ from typing import Any, get_args
 
 from softjaw.study.case.build import has_wall
 from softjaw.study.quantities import EFFECTS
+from softjaw.study.run.plan import wall_size
 from softjaw.study.scene import Scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.sections import Effects, WallSize
@@ -126,8 +127,6 @@ def refusal(scene: Scene, level: Level) -> str:
 
 def weight(scene: Scene) -> float:
     """Expected time of one force, in any unit: by the unknowns of pad and wall, and by what effects cost."""
-    from softjaw.study.run.plan import wall_size
-
     times = 1.0
     for key, levels in DEARER.items():
         section, _, name = key.partition(".")

@@ -6,16 +6,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.contact.pattern import Pattern
+from softjaw.fem.petsc import Factors
+from softjaw.study import pipeline
 from softjaw.study.accuracy.cost.knobs import EACH_ALONE, Level, with_level
+from softjaw.study.case.probes import Probe
 from softjaw.study.case.result import CaseFailure
-
-if TYPE_CHECKING:
-    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -134,8 +135,6 @@ def ladders_of(forces: Sequence[float], between: int) -> list[tuple[float, ...]]
 
 
 def _climb(unit: Any, forces: Sequence[float]) -> tuple[dict[float, Case], str]:
-    from softjaw.study import pipeline  # loads PETSc, which is not needed to read a study
-
     found: dict[float, Case] = {}
     message = ""
     try:
@@ -167,9 +166,6 @@ def calibration_seconds() -> float:
 
     Runs on two machines compare by their seconds over this one.
     """
-    from softjaw.fem.contact.pattern import Pattern
-    from softjaw.fem.petsc import Factors
-
     n = CALIBRATION
     number = np.arange(n**3, dtype=np.int32).reshape(n, n, n)
     pairs = [(np.delete(number, -1, axis).ravel(), np.delete(number, 0, axis).ravel()) for axis in range(3)]

@@ -11,13 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.accuracy.cost.errors import KnobErrors, tables
+from softjaw.study.accuracy.cost.judging import judge, solved
 from softjaw.study.accuracy.cost.knobs import (
     EACH_ALONE,
     Knob,
@@ -30,15 +31,12 @@ from softjaw.study.accuracy.cost.knobs import (
     with_level,
 )
 from softjaw.study.accuracy.cost.measure import QUANTITIES, UNITS, Measured, calibration_seconds, measure, warm_up
-from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.case.probes import Probe
+from softjaw.study.messages import OTHER_FILE, StudyError, beside
 from softjaw.study.result import provenance
 from softjaw.study.result.guarded import GuardedFile, opened
 from softjaw.study.run.progress import duration
 from softjaw.study.scene import Scene
-from softjaw.study.writing import beside
-
-if TYPE_CHECKING:
-    from softjaw.study.case.probes import Probe
 
 FIRST_GUESS = 2e-8  # seconds of one force over `weight`, before anything is measured
 PROGRAM, KIND, VERSION = "softjaw", "cost study", 2
@@ -330,8 +328,6 @@ class Measuring:
         if level is not None:
             solve = lambda probe: replace(measure(task.setting, probe, level), what=task.name)  # noqa: E731
         else:
-            from softjaw.study.accuracy.cost.judging import judge
-
             contacts = dict(zip((p.label for p in self.probes), self._solved(), strict=False))
             if not contacts:
                 return
@@ -344,8 +340,6 @@ class Measuring:
 
     def _solved(self) -> list[Any]:
         """Contacts of all probes at the scene's own settings, solved once; of none where one fails."""
-        from softjaw.study.accuracy.cost.judging import solved
-
         if not self._contacts:
             try:
                 self._contacts = [solved(p) for p in self.probes]

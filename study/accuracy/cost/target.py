@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +22,12 @@ from softjaw.study.accuracy.cost.knobs import Knob, Level, contact_knobs, weight
 from softjaw.study.accuracy.cost.measure import Measured, measure_once, warm_up
 from softjaw.study.accuracy.cost.study import CostStudy, costs, load, new_study, plain, save, setting_of
 from softjaw.study.case import sweep
+from softjaw.study.case.probes import Probe, demanding, held_out, probes, probes_at
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.derived import MEANING
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.scene.text import changes, toml_text
-
-if TYPE_CHECKING:
-    from softjaw.study.case.probes import Probe
 
 FloatArray = NDArray[np.float64]
 FORMAL = 2.0  # highest order that is believed
@@ -82,8 +80,6 @@ def _fresh(scene: Scene, output: Path, say: Callable[[str], None]) -> Choice:
 
 
 def _from_file(scene: Scene, say: Callable[[str], None]) -> Choice:
-    from softjaw.study.case.probes import held_out, probes  # loads PETSc
-
     path = Path(str(scene.accuracy.cost_file))
     study = load(path)
     measured = stored_scene(path, study)
@@ -124,12 +120,8 @@ def refuse_other(path: Path, scene: Scene, measured: Scene) -> None:
 
 
 def expected(scene: Scene) -> str:
-    """What ``check`` can say of the target without solving anything; empty where the scene names none."""
-    if scene.accuracy.e_n is None:
-        return ""
+    """What ``check`` can say of the target that a scene's cost study has measured, without solving anything."""
     goal = f"e_n within {100 * scene.accuracy.e_n:g} %"
-    if scene.accuracy.cost_file is None:
-        return f"{goal}: the mesh is chosen when the run starts, by solving some ten cases on several meshes"
     path = Path(scene.accuracy.cost_file)
     study = load(path)
     measured = stored_scene(path, study)
@@ -165,8 +157,6 @@ def _open(knob: Knob | None, given: Mapping[str, Any]) -> list[Level]:
 
 def quick_probes(scene: Scene) -> tuple[list[Probe], list[Probe], int]:
     """Probes at the lowest and the highest force, the cases that the choice is tried on, and all cases of the run."""
-    from softjaw.study.case.probes import demanding, held_out, probes_at  # loads PETSc
-
     units, forces = sweep.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
     found = probes_at(scene, demanding(units), tuple(dict.fromkeys((forces[0], forces[-1]))))
     return found, held_out(scene, found), len(units) * len(forces)

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import io
 import os
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError, first_rank
+import numpy as np
+
+from softjaw.study import pictures
+from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError, first_rank, write_file
+from softjaw.study.result.layout import DONE as SOLVED
+from softjaw.study.result.store import open_result
+from softjaw.study.show.data import Data
 from softjaw.study.show.figures import JOBS
-from softjaw.study.writing import write_file
-
-if TYPE_CHECKING:
-    from softjaw.study.show.figures.table import Figure
+from softjaw.study.show.figures.table import EVERY, FIGURES, Figure, find
 
 FOLDER = "results/figures"
 DPI = 140
-
-
-def add_options(parser: ArgumentParser) -> None:
-    """The options of the command."""
-    parser.add_argument("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
-    parser.add_argument("-o", metavar="PNG", dest="output",
-                        help=f"picture, or folder for several (default: {FOLDER})")  # fmt: skip
-    parser.add_argument("--results", metavar="FOLDER", default="results",
-                        help="where the scenes' results are or will be (default: results)")  # fmt: skip
 
 
 def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
@@ -58,8 +52,6 @@ def chosen(names: list[str]) -> list[Figure]:
     StudyError
         For a name that no figure has.
     """
-    from softjaw.study.show.figures.table import EVERY, FIGURES, find
-
     found = {name: find(name) for name in names}
     if strange := [name for name, figures in found.items() if not figures]:
         known = ", ".join(one.name for one in FIGURES)
@@ -97,13 +89,6 @@ def draw(one: Figure, results: dict[str, Path], path: Path) -> str:
     StudyError
         If cases failed that the figure cannot do without, or the file cannot be written.
     """
-    import numpy as np
-
-    from softjaw.study import pictures
-    from softjaw.study.result.layout import DONE as SOLVED
-    from softjaw.study.result.store import open_result
-    from softjaw.study.show.data import Data
-
     with ExitStack() as stack, pictures.style():
         opened = [stack.enter_context(open_result(results[scene])) for scene in one.scenes]
         for result in opened:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
+from softjaw.study.scene import load_scene
 from softjaw.study.show.data import Data, number
 from softjaw.study.show.figures import JOBS, WIDTH
 from softjaw.study.show.outline import read_scene, shape_outline
@@ -54,8 +55,6 @@ def candidates(data: Data) -> tuple[Any, str]:
 
 def candidate_marks() -> np.ndarray:
     """Where the fingers of the map's candidates touch ``(2 c, 3)`` [m]."""
-    from softjaw.study.scene import load_scene
-
     scene = load_scene(JOBS / f"{MAP}.toml")
     found = []
     for angle in scene.candidates.angles:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.result.grid_surface import edges
 from softjaw.study.result.layout import FAILED
 from softjaw.study.result.store import open_result
@@ -21,8 +21,9 @@ from softjaw.study.show.data import Data, number, shown
 from softjaw.study.show.outline import read_scene, swept_object
 from softjaw.study.show.page import Block, Section, box, heading, page, text
 from softjaw.study.show.page import answer as answer_block
-from softjaw.study.show.report import curves, maps, tables, verdict
-from softjaw.study.writing import write_file
+from softjaw.study.show.report import contact, curves, maps, tables, verdict
+from softjaw.study.show.view.model import View, view_of
+from softjaw.study.show.view.object3d import object_block
 
 Place = tuple[float | None, float | None]
 
@@ -49,8 +50,6 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
 
 def build(result: Any, candidate: int | None = None, place: Place = (None, None)) -> tuple[str, bytes]:
     """The page and the picture of an open result file."""
-    from softjaw.study.show.view.model import view_of
-
     data, scene = Data(result), read_scene(result.scene)
     if candidate is not None or place != (None, None):
         data.chosen = view_of(data, candidate, place, None)[1]
@@ -94,9 +93,6 @@ def answer(data: Data, scene: Any) -> list[Block]:
 
 def the_object(data: Data, best: tuple[int, ...]) -> list[Block]:
     """The object in three dimensions with the pads of the best and of the chosen grasp at every force."""
-    from softjaw.study.show.view.model import View
-    from softjaw.study.show.view.object3d import object_block
-
     view = View(data, best[:-3])
     cases = [(*i[:-1], k) for i in (best, data.chosen) if i and i[:-3] == best[:-3] for k in range(len(data.forces))]
     if block := object_block(view, best, data.score, "x", list(dict.fromkeys(cases))):
@@ -118,9 +114,6 @@ def wall(data: Data, scene: Any) -> list[Block]:
 
 def cases(data: Data, scene: Any, best: tuple[int, ...]) -> list[Section]:
     """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
-    from softjaw.study.show.report import contact
-    from softjaw.study.show.view.model import View
-
     roles = [("Best case", best)]
     if data.chosen is not None and data.other[0] == data.chosen:
         roles.append(("Chosen candidate", data.chosen))

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from softjaw.study.case.build import axis_span, geometry, has_wall, warnings
+from softjaw.study.case.variations import changes
 from softjaw.study.units import UNITS, shown, shown_text
 
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
-    # here and below: who only reads results must not load all that checks scenes
-    from softjaw.study.case.build import has_wall, warnings
-
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
     where = (
@@ -57,6 +56,10 @@ def _target(scene: Any) -> str:
     """What will be chosen for a target of accuracy; empty without one."""
     if scene.accuracy.e_n is None:
         return ""
+    if scene.accuracy.cost_file is None:
+        goal = f"e_n within {100 * scene.accuracy.e_n:g} %"
+        return f"{goal}: the mesh is chosen when the run starts, by solving some ten cases on several meshes"
+    # loads PETSc, which only a measured study needs
     from softjaw.study.accuracy.cost.target import expected
 
     return expected(scene)
@@ -67,8 +70,6 @@ def _intervals(scene: Any) -> str:
     own = scene.uncertainty
     if not own.parts:
         return ""
-    from softjaw.study.case.variations import changes
-
     more = len(changes(scene))
     count = own.probes if isinstance(own.probes, int) else len(own.probes)
     cost = f"{count} candidates are solved {more} more time{'s' * (more > 1)}" if more else "no further solves"
@@ -77,14 +78,9 @@ def _intervals(scene: Any) -> str:
 
 def wall_text(shape: Any) -> str:
     """Thickness, material and support of an object's wall; empty for a rigid object."""
-    from softjaw.study.case.build import has_wall
-
     if not has_wall(shape):
         return ""
-    from softjaw.fem.shell.wall_material import wall_material
-
-    name = None if shape.wall_material == "custom" else shape.wall_material
-    found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+    found = geometry().material_of(shape)
     given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
     strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""
@@ -115,8 +111,6 @@ def compliance_text(scene: Any) -> str:
 
 def _extent(shape: Any) -> str:
     """Where the object begins and ends along its axis, and for a mesh what that is counted from."""
-    from softjaw.study.case.build import axis_span
-
     span = axis_span(shape)
     if span is None:
         return ", without end along its axis"

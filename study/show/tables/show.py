@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,23 +16,8 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import csv_text, with_unit
 from softjaw.study.show.tables.ranking import borne_level, judged, nearest, passed_over, ranking
-from softjaw.study.show.tables.show_text import Columns, alike
+from softjaw.study.show.tables.show_text import Columns, Table, alike
 from softjaw.study.show.tables.show_text import as_text as as_text
-
-
-@dataclass(frozen=True)
-class Table:
-    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
-
-    An error stands behind the quantity it belongs to, relative unless the column has a unit; an interval is in the unit
-    of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
-    """
-
-    title: str
-    columns: Columns
-    rows: tuple[tuple[Any, ...], ...]
-    force: float
-    verdict: str = ""
 
 
 def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from softjaw.study.flags import flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, MAIN, MODELS, WINDOW
 from softjaw.study.show.tables.columns import PAPER, aligned, digits, fitting, two_lines, wrapped
 from softjaw.study.units import shown, shown_unit
-
-if TYPE_CHECKING:
-    from softjaw.study.show.tables.show import Table
 
 Columns = tuple[tuple[str, str], ...]  # names and units
 WINDOW_MEANS = "normal forces that hold the object, if its mass is given, and that its wall bears, as far as was solved"
@@ -25,6 +22,21 @@ INTERVAL_MEANS = (
 )
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 FLAGS_WIDTH, LABEL_WIDTH = 18, 28
+
+
+@dataclass(frozen=True)
+class Table:
+    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
+
+    An error stands behind the quantity it belongs to, relative unless the column has a unit; an interval is in the unit
+    of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
+    """
+
+    title: str
+    columns: Columns
+    rows: tuple[tuple[Any, ...], ...]
+    force: float
+    verdict: str = ""
 
 
 def as_text(table: Table, width: int = PAPER) -> str:

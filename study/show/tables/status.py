@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
@@ -13,10 +14,18 @@ from softjaw.study.quantities import PARTS, STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.reading import place_text
+from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
+
+
+def status(options: Namespace) -> str:
+    """Say what a result file holds so far, as text, JSON or CSV."""
+    forms = {"json": status_json, "csv": status_csv}
+    with open_result(options.file) as result:
+        return forms[options.form](result) if options.form else status_text(result, terminal_width())
 
 
 def status_text(result: Any, width: int = PAPER) -> str:
@@ -66,21 +75,6 @@ def place(result: Any, row: int) -> str:
 def _place(result: Any, row: int) -> list[float]:
     index = np.unravel_index(row, result.layout.shape)
     return [float(axis.values[i]) for axis, i in zip(result.axes, index, strict=True)]
-
-
-def summary(result: Any) -> str:
-    """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
-    # here and not above: 'status' must not wait for xarray
-    from softjaw.study.result.read import dataset
-    from softjaw.study.show.tables.show import as_text, best
-
-    width = terminal_width()
-    table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
-    missing = int(np.sum(result.status == MISSING))
-    more = f"; {missing} cases are missing, the same command goes on" if missing else ""
-    return "\n".join(
-        [counts(result), *reasons(result, width), *time_split(result), *table, f"results are in {result.path}{more}"]
-    )
 
 
 def counts(result: Any) -> str:

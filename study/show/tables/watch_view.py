@@ -14,9 +14,11 @@ from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
+from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import Progress, duration
 from softjaw.study.show.tables.columns import terminal_width, wrapped
+from softjaw.study.show.tables.show import best
 from softjaw.study.show.tables.status import place, reasons
 from softjaw.study.units import shown_text
 
@@ -109,9 +111,6 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     solved = (codes.reshape(-1, result.layout.shape[-1]) == DONE).any(axis=0)
     if not solved.any():
         return "best so far: none is solved yet"
-    from softjaw.study.result.read import dataset
-    from softjaw.study.show.tables.show import best
-
     table = best(dataset(result), float(result.axes[-1].values[np.flatnonzero(solved)[-1]]), top=1)
     row = dict(zip((name for name, _ in table.columns), table.rows[0], strict=True))
     where = [f'"{row["label"]}"'] if "label" in row else []
