@@ -23,10 +23,10 @@ from softjaw.scoring.polytope import polytope_volume
 from softjaw.study import pictures
 from softjaw.study.case import effects, model, wall
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
 from softjaw.study.case.solving import Solver, solver
-from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
 from softjaw.study.scene.sections import LimitSurface
 

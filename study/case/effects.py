@@ -14,7 +14,7 @@ from softjaw.fem.materials import Material, material
 from softjaw.fem.pad.backing_plate import Sheet, relative_compliance
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_shape
-from softjaw.study.case.margin import surely_below
+from softjaw.study.case.result import surely_below
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper

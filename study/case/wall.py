@@ -16,7 +16,7 @@ from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_fa
 from softjaw.fem.shell.wall_material import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
-from softjaw.study.case.margin import MARGIN, surely_below
+from softjaw.study.case.result import MARGIN, surely_below
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene

@@ -15,7 +15,7 @@ from typing import Any
 from softjaw.study.cli.options import program
 from softjaw.study.doctor import keep_compiled_loops, pin_threads
 from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, say
-from softjaw.study.run.memory import is_out_of_memory, no_room, require_room
+from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost", "figure")

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from softjaw.study.case.sweep import axes
+from softjaw.study.case.candidates import axes
 from softjaw.study.result import interval, window
 from softjaw.study.result.grid import fill_grid
 from softjaw.study.result.layout import Derived

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.study.case.build import geometry
-from softjaw.study.case.margin import MARGIN
-from softjaw.study.case.sweep import axes
+from softjaw.study.case.candidates import axes
+from softjaw.study.case.result import MARGIN
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.result.result_writer import ResultWriter
 from softjaw.study.scene import Scene

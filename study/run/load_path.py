@@ -15,9 +15,8 @@ from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Standing
 from softjaw.study.result.record import record
-from softjaw.study.run.memory import is_out_of_memory
+from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.schedule import LostRanks
-from softjaw.study.run.stopping import AbandonedError, Stopper
 
 DEADLY = 2
 KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.objects.outer_surface import Turned
-from softjaw.study.case import sweep
+from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, pad_shape
 from softjaw.study.case.variations import changes, probe_candidates, with_probes
 from softjaw.study.quantities import ALONG, AROUND
@@ -57,9 +57,9 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     check_object(scene)
     patches = scene.output.patches != "none"
     front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
-    axes = tuple(sweep.axes(scene))
+    axes = tuple(grasps.axes(scene))
     surface = surface_of(scene, axes)
-    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    units = grasps.units(scene, lambda point: point.axis_symmetry)
     probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
@@ -68,7 +68,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         scene_file=scene_file,
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
-        labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
+        labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
         surface=surface,
     )
     layout = Layout(

@@ -23,12 +23,11 @@ from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, Standing
 from softjaw.study.result.store import ResultWriter, create, open_result, torn_rows, verify
+from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, settle
-from softjaw.study.run.memory import limited_memory
 from softjaw.study.run.plan import Plan, by_cost
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.schedule import Claims, LostRanks
-from softjaw.study.run.stopping import GRACE, Stopper
 
 T = TypeVar("T")
 
@@ -50,7 +49,7 @@ class Work:
     time_limit : float
         Of a single case [s].
     memory : float, "auto" or "none"
-        As for `study.run.memory.limited_memory`.
+        As for `study.run.limits.limited_memory`.
     """
 
     solve_unit: Callable[[Any], Iterable[tuple[int, Any]]]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.margin import TIE
+from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST
 from softjaw.study.quantities import SINGULAR
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT

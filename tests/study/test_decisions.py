@@ -54,7 +54,7 @@ def test_equal_grasps_keep_their_order(values, seed):
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
-    from softjaw.study.case.margin import TIE
+    from softjaw.study.case.result import TIE
     from softjaw.study.show.tables.ranking import falling
 
     order = falling(np.array(values))
@@ -233,8 +233,8 @@ def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
 @pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
 def test_equal_places_give_the_first_ones_as_probes(shift):
     """Pads all along a cylinder touch it alike, but for rounding."""
+    from softjaw.study.case.candidates import units
     from softjaw.study.case.probes import demanding, spread
-    from softjaw.study.case.sweep import units
     from softjaw.study.scene import parse_scene
 
     text = """

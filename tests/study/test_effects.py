@@ -13,9 +13,9 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.effects import coupling_level, neglected_traction
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved

@@ -23,9 +23,8 @@ from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyErro
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import Standing
 from softjaw.study.result.store import open_result
-from softjaw.study.run import memory
-from softjaw.study.run.memory import available, limited_memory
-from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper
+from softjaw.study.run import limits
+from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 
@@ -48,7 +47,7 @@ def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
 
 
 def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
-    monkeypatch.setattr("softjaw.study.run.stopping.AGAIN", 0.05)
+    monkeypatch.setattr("softjaw.study.run.limits.AGAIN", 0.05)
 
     def deaf():
         with contextlib.suppress(TimeLimitError):  # as what is raised inside a finaliser is
@@ -149,10 +148,10 @@ def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path,
     files = {"memory.max": "8000000000", "memory.current": "7000000000", "memory.stat": "inactive_file 3000000000\n"}
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    monkeypatch.setattr(memory, "CGROUPS", tmp_path)
-    ask = memory._lines
+    monkeypatch.setattr(limits, "CGROUPS", tmp_path)
+    ask = limits._lines
     asked = {"/proc/self/cgroup": ["0::/"], "/proc/meminfo": ["MemAvailable:   9000000 kB"]}
-    monkeypatch.setattr(memory, "_lines", lambda path: asked.get(str(path)) or ask(path))
+    monkeypatch.setattr(limits, "_lines", lambda path: asked.get(str(path)) or ask(path))
     assert available() == 4e9  # 8 - 7 + 3 GB; the machine itself would have 9.2
     (tmp_path / "memory.max").write_text("max\n")
     assert available() == 1024 * 9e6

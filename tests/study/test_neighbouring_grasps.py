@@ -11,7 +11,7 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
-from softjaw.study.case.sweep import units
+from softjaw.study.case.candidates import units
 from softjaw.study.scene import load_scene
 from tests.friction.test_torque import centred, two_ends
 from tests.study.launching import ROOT

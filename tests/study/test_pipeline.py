@@ -14,8 +14,8 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import solving
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
 from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS

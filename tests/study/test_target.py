@@ -118,8 +118,8 @@ def test_the_hardest_contact_is_a_probe():
 
     At the other stations it misses less than 1 %.
     """
+    from softjaw.study.case.candidates import units
     from softjaw.study.case.probes import demanding
-    from softjaw.study.case.sweep import units
     from softjaw.study.scene import load_scene
 
     bottle = load_scene("jobs/bottle-rigid.toml", ["candidates.stations_mm=[25, 64.7, 69.1, 104.4, 113.2, 130.9]"])
@@ -281,8 +281,8 @@ def test_a_target_is_kept_on_five_cases_held_out_or_it_is_said_that_it_is_not(te
     from softjaw.study.accuracy.cost.measure import measure_once
     from softjaw.study.accuracy.cost.study import new_study
     from softjaw.study.accuracy.cost.target import quick_choice, quick_probes
+    from softjaw.study.case.candidates import units
     from softjaw.study.case.probes import Probe
-    from softjaw.study.case.sweep import units
 
     own = scene(text, [f"accuracy.e_n={target}"])
     found, others, cases = quick_probes(own)

@@ -10,8 +10,8 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import wall
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
 from softjaw.study.scene import parse_scene

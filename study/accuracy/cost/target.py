@@ -21,7 +21,7 @@ from softjaw.study.accuracy.cost.errors import flagged, flags_of, limit, places,
 from softjaw.study.accuracy.cost.knobs import Knob, Level, contact_knobs, weight, with_level
 from softjaw.study.accuracy.cost.measure import Measured, measure_once, warm_up
 from softjaw.study.accuracy.cost.study import CostStudy, costs, load, new_study, plain, save, setting_of
-from softjaw.study.case import sweep
+from softjaw.study.case import candidates as grasps
 from softjaw.study.case.probes import Probe, demanding, held_out, probes, probes_at
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.derived import MEANING
@@ -157,7 +157,7 @@ def _open(knob: Knob | None, given: Mapping[str, Any]) -> list[Level]:
 
 def quick_probes(scene: Scene) -> tuple[list[Probe], list[Probe], int]:
     """Probes at the lowest and the highest force, the cases that the choice is tried on, and all cases of the run."""
-    units, forces = sweep.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
+    units, forces = grasps.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
     found = probes_at(scene, demanding(units), tuple(dict.fromkeys((forces[0], forces[-1]))))
     return found, held_out(scene, found), len(units) * len(forces)
 
