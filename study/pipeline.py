@@ -15,7 +15,7 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.effects import effects_of
+from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
@@ -60,7 +60,9 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values, patch, flag_sentences(values["maps/flags"]), effects_of(scene, fine, fits, solving))
+    return CaseResult(
+        values, patch, flag_sentences(values["maps/flags"]), effects_of(Simulated(scene, fine, fits, solving))
+    )
 
 
 def _probed(result: CaseResult, probing: Probing) -> CaseResult:

@@ -149,7 +149,8 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_SHEET * on)
     assert effects.sheet_level(scene).elastic
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
-    reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
+    case = effects.Simulated(scene, [SimpleNamespace(state=None)], [], SimpleNamespace(level=None))
+    reason = effects.LEVELS["friction_pressure_coupling"](case)[2]
     assert effects.REASONS[reason].startswith("left out")
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
     for indentation, ratio, level in (
