@@ -16,7 +16,6 @@ from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasp_checks import station_warnings
-from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.sections import Gripper
 
 
@@ -28,7 +27,7 @@ def geometry() -> Any:
 
 
 @lru_cache(maxsize=8)
-def build_object(shape: Shape) -> GapObject:
+def build_object(shape: Any) -> GapObject:
     """Object of a scene's section ``[object]``.
 
     Raises
@@ -54,7 +53,7 @@ def build_object(shape: Shape) -> GapObject:
 
 
 @lru_cache(maxsize=8)
-def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
+def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
     """Outer surface of an object that can have a wall, and whether it is a body of revolution.
 
     Raises
@@ -76,7 +75,7 @@ def has_wall(shape: Any) -> bool:
     return getattr(shape, "wall", None) is not None
 
 
-def shapes_of(scene: Scene) -> list[Shape]:
+def shapes_of(scene: Scene) -> list[Any]:
     """The object at every point of the sweep, each once."""
     swept = {key: values for key, values in scene.sweep.items() if key.startswith("object.")}
     if not swept:
@@ -113,7 +112,7 @@ def check_object(scene: Scene) -> None:
             _check_stations(scene, shape)
 
 
-def _check_stations(scene: Scene, mesh: Shape) -> None:
+def _check_stations(scene: Scene, mesh: Any) -> None:
     low, high = axis_span(mesh) or (-math.inf, math.inf)
     beside = [s for s in scene.candidates.station_values_mm if not low <= s <= high]
     if beside:
@@ -125,7 +124,7 @@ def _check_stations(scene: Scene, mesh: Shape) -> None:
         )
 
 
-def axis_span(shape: Shape) -> tuple[float, float] | None:
+def axis_span(shape: Any) -> tuple[float, float] | None:
     """Where the object begins and ends along its axis [mm]; None where it has no end."""
     if shape.shape != "mesh":
         return shape.spans_mm.get("z")

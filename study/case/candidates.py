@@ -125,10 +125,10 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
     float or None
         Angle in [0, 2 pi) [rad].
     """
-    turns = [turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True)]
-    if None in turns or abs(math.remainder(turns[0] - turns[1], 2 * math.pi)) > ALIKE:
+    one, two = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
+    if one is None or two is None or abs(math.remainder(one - two, 2 * math.pi)) > ALIKE:
         return None
-    return 0.0 if abs(turns[0]) <= ALIKE else turns[0] % (2 * math.pi)
+    return 0.0 if abs(one) <= ALIKE else one % (2 * math.pi)
 
 
 def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import OuterSurface, Turned
+from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport, traced
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Mesh, Walled
 
 
 @lru_cache(maxsize=8)
-def mesh_object(shape: Mesh) -> GapObject:
+def mesh_object(shape: Mesh) -> MeshObject:
     """The object of a mesh file; `ValueError` for a mesh that is open or crosses itself."""
     return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
 
@@ -58,7 +58,7 @@ def material_of(shape: Walled) -> WallMaterial:
     return wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
 
 
-def check_wall(shape: Walled, surface: OuterSurface) -> None:
+def check_wall(shape: Any, surface: OuterSurface) -> None:
     """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely.
 
     Raises
@@ -77,9 +77,12 @@ def check_wall(shape: Walled, surface: OuterSurface) -> None:
 
 
 def wall_lines(
-    scene: Scene, turned: Turned, heights: tuple[float, float], half: float, mirrors: tuple[bool, bool]
+    scene: Any, turned: Any, heights: tuple[float, float], half: float, mirrors: tuple[bool, bool]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lines of a wall's mesh round the object [rad] and along its outline, finer between ``heights`` [m]."""
+    """Lines of a wall's mesh round the object [rad] and along its outline, finer between ``heights`` [m].
+
+    ``scene`` is a `Scene` whose object has a wall, ``turned`` its outer surface as the fingers see it.
+    """
     accuracy = scene.accuracy
     size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
     return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top, 0.0)

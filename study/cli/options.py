@@ -8,7 +8,7 @@ import math
 import shutil
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import IO, Any
+from typing import Any
 
 from softjaw.study.messages import MEANING, first_rank
 
@@ -62,7 +62,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
 class Parser(argparse.ArgumentParser):
     """Speaks on the first rank only, whatever started the ranks, and suggests what an unknown word may have meant."""
 
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+    def _print_message(self, message: str, file: Any = None) -> None:
         if first_rank():
             super()._print_message(message, file)
 

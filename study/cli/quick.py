@@ -25,7 +25,8 @@ def init(options: Namespace) -> str:
 
 def _mesh_size(options: Namespace) -> list[float]:
     """Extents across and along the axis [mm] of a mesh that a study can take."""
-    shape = Mesh(shape="mesh", mesh=str(Path(options.mesh).absolute()), unit=options.unit, axis=options.axis)
+    mesh = str(Path(options.mesh).absolute())
+    shape = Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": options.axis})
     try:
         bounds: Any = build_object(shape).bounds
     except (ValueError, OSError) as error:

@@ -55,7 +55,8 @@ class Stopper:
         self.name = ""
         self.limit = limit
         self._on_stop, self._last_resort = on_stop, last_resort
-        self._solving, self._before = False, {}
+        self._solving = False
+        self._before: dict[signal.Signals, Any] = {}
         self._leave = self._case_ends = math.inf
 
     def __enter__(self) -> Stopper:
@@ -81,7 +82,7 @@ class Stopper:
         self._case_ends = time.monotonic() + self.limit
         self._set_alarm()
         if self._last_resort is not None:  # in a thread that needs nothing of Python, which may never be back
-            faulthandler.dump_traceback_later(self._last_resort, exit=True, file=sys.__stderr__)
+            faulthandler.dump_traceback_later(self._last_resort, exit=True, file=sys.__stderr__ or sys.stderr)
         self._solving = True
         try:
             yield
