@@ -23,10 +23,10 @@ from softjaw.scoring.bodies import polytope_volume
 from softjaw.study import pictures
 from softjaw.study.case import effects, model, wall
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
 from softjaw.study.case.solving import Solver, solver
-from softjaw.study.case.sweep import units
 from softjaw.study.scene import Scene, load_scene, parse_scene
 from softjaw.study.scene.sections import LimitSurfaceKeys
 
@@ -94,12 +94,12 @@ def solvers(scene: Scene, **levels: str) -> Iterator[Solver]:
         solving.destroy()
 
 
-def climb(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:
-    """Contacts by candidate and force; ladders end where they have no solution."""
+def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:
+    """Contacts by candidate and force; load paths end where they have no solution."""
     found = {}
     for n, solving in enumerate(solvers(scene, **levels)):
         try:
-            for force, outcome in zip(scene.load.normal_force, solving.ladder(scene.load.normal_force), strict=True):
+            for force, outcome in zip(scene.load.normal_force, solving.load_path(scene.load.normal_force), strict=True):
                 found[n, force] = [c for c, *_ in outcome.contacts]
         except (CheckError, ConvergenceError):
             continue
@@ -147,10 +147,10 @@ def rigid_rows() -> Iterator[Row]:
     for label, scene in rigid_scenes():
         compliance = effects.backing_plate_level(scene).compliance
         plain = {"sheet": "rigid"}
-        foam, plate = climb(scene, **plain), climb(scene, sheet="elastic")
-        coupled = climb(scene, **plain, friction_pressure_coupling="tangential")
+        foam, plate = contacts_at(scene, **plain), contacts_at(scene, sheet="elastic")
+        coupled = contacts_at(scene, **plain, friction_pressure_coupling="tangential")
         coarse = scene.with_values({"gripper.elements": [12, 6, 4]})
-        part, whole = climb(coarse, **plain), climb(coarse, **plain, model_size="full")
+        part, whole = contacts_at(coarse, **plain), contacts_at(coarse, **plain, model_size="full")
         for key, contacts in foam.items():
             name = f"{label}, place {key[0]}, {key[1]:g} N"
             yield from of_patch(name, contacts)
@@ -170,7 +170,9 @@ def wall_rows() -> Iterator[Row]:
         material = (f"object.{thickness}", 'object.wall_material="custom"', *stiff)
         where = (f"candidates.stations_mm={stations}", "candidates.angles_deg=[0]", f"load.normal_force_n={forces}")
         scene = load_scene(file, (*material, *where, *COARSE))
-        rigid, linear, shell = (climb(scene, object=level) for level in ("rigid", "linear_shell", "nonlinear_shell"))
+        rigid, linear, shell = (
+            contacts_at(scene, object=level) for level in ("rigid", "linear_shell", "nonlinear_shell")
+        )
         for force in scene.load.normal_force:
             for n, solving in enumerate(solvers(scene.with_values({"load.normal_force_n": [force]}))):
                 key, name, level = (n, force), f"{label}, place {n}, {force:g} N", solving.level

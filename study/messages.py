@@ -1,10 +1,16 @@
-"""What a command says and how it ends: exit codes, the error that carries one, and texts fit for a terminal."""
+"""What a command says and writes, and how it ends: exit codes, the error that carries one, printable texts, files.
+
+Files that a user asked for are whole under their name or not there.
+"""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 DONE, USAGE, OTHER_FILE, IN_USE, CANNOT_WRITE, SOME_FAILED, BUG, STOPPED = 0, 2, 3, 4, 5, 6, 70, 75
 MEANING = {
@@ -64,3 +70,62 @@ def complain(error: StudyError) -> int:
 def say(text: str) -> None:
     """Print a text that may hold parts of files from elsewhere."""
     print(printable(text))
+
+
+@contextmanager
+def beside(path: Path, folders: bool = False) -> Iterator[Path]:
+    """A place to write to, renamed to ``path`` at the end; with ``folders`` those that are missing are made.
+
+    Devices and pipes are written to as they are.
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be written, with exit code 5.
+    """
+    special = path.exists() and not path.is_file() and not path.is_dir()
+    part = path if special else path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        if folders:
+            make_folders(path.parent)
+        yield part
+        if not special:
+            part.replace(path)
+    except (OSError, RuntimeError) as error:
+        if not isinstance(error, OSError) and "write" not in str(error):  # what h5py says of a full disk
+            raise
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written ({why(error)}); choose another place") from error
+    finally:
+        if not special:
+            remove(part)
+
+
+def why(error: Exception) -> str:
+    """What the system said of a file, also where HDF5 reports it.
+
+    >>> why(OSError("Unable to create file (unable to open file: errno = 13, error message = 'Permission denied')"))
+    'Permission denied'
+    """
+    found = re.search(r"error message = '([^']*)'", str(error))
+    return found[1] if found else getattr(error, "strerror", None) or str(error)
+
+
+def remove(path: Path) -> None:
+    """Remove a file if it is there; a read-only place, which refuses even to look, has none."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+
+
+def make_folders(folder: Path) -> None:
+    """Make a folder and those above it; `NotADirectoryError` where one of them is a file."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise NotADirectoryError(error.errno, "Not a directory", str(folder)) from error
+
+
+def write_file(path: Path, content: str | bytes, folders: bool = False) -> Path:
+    """Write a whole file; see `beside`."""
+    with beside(path, folders) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path

@@ -1,6 +1,6 @@
 """The paper on one page: press both fingers, read the contact patches, bound the friction, score the grasp.
 
-``solve_unit`` climbs the forces of one candidate; everything it computes goes into the ``CaseResult`` of each force.
+``solve_unit`` follows the load path of one candidate; all that it computes is in the ``CaseResult`` of each force.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.effects import effects_of
+from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
@@ -60,7 +60,9 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(values, patch, flag_sentences(values["maps/flags"]), effects_of(scene, fine, fits, solving))
+    return CaseResult(
+        values, patch, flag_sentences(values["maps/flags"]), effects_of(Simulated(scene, fine, fits, solving))
+    )
 
 
 def _probed(result: CaseResult, probing: Probing) -> CaseResult:
@@ -75,15 +77,15 @@ def _probed(result: CaseResult, probing: Probing) -> CaseResult:
 
 def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
     """For every force the contacts of both fingers, or why there are none."""
-    ladder = solving.ladder(forces)
+    path = solving.load_path(forces)
     for k, force in enumerate(forces):
         try:
-            yield next(ladder)
+            yield next(path)
         except (ConvergenceError, CheckError) as error:
             good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
             yield CaseFailure(f"{error}; {good}")
             for _ in forces[k + 1 :]:
-                yield CaseFailure(f"not tried, because the ladder of forces ended at {force:g} N: {error}")
+                yield CaseFailure(f"not tried, because the load path ended at {force:g} N: {error}")
             return
 
 

@@ -27,26 +27,43 @@ MONOMIALS = tuple(
     for i in range(4, -1, -1)
     for j in range(4 - i, -1, -1)
 )
-# Levels of each effect, cheapest first, and what its indicator is, where it has one.
-EFFECTS = {
-    "object": ("rigid", "linear shell", "nonlinear shell"),
-    "sheet": ("rigid", "elastic plate"),
-    "model_size": ("quarter", "half", "full"),
-    "fingers": ("one", "two"),
-    "friction": ("pcm", "ccm"),
-    "wrench": ("3-D", "6-D"),
-    "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
-    "friction_pressure_coupling": ("none", "tangential traction"),
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that a scene may call for: its levels, the cheapest first, and what its indicator is, if it has one."""
+
+    levels: tuple[str, ...]
+    indicator: str = ""
+
+
+EFFECT_TABLE = {
+    "object": Effect(
+        ("rigid", "linear shell", "nonlinear shell"),
+        "indentation that a linear wall would get at the largest force, over the wall's thickness",
+    ),
+    "sheet": Effect(
+        ("rigid", "elastic plate"), "mean deflection of the backing plate under an even pressure over that of the pad"
+    ),
+    "model_size": Effect(("quarter", "half", "full")),
+    "fingers": Effect(("one", "two")),
+    "friction": Effect(
+        ("pcm", "ccm"),
+        "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
+    ),
+    "wrench": Effect(("3-D", "6-D"), "mean share of the three dropped components in the friction wrench"),
+    "limit_surface": Effect(
+        ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
+        "radial fit error of the fitted limit surface, CCM, of the finger where it is larger",
+    ),
+    "friction_pressure_coupling": Effect(
+        ("none", "tangential traction"),
+        "share of the pressure sum that friction which acted back would add across it, of the finger where it is"
+        " larger",
+    ),
 }
-INDICATORS = {
-    "object": "indentation that a linear wall would get at the largest force, over the wall's thickness",
-    "sheet": "mean deflection of the backing plate under an even pressure over that of the pad",
-    "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
-    "wrench": "mean share of the three dropped components in the friction wrench",
-    "limit_surface": "radial fit error of the fitted limit surface, CCM, of the finger where it is larger",
-    "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
-    " finger where it is larger",
-}
+EFFECTS = {name: effect.levels for name, effect in EFFECT_TABLE.items()}
+INDICATORS = {name: effect.indicator for name, effect in EFFECT_TABLE.items() if effect.indicator}
 REASONS = (
     "the only level of this version",
     "forced by the scene",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from tests.blas import loaded, usable
 
 ASK = "from tests.blas import loaded; print(*(f'{file}|{kernel}' for file, kernel in loaded().items()), sep='\\n')"

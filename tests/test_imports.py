@@ -21,8 +21,8 @@ ALLOWED = {
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
-    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "shtab", "vtkmodules"}
-    | {"xarray"}
+    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "vtkmodules"}
+    | {"xarray", "(computed)"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
@@ -33,7 +33,7 @@ PICTURES = {
 }
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
-    "shtab": {"study/commands.py"},
+    "(computed)": {"study/cli/__init__.py"},
     "h5py": {
         "study/result/skeleton.py",
         "study/result/write.py",
@@ -45,12 +45,12 @@ DOORS = {
     "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},
 }
 # Folders of study, and modules directly in it, the lowest first: each imports only what stands before it, so that there
-# is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; preparation
-# joins what a run needs, from the scene to the report in its file; commands joins everything, cli above it.
+# is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; cli joins
+# everything, and imports what a command needs when it runs.
 ORDER = (
-    "messages", "units", "flags", "quantities", "environment", "writing", "pictures", "templates", "page",
+    "messages", "units", "flags", "quantities", "pictures", "templates", "page",
     "scene", "case", "pipeline", "result", "run", "accuracy", "lookup", "export", "patch", "show",
-    "preparation", "doctor", "commands", "cli",
+    "doctor", "cli",
 )  # fmt: skip
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]
@@ -140,14 +140,14 @@ def test_study_imports_downward_only():
         ("study/case/build.py", "if TYPE_CHECKING:\n    import softjaw.study.run.plan as p", {"run.plan"}),
         ("study/case/build.py", "from softjaw.study import pipeline, units", {"pipeline"}),
         ("study/flags.py", "from softjaw.study.quantities import MODELS", {"quantities.MODELS"}),
-        ("study/commands.py", "from softjaw.study.cli import main", {"cli.main"}),
+        ("study/doctor.py", "from softjaw.study.cli import main", {"cli.main"}),
         ("study/case/build.py", "import importlib\nimportlib.import_module('softjaw.study.cli')", {"cli"}),
         ("study/case/build.py", "__import__(name)", {""}),
         ("study/case/build.py", "from softjaw import study", {""}),
         ("study/case/build.py", "import softjaw.study", {""}),
         ("study/case/build.py", "from softjaw.study.unheard import of", {"unheard.of"}),
         ("study/case/build.py", "from softjaw.study.case.model import Finger\nfrom softjaw.fem import run", set()),
-        ("study/cli.py", "from softjaw.study import commands\nfrom softjaw.study.show.data import Data", set()),
+        ("study/cli/drawings.py", "from softjaw.study import doctor\nfrom softjaw.study.show.data import Data", set()),
     ],
 )
 def test_an_import_upward_is_noticed(path, source, names):

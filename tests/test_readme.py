@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from softjaw.study.environment import launch_environment, mpirun
+from softjaw.study.doctor import launch_environment, mpirun
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -21,7 +21,7 @@ TYPED = re.compile(r"^(mkdir|cat) |softjaw ")
 TYPED_IN = [[line for line in block if TYPED.search(line)] for block in BLOCKS if not block[0].startswith("conda")]
 SOFTJAW = [list(block) for block in dict.fromkeys(map(tuple, TYPED_IN))]
 FIRST = "mpirun -n 2 softjaw run jobs/smoke.toml"
-SOLVES = re.compile(r"softjaw (figure|cost|scale) ")
+SOLVES = re.compile(r"softjaw (figure|cost) ")
 LONG_RUNS = ("results/bottle.hdf",)  # files of runs of many minutes; a small one of the same name stands for them
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, grid_triangles
+from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
-
-if TYPE_CHECKING:  # numba and scipy, which a scene that is only checked does not need
-    from softjaw.fem.objects.mesh_object import MeshObject
-    from softjaw.fem.objects.spline_surface import SplineSurface
-    from softjaw.fem.shell.facing import Wall
+from softjaw.fem.objects.spline_surface import SplineSurface, spline_surface
+from softjaw.fem.shell.facing import FAR, Wall, face
 
 ROUND = 1e-9  # how far ratios and exponents of round sections may be off
 NEAR = 0.004  # where the exact place on the wall is looked for [m]
@@ -56,8 +53,6 @@ class Stacked:
 
     def _gap(self, x: FloatArray, close: NDArray[np.bool_]) -> Gap:
         """Exact where points are ``close`` to the wall and face it, else from the triangles."""
-        from softjaw.fem.shell.facing import FAR, face
-
         g, normal, hessian = np.zeros(len(x)), np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         none = np.zeros((self._wall.nodes.max() + 1, 3))
         near = np.flatnonzero(close)
@@ -81,8 +76,6 @@ class Stacked:
 
     @cached_property
     def _triangles(self) -> MeshObject:
-        from softjaw.fem.objects.mesh_object import MeshObject
-
         return MeshObject(*self._sampled(AROUND, ALONG))
 
     def _sampled(self, around: int, along: int) -> Surface:
@@ -117,8 +110,6 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
 
     ``outer`` offers ``wall``, ``curve`` and ``jets`` as ``fem.objects.outer_surface.OuterSurface`` does.
     """
-    from softjaw.fem.objects.spline_surface import spline_surface
-
     ends = outer.wall[0] if lower is None else lower, outer.wall[1] if upper is None else upper
     breaks = outer.curve.breaks
     breaks = breaks[(breaks > ends[0]) & (breaks < ends[1])]
@@ -133,8 +124,6 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
 
 def undeformed(surface: SplineSurface) -> Wall:
     """The surface's own grid as the mesh of a wall."""
-    from softjaw.fem.shell.facing import Wall
-
     m, k = len(surface.theta) - 1, len(surface.s)
     number = np.arange(m * k, dtype=np.int32).reshape(m, k)
     return Wall(surface, surface.theta, surface.s, np.vstack([number, number[:1]]), np.full(m * k, 1e-3))

@@ -14,9 +14,8 @@ from softjaw.study.accuracy.cost_study import Costs, CostStudy, costs, load, new
 from softjaw.study.accuracy.measure import Measuring
 from softjaw.study.case.build import check_object
 from softjaw.study.case.probes import probes
-from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError, write_file
 from softjaw.study.scene.text import differences
-from softjaw.study.writing import write_file
 
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS")
 

@@ -26,11 +26,10 @@ from softjaw.study.accuracy.parameters import (
     evaluation_parameters,
     value_of,
 )
-from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError, beside
 from softjaw.study.result import provenance
 from softjaw.study.result.guarded import GuardedFile, opened
 from softjaw.study.scene import Scene
-from softjaw.study.writing import beside
 
 FloatArray = NDArray[np.float64]
 QUANTITIES = ("e_n", "max_force", "max_torque", "quality")

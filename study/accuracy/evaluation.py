@@ -59,7 +59,7 @@ def solved(probe: Probe) -> SolvedProbe:
     start = time.process_time()
     solving = solver(scene, fingers, probe.unit.candidate.poses)
     try:
-        contacts = [[c for c, *_ in outcome.contacts] for outcome in solving.ladder(probe.forces)]
+        contacts = [[c for c, *_ in outcome.contacts] for outcome in solving.load_path(probe.forces)]
     finally:
         solving.destroy()
     return SolvedProbe(probe, obj, contacts, (time.process_time() - start) / len(probe.forces))

@@ -22,7 +22,7 @@ from softjaw.study.accuracy.convergence import extrapolate, flagged, flags_of, p
 from softjaw.study.accuracy.cost_study import CostStudy, Measured, load, new_study, plain, save, setting_of
 from softjaw.study.accuracy.measure import measure_once, warm_up
 from softjaw.study.accuracy.parameters import Level, Parameter, contact_parameters, weight, with_level
-from softjaw.study.case import sweep
+from softjaw.study.case import candidates
 from softjaw.study.case.probes import Probe, demanding, held_out, probes, probes_at
 from softjaw.study.scene import Scene
 
@@ -109,7 +109,7 @@ def _open(parameter: Parameter | None, given: Mapping[str, Any]) -> list[Level]:
 
 def quick_probes(scene: Scene) -> tuple[list[Probe], list[Probe], int]:
     """Probes at the lowest and the highest force, the cases that the choice is tried on, and all cases of the run."""
-    units, forces = sweep.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
+    units, forces = candidates.units(scene, lambda point: point.axis_symmetry), scene.load.normal_force
     found = probes_at(scene, demanding(units), tuple(dict.fromkeys((forces[0], forces[-1]))))
     return found, held_out(scene, found), len(units) * len(forces)
 

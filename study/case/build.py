@@ -1,27 +1,32 @@
-"""From the sections of a scene to what ``fem`` works with; heavy modules are imported only for what is built."""
+"""From the sections of a scene to the objects that ``fem`` works with, and what is wrong with them before a run."""
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from softjaw.fem.objects import shapes as objects
+from softjaw.fem.objects.gap import GapObject
+from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
+from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import Gripper
 
-if TYPE_CHECKING:
-    from softjaw.fem.materials import Material
-    from softjaw.fem.objects.gap import GapObject
-    from softjaw.fem.objects.outer_surface import OuterSurface
-    from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport
-    from softjaw.fem.pad.shape import BackingPlate, PadShape
-    from softjaw.study.scene import Scene
-    from softjaw.study.scene.objects import Shape, Walled
-    from softjaw.study.scene.sections import Gripper
+
+def geometry() -> Any:
+    """The module that builds what needs compiled loops; most scenes are checked and planned without it."""
+    from softjaw.study.case import geometry
+
+    return geometry
 
 
 @lru_cache(maxsize=8)
-def build_object(shape: Shape) -> GapObject:
+def build_object(shape: Any) -> GapObject:
     """Object of a scene's section ``[object]``.
 
     Raises
@@ -29,21 +34,13 @@ def build_object(shape: Shape) -> GapObject:
     ValueError
         For geometry that cannot be, a mesh that is open or crosses itself among others.
     """
-    if shape.shape == "mesh":
-        from softjaw.fem.objects.mesh_object import MeshObject
-
-        return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
-    import numpy as np
-
-    from softjaw.fem.objects import shapes as objects
-
     match shape.shape:
+        case "mesh":
+            return geometry().mesh_object(shape)
         case "revolution":
             return objects.Revolution(np.array(shape.profile))
         case "sections":
-            from softjaw.fem.objects.stacked import Stacked
-
-            return Stacked(outer_surface(shape)[0])
+            return geometry().stacked(outer_surface(shape)[0])
         case "elliptic_cylinder":
             return objects.EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
         case "sphere":
@@ -56,7 +53,7 @@ def build_object(shape: Shape) -> GapObject:
 
 
 @lru_cache(maxsize=8)
-def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
+def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
     """Outer surface of an object that can have a wall, and whether it is a body of revolution.
 
     Raises
@@ -64,23 +61,13 @@ def outer_surface(shape: Walled) -> tuple[OuterSurface, bool]:
     ValueError
         For geometry that cannot be.
     """
-    from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
-
     if shape.shape == "revolution":
         return of_revolution(build_object(shape)), True
     if shape.shape == "mesh":
-        surface, _ = _traced(shape)
+        surface, _ = geometry().traced_surface(shape)
         return surface, surface.round
     sections = [Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections]
     return of_sections(sections), shape.axis_symmetry == 0
-
-
-@lru_cache(maxsize=8)
-def _traced(shape: Walled) -> tuple[TracedSurface, TraceReport]:
-    """Smooth surface of a mesh's wall, and how far it is from the mesh."""
-    from softjaw.fem.objects.traced_surface import traced
-
-    return traced(build_object(shape), shape.wall_heights)
 
 
 def has_wall(shape: Any) -> bool:
@@ -88,7 +75,7 @@ def has_wall(shape: Any) -> bool:
     return getattr(shape, "wall", None) is not None
 
 
-def shapes_of(scene: Scene) -> list[Shape]:
+def shapes_of(scene: Scene) -> list[Any]:
     """The object at every point of the sweep, each once."""
     swept = {key: values for key, values in scene.sweep.items() if key.startswith("object.")}
     if not swept:
@@ -120,29 +107,12 @@ def check_object(scene: Scene) -> None:
         except ValueError as error:
             raise StudyError(USAGE, f"{key}: {error}") from error
         if shape.wall is not None:
-            _check_wall(shape)
+            geometry().check_wall(shape, outer_surface(shape)[0])
         if shape.shape == "mesh":
             _check_stations(scene, shape)
 
 
-def _check_wall(shape: Walled) -> None:
-    """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely."""
-    import numpy as np
-
-    from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
-
-    surface, _ = outer_surface(shape)
-    lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
-    size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
-    wall = shape.wall if isinstance(shape.wall, float) else [list(pair) for pair in shape.wall]
-    try:
-        body_mesh(surface, wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
-    except ValueError as error:
-        key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
-        raise StudyError(USAGE, f"object.{key}: {error}") from error
-
-
-def _check_stations(scene: Scene, mesh: Shape) -> None:
+def _check_stations(scene: Scene, mesh: Any) -> None:
     low, high = axis_span(mesh) or (-math.inf, math.inf)
     beside = [s for s in scene.candidates.station_values_mm if not low <= s <= high]
     if beside:
@@ -154,7 +124,7 @@ def _check_stations(scene: Scene, mesh: Shape) -> None:
         )
 
 
-def axis_span(shape: Shape) -> tuple[float, float] | None:
+def axis_span(shape: Any) -> tuple[float, float] | None:
     """Where the object begins and ends along its axis [mm]; None where it has no end."""
     if shape.shape != "mesh":
         return shape.spans_mm.get("z")
@@ -166,39 +136,11 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     """Sentences about values that are allowed but seldom meant; builds the object if it is a mesh."""
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
-    walls = [_distance(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
+    walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
     return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls)
-
-
-def _distance(shape: Walled) -> str:
-    """How far the wall that is simulated lies from the mesh that it was traced on."""
-    _, report = _traced(shape)
-    z, theta = report.place
-    return (
-        f"the wall traced on {shape.mesh} lies {1e3 * report.rms:.2g} mm (rms), at most {1e3 * report.largest:.2g} mm,"
-        f" from the mesh, farthest at z = {1e3 * z:.3g} mm, {math.degrees(theta):.3g} deg; waves shorter than"
-        f" {1e3 * report.wavelength:.2g} mm are smoothed out"
-    )
-
-
-def pad_material(gripper: Gripper) -> Material:
-    """Foam of the pads."""
-    from softjaw.fem.materials import material
-
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
-
-
-def backing_plate(gripper: Gripper) -> BackingPlate:
-    """Plate behind each pad."""
-    from softjaw.fem.pad.shape import BackingPlate
-
-    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
     """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
-    from softjaw.fem.pad.shape import PadShape
-
     shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)
     return shape.halved() if coarser else shape

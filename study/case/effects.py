@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import nan
@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.fem.materials import Material, material
 from softjaw.fem.pad.backing_plate import relative_compliance
+from softjaw.fem.pad.shape import BackingPlate
 from softjaw.friction.patch import FloatArray
-from softjaw.study.case.build import backing_plate, pad_material, pad_shape
-from softjaw.study.case.margin import surely_below
+from softjaw.study.case.build import pad_shape
+from softjaw.study.case.result import surely_below
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -24,9 +26,8 @@ STIFF_PLATE = 0.005
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
 # tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.
 SMALL_TRACTION = 0.03
-ONLY, FORCED, BELOW, ABOVE, SYMMETRY = range(5)  # of REASONS
-CHEAP = REASONS.index("never skipped, because it costs next to nothing")
-APART = REASONS.index("e_n and quality do not depend on it")
+ONLY, FORCED, BELOW, ABOVE, SYMMETRY, DEFAULT, NO_WALL, CHEAP, LEFT_OUT, APART = range(len(REASONS))
+Level = tuple[str, float, int]  # level, indicator (NaN where it is not known) and reason, an index of REASONS
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
@@ -36,26 +37,37 @@ SURFACES = {
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
+def pad_material(gripper: Gripper) -> Material:
+    """Foam of the pads."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
+
+
+def backing_plate(gripper: Gripper) -> BackingPlate:
+    """Plate behind each pad."""
+    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
+
+
 @dataclass(frozen=True)
 class BackingPlateLevel:
-    """Level of the backing plates of a scene; ``reason`` is one of `study.quantities.REASONS`.
+    """Level of the backing plates of a scene; ``reason`` is an index of `study.quantities.REASONS`.
 
     ``compliance`` is the mean deflection of the plate under an even pressure over that of the pad.
     """
 
     elastic: bool
     compliance: float
-    reason: str
+    reason: int
 
 
 def backing_plate_level(scene: Scene) -> BackingPlateLevel:
     """The level that the scene asks for, else the cheapest whose e_n is good to 2 %."""
     compliance = _compliance(scene.gripper)
     if scene.effects.sheet != "auto":
-        return BackingPlateLevel(scene.effects.sheet == "elastic", compliance, "forced by the scene")
+        return BackingPlateLevel(scene.effects.sheet == "elastic", compliance, FORCED)
     if surely_below(compliance, STIFF_PLATE):
-        return BackingPlateLevel(False, compliance, "indicator below the target")
-    return BackingPlateLevel(True, compliance, "indicator above the target")
+        return BackingPlateLevel(False, compliance, BELOW)
+    return BackingPlateLevel(True, compliance, ABOVE)
 
 
 @lru_cache(maxsize=8)
@@ -64,23 +76,6 @@ def _compliance(gripper: Gripper) -> float:
     x, y = (tuple(map(float, shape.lines(axis, half))) for axis, half in enumerate(halves))
     foam = shape.size[2] / pad_material(gripper).young_modulus
     return relative_compliance(x, y, halves, backing_plate(gripper), foam)
-
-
-def coupling_level(scene: Scene, contacts: Sequence[Any], walled: bool) -> tuple[str, float, int]:
-    """Level, indicator and reason of the effect in one case; only the scene can ask for friction that acts back.
-
-    On a thin wall, where friction cannot act back yet, there is no indicator.
-    """
-    wanted, levels = scene.effects.friction_pressure_coupling, EFFECTS["friction_pressure_coupling"]
-    level = levels[wanted == "tangential"]
-    left_out = float("nan") if walled else max(neglected_traction(c.state, scene.friction.mu) for c in contacts)
-    if wanted != "auto":
-        return level, left_out, REASONS.index("forced by the scene")
-    if walled:
-        return level, left_out, REASONS.index("the default level of this version")
-    small = surely_below(left_out, SMALL_TRACTION)
-    reason = "indicator below the target" if small else "left out, though the indicator is above the target"
-    return level, left_out, REASONS.index(reason)
 
 
 def neglected_traction(state: Any, mu: float) -> float:
@@ -104,52 +99,92 @@ def dropped_share(wrench: FloatArray, rho: float) -> float:
     return float((np.linalg.norm(w[:, 2:5], axis=1) / np.linalg.norm(w, axis=1)).mean())
 
 
-def effects_of(
-    scene: Scene, contacts: Sequence[Any], fits: Sequence[Mapping[str, Any]], solving: Any
-) -> dict[str, tuple[str, float, int]]:
-    """Level, indicator and reason of every effect of one case; keys and levels as in ``EFFECTS``.
+# --- one function for each effect, by its name in study.quantities ----------------------------------------------------
 
-    The indicators are those of ``INDICATORS``. Levels that change the solve are chosen before it, by
-    `study.case.wall` and `backing_plate_level`; here they only get their names.
+
+@dataclass(frozen=True)
+class Simulated:
+    """A solved case: contacts of both fingers, their limit surfaces by friction model, and what solved it."""
+
+    scene: Scene
+    contacts: Sequence[Any]
+    fits: Sequence[Mapping[str, Any]]
+    solver: Any
+
+
+def effects_of(case: Simulated) -> dict[str, Level]:
+    """Level, indicator and reason of every effect of one case, by the names of ``EFFECT_TABLE``.
+
+    Levels that change the solve are chosen before it, by `study.case.wall` and `backing_plate_level`; here they get
+    their names.
     """
-    wanted = scene.effects
-
-    def only(name: str) -> int:
-        return ONLY if getattr(wanted, name, "auto") == "auto" else FORCED
-
-    plate = backing_plate_level(scene)
-    S, F_N = (sum(getattr(c.limits["ccm"], name) for c in contacts) for name in ("S", "F_N"))
-    curved = [own["ccm"] for own in fits]
-    dropped = max(dropped_share(b.wrench, b.rho) for b in curved)
-    size = MODEL_SIZES[solving.planes]
-    return {
-        "object": _object(solving.level),
-        "sheet": (EFFECTS["sheet"][plate.elastic], plate.compliance, REASONS.index(plate.reason)),
-        "model_size": (size, nan, SYMMETRY if wanted.model_size == "auto" else FORCED),
-        "fingers": _fingers(solving, only("fingers")),
-        "friction": ("ccm", 1.0 - F_N / S, CHEAP if wanted.friction == "auto" else FORCED),
-        "wrench": ("3-D", dropped, APART) if wanted.wrench == "auto" else (wanted.wrench, dropped, FORCED),
-        "limit_surface": _surface(scene, curved),
-        "friction_pressure_coupling": coupling_level(scene, contacts, bool(solving.level and solving.level.number)),
-    }
+    return {name: LEVELS[name](case) for name in EFFECTS}
 
 
-def _object(level: Any) -> tuple[str, float, int]:
-    """Level of the object's compliance: the cheapest that its indicator allows."""
-    names = EFFECTS["object"]
+def _forced(case: Simulated, name: str, otherwise: int) -> int:
+    """The reason of a level: the scene's word, or ``otherwise`` where it leaves the choice."""
+    return otherwise if getattr(case.scene.effects, name) == "auto" else FORCED
+
+
+def _object(case: Simulated) -> Level:
+    """Compliance of the object: the cheapest level that its indicator allows."""
+    names, level = EFFECTS["object"], case.solver.level
     if level is None:
-        return names[0], nan, REASONS.index("the object has no wall")
+        return names[0], nan, NO_WALL
     reason = FORCED if level.forced else BELOW if level.number < len(names) - 1 else ABOVE
     return names[level.number], level.indicator, reason
 
 
-def _surface(scene: Scene, fits: Sequence[Any]) -> tuple[str, float, int]:
-    """Form of the limit surface: an ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
-    model = scene.limit_surface.model
-    costs_little = model == "quartic" and scene.effects.limit_surface == "auto"
-    return SURFACES[model], float(np.max([b.fit_error.Erad for b in fits])), CHEAP if costs_little else FORCED
+def _sheet(case: Simulated) -> Level:
+    level = backing_plate_level(case.scene)
+    return EFFECTS["sheet"][level.elastic], level.compliance, level.reason
 
 
-def _fingers(solving: Any, only: int) -> tuple[str, float, int]:
+def _model_size(case: Simulated) -> Level:
+    return MODEL_SIZES[case.solver.planes], nan, _forced(case, "model_size", SYMMETRY)
+
+
+def _fingers(case: Simulated) -> Level:
     """One finger where a plane of symmetry lies between two that press on one wall."""
-    return ("one", nan, SYMMETRY) if solving.fingers_solved == 1 else ("two", nan, only)
+    if case.solver.fingers_solved == 1:
+        return "one", nan, SYMMETRY
+    return "two", nan, _forced(case, "fingers", ONLY)
+
+
+def _friction(case: Simulated) -> Level:
+    S, F_N = (sum(getattr(c.limits["ccm"], name) for c in case.contacts) for name in ("S", "F_N"))
+    return "ccm", 1.0 - F_N / S, _forced(case, "friction", CHEAP)
+
+
+def _wrench(case: Simulated) -> Level:
+    dropped = max(dropped_share(own["ccm"].wrench, own["ccm"].rho) for own in case.fits)
+    wanted = case.scene.effects.wrench
+    return "3-D" if wanted == "auto" else wanted, dropped, _forced(case, "wrench", APART)
+
+
+def _limit_surface(case: Simulated) -> Level:
+    """An ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
+    model = case.scene.limit_surface.model
+    error = float(np.max([own["ccm"].fit_error.Erad for own in case.fits]))
+    return SURFACES[model], error, _forced(case, "limit_surface", CHEAP) if model == "quartic" else FORCED
+
+
+def _coupling(case: Simulated) -> Level:
+    """Only the scene can ask for friction that acts back; a thin wall, where it cannot yet, has no indicator."""
+    levels, wanted = EFFECTS["friction_pressure_coupling"], case.scene.effects.friction_pressure_coupling
+    walled = bool(case.solver.level and case.solver.level.number)
+    left_out = nan if walled else max(neglected_traction(c.state, case.scene.friction.mu) for c in case.contacts)
+    small = DEFAULT if walled else BELOW if surely_below(left_out, SMALL_TRACTION) else LEFT_OUT
+    return levels[wanted == "tangential"], left_out, _forced(case, "friction_pressure_coupling", small)
+
+
+LEVELS: dict[str, Callable[[Simulated], Level]] = {
+    "object": _object,
+    "sheet": _sheet,
+    "model_size": _model_size,
+    "fingers": _fingers,
+    "friction": _friction,
+    "wrench": _wrench,
+    "limit_surface": _limit_surface,
+    "friction_pressure_coupling": _coupling,
+}

@@ -14,9 +14,9 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
 from softjaw.fem.pad.mesh import Pad
-from softjaw.study.case.build import backing_plate, build_object, pad_material, pad_shape
+from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.effects import backing_plate_level
+from softjaw.study.case.effects import backing_plate, backing_plate_level, pad_material
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper

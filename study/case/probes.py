@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import ContactPatch, NoContactError
-from softjaw.study.case import model, sweep
+from softjaw.study.case import candidates as grasps
+from softjaw.study.case import model
 from softjaw.study.case.build import build_object
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
@@ -46,7 +47,7 @@ def probes(scene: Scene, named: Sequence[str] = (), count: int = 3) -> list[Prob
     """
     forces = scene.load.normal_force
     few = tuple(dict.fromkeys((forces[0], forces[(len(forces) - 1) // 2], forces[-1])))
-    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    units = grasps.units(scene, lambda point: point.axis_symmetry)
     chosen = [_named(units, scene.candidates.labels, name) for name in dict.fromkeys(named)] or spread(units, count)
     return probes_at(scene, chosen, few)
 
@@ -89,7 +90,7 @@ def held_out(scene: Scene, found: Sequence[Probe], count: int = HELD_OUT) -> lis
     Each candidate has one force, which change from one to the next, and the highest, which effects are chosen by.
     """
     forces, taken = scene.load.normal_force, {probe.unit.index: probe.forces for probe in found}
-    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    units = grasps.units(scene, lambda point: point.axis_symmetry)
     new = [unit for unit in units if unit.index not in taken]
     lower, chosen = forces[:-1] or forces, _evenly(new, -(-count // min(2, len(forces))))
     made = [(unit, (lower[i % len(lower)],)) for i, unit in enumerate(chosen)]

@@ -25,7 +25,7 @@ POWER = 5  # of mu in the quality of contacts that face each other: three axes o
 
 
 class Probing:
-    """The further solves of one probe, which climb its forces beside it.
+    """The further solves of one probe, which follow its load path beside it.
 
     What fails there leaves NaN from that force on, and never harms the case itself; so does a time limit. ``failures``
     says what failed at the last force.
@@ -33,35 +33,35 @@ class Probing:
 
     def __init__(self, unit: Any) -> None:
         self._solves = variations(unit.scene) if unit.probe else ()
-        self._ladders = [_ladder(unit, variation) for variation in self._solves]
+        self._paths = [_path(unit, variation) for variation in self._solves]
         self.failures: list[str] = []
 
     def values(self) -> dict[str, np.ndarray]:
         """Values ``(variations,)`` of the next force, keyed as in ``study.quantities``."""
-        found = np.full((len(NAMES), len(self._ladders)), np.nan)
+        found = np.full((len(NAMES), len(self._paths)), np.nan)
         self.failures = []
         try:
-            for i in range(len(self._ladders)):
+            for i in range(len(self._paths)):
                 found[:, i] = self._next(i)
         except TimeLimitError:
             self.failures.append("probe: run.time_limit_s passed")
             self.close()
-        return {f"probes/{name}": values for name, values in zip(NAMES, found, strict=True)} if self._ladders else {}
+        return {f"probes/{name}": values for name, values in zip(NAMES, found, strict=True)} if self._paths else {}
 
     def _next(self, i: int) -> tuple[float, float]:
         try:
-            return next(self._ladders[i], (np.nan, np.nan))
+            return next(self._paths[i], (np.nan, np.nan))
         except (ArithmeticError, MemoryError, RuntimeError, ValueError, StudyError) as error:
             self.failures.append(f"probe, {self._solves[i].name}: {error}")
             return np.nan, np.nan
 
     def close(self) -> None:
         """End all of them and give their memory back."""
-        for ladder in self._ladders:
-            ladder.close()
+        for path in self._paths:
+            path.close()
 
 
-def _ladder(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
+def _path(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
     """e_n [m] and quality, curved model, at each force of one further solve."""
     scene = unit.scene.with_values(variation.values) if variation.values else unit.scene
     poses = moved_poses(unit.candidate.poses, variation.shift, variation.turn)
@@ -69,7 +69,7 @@ def _ladder(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
     fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in poses]
     solving, settings = solver(scene, fingers, poses), settings_of(scene, obj)
     try:
-        for outcome in solving.ladder(scene.load.normal_force):
+        for outcome in solving.load_path(scene.load.normal_force):
             contacts = [c for c, *_ in outcome.contacts]
             yield min(c.limits["ccm"].e_n for c in contacts), quality(contacts, settings)
     finally:

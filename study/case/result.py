@@ -1,9 +1,12 @@
-"""What one case gives back: values to store, or the reason why there are none."""
+"""What one case gives back, values to store or the reason why there are none, and how values are compared."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
+
+MARGIN = 1e-6  # of a limit: what is nearer to it is undecided
+TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal as far as can be told
 
 
 @dataclass(frozen=True)
@@ -29,3 +32,12 @@ class CaseFailure:
 
 class TimeLimitError(BaseException):
     """The case in flight has had its time; not an ``Exception``, so that no solver takes it for a failed step."""
+
+
+def surely_below(value: float, limit: float) -> bool:
+    """Whether a value is below a limit by more than `MARGIN`; no where that is undecided, or the value is NaN.
+
+    >>> surely_below(0.9, 1.0), surely_below(1.0 - 1e-12, 1.0), surely_below(1.1, 1.0)
+    (True, False, False)
+    """
+    return value <= limit * (1.0 - MARGIN)

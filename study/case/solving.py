@@ -1,6 +1,6 @@
 """Solvers of one candidate and the contacts that they give: each finger by itself, or both on a thin wall.
 
-Either climbs the ladder of forces and gives the contacts of every force; what comes after does not ask which it was.
+Either follows the load path and gives the contacts of every force; what comes after does not ask which it was.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class Solved:
 
 
 class Solver(Protocol):
-    """Climbs the forces of one candidate.
+    """Follows the load path of one candidate.
 
     ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
     """
@@ -109,7 +109,7 @@ class Solver(Protocol):
     fingers_solved: int
     planes: int
 
-    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+    def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
 
     def destroy(self) -> None:
@@ -141,10 +141,10 @@ class OnRigid:
         self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
-    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+    def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        ladders = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
-        for states in zip(*ladders, strict=True):
+        paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
+        for states in zip(*paths, strict=True):
             pairs = zip(self.fingers, states, strict=False)
             contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
             if self.shared:  # an image finger has its partner's states; only its place differs
@@ -169,7 +169,7 @@ class OnWall:
         ]
         self.fingers_solved, self.planes = len(self.held[0].poses), sum(self.held[0].mirrors)
 
-    def ladder(self, forces: Sequence[float]) -> Iterator[Solved]:
+    def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
         for states in zip(*(g.load_path(forces) for g in self.grips), strict=True):
             each = [self._contacts(held, state) for held, state in zip(self.held, states, strict=True)]

@@ -13,9 +13,10 @@ from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.grip import Gripped
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
-from softjaw.fem.shell.wall_material import faces, wall_material
+from softjaw.fem.shell.wall_material import faces
 from softjaw.study.case.build import outer_surface
-from softjaw.study.case.margin import MARGIN, surely_below
+from softjaw.study.case.geometry import material_of
+from softjaw.study.case.result import MARGIN, surely_below
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
@@ -31,13 +32,12 @@ ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level 
 @lru_cache(maxsize=8)
 def thin_body(shape: Walled) -> ThinWalled:
     """Wall of an object that has one (``shape.wall`` is not None)."""
-    name = None if shape.wall_material == "custom" else shape.wall_material
     surface, is_round = outer_surface(shape)
     return ThinWalled(
         surface,
         is_round,
         shape.wall,
-        wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength),
+        material_of(shape),
         shape.support,
         shape.open_top,
         shape.base_wall,

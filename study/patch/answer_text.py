@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.patch.answer import (
     DEFINITIONS,
     FRICTION,
@@ -27,7 +27,6 @@ from softjaw.study.patch.answer import (
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.quantities import MODELS
 from softjaw.study.units import shown, shown_unit
-from softjaw.study.writing import write_file
 
 PICTURES = (".png", ".svg")
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")

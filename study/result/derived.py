@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.study.case.margin import MARGIN
-from softjaw.study.case.sweep import axes
+from softjaw.study.case.candidates import axes
+from softjaw.study.case.result import MARGIN
 from softjaw.study.result import interval
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.result.vtkhdf import fill_grid

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.margin import TIE
-from softjaw.study.case.sweep import axes
+from softjaw.study.case.candidates import axes
+from softjaw.study.case.result import TIE
 from softjaw.study.case.variations import by_formula, variations
 from softjaw.study.flags import LOST
 from softjaw.study.result.layout import DONE, Derived

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
 from softjaw.study.quantities import FIRST, MODELS
 from softjaw.study.result import checksums, vtkhdf
 from softjaw.study.result.datasets import CLOSING, SUMS
@@ -36,7 +36,6 @@ from softjaw.study.result.layout import (
 )
 from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.vtkhdf import LIBVER
-from softjaw.study.writing import remove
 
 TEXT = h5py.string_dtype("utf-8")
 EVEN = 1e-6  # relative difference of steps that makes an axis uneven

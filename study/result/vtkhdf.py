@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
+from softjaw.study.messages import beside
 from softjaw.study.quantities import DONE, FINGERS, MISSING, ON_OBJECT, STATES
 from softjaw.study.result.datasets import Dataset
-from softjaw.study.writing import beside
 
 LIBVER = ("earliest", "v110")
 Arrays = Mapping[str, np.ndarray]

@@ -11,9 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.build import has_wall, outer_surface
+from softjaw.fem.objects.outer_surface import Turned
+from softjaw.study.case import candidates as grasps
+from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, pad_shape
+from softjaw.study.case.variations import changes, probe_candidates, with_probes
 from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.derived import derived
+from softjaw.study.result.grid_surface import surface_of
 from softjaw.study.result.layout import Header, Layout
+from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
@@ -47,18 +53,12 @@ class Plan:
 
 def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
     """The plan of a scene; builds its objects, so a mesh is read here."""
-    from softjaw.study.case import sweep
-    from softjaw.study.case.build import check_object, pad_shape
-    from softjaw.study.case.variations import changes, probe_candidates, with_probes
-    from softjaw.study.result.derived import derived
-    from softjaw.study.result.grid_surface import surface_of
-
     check_object(scene)
     patches = scene.output.patches != "none"
     front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
-    axes = tuple(sweep.axes(scene))
+    axes = tuple(grasps.axes(scene))
     surface = surface_of(scene, axes)
-    units = sweep.units(scene, lambda point: point.axis_symmetry)
+    units = grasps.units(scene, lambda point: point.axis_symmetry)
     probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
@@ -67,7 +67,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         scene_file=scene_file,
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
-        labels=tuple(candidate.label for candidate in sweep.candidates(scene)),
+        labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
         surface=surface,
     )
     layout = Layout(
@@ -174,7 +174,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     free = _free(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
-        "units": f"{len(plan.units)} ladders of {forces} forces{symmetric}",
+        "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
@@ -184,10 +184,10 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
-    seconds = _seconds(plan.layout, path)
+    seconds = measured_seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        known = f"a few ladders are in {path}: start the run, then plan again"
+        known = f"a few load paths are in {path}: start the run, then plan again"
         wall = shells(scene)
         return f"{_wall_time(plan, scene, ranks)}; known better when {known}" if wall else f"not known before {known}"
     whole = duration(makespan(expected, ranks))
@@ -201,18 +201,17 @@ def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
         return "not known yet for this wall"
     level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
     times = sorted(level.get(scene.effects.object, wall.seconds))
-    ladders = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
-    whole = [duration(each * makespan(ladders, ranks)) for each in (times[0], times[-1])]
+    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
+    whole = [duration(each * makespan(paths, ranks)) for each in (times[0], times[-1])]
     names = scene.effects.object.replace("_", " ")
     names = "all candidates rigid, or all on the costliest shell" if len(times) > 1 else names
     return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
 
 
-def _seconds(layout: Layout, path: Path) -> Any:
+def measured_seconds(layout: Layout, path: Path) -> Any:
+    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file."""
     if not path.is_file():
         return None
-    from softjaw.study.result.store import open_result
-
     with open_result(path) as result:
         return result.read("work/seconds_total").ravel() if result.layout.shape == layout.shape else None
 
@@ -256,24 +255,18 @@ class WallSize:
 
 def wall_size(scene: Any) -> WallSize | None:
     """Unknowns of a candidate in the middle of the scene's stations; None where the wall has no outline to divide."""
-    from softjaw.fem.objects.outer_surface import Turned
-    from softjaw.fem.shell.wall_mesh import MeshSize, along, around
-
     try:
         surface, is_round = outer_surface(scene.object)
     except (AttributeError, ValueError):
         return None
     angle = 0.0 if scene.candidates.poses else scene.candidates.angles[0]
-    turned, accuracy = Turned(surface, angle, is_round), scene.accuracy
+    turned = Turned(surface, angle, is_round)
     mirrors = _mirrors(scene, turned.symmetric)
     low, high, half = _covered(scene, surface)
 
-    def grid(heights: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
-        return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top)
-
-    theta, s = grid((low, high))
-    wide, tall = grid(_heights(surface))
+    lines = geometry().wall_lines
+    theta, s = lines(scene, turned, (low, high), half, mirrors)
+    wide, tall = lines(scene, turned, _heights(surface), half, mirrors)
     radius, z = surface.curve.derivative(tall)[:, 1], surface.curve.derivative(tall)[:, 0]
     beside = np.abs(np.sin(theta)) * radius[(z >= low) & (z <= high)].max(initial=half) <= half
     ends = 4 >> sum(mirrors)  # one more line beside each end of a region

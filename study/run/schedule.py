@@ -17,7 +17,7 @@ IDLE = -1
 def _shared(node: Any, count: int, kind: type) -> tuple[Any, np.ndarray]:
     """A window and ``count`` numbers of eight bytes in it, which all ranks of the node see."""
     window = MPI.Win.Allocate_shared(8 * count if node.rank == 0 else 0, 8, comm=node)
-    memory, _ = window.Shared_query(0)
+    memory: Any = window.Shared_query(0)[0]
     return window, np.frombuffer(memory, kind)
 
 

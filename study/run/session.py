@@ -18,20 +18,18 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError
+from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, Standing
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
-from softjaw.study.run.ladder import Climber, give_up, settle
-from softjaw.study.run.memory import limited_memory
+from softjaw.study.run.limits import GRACE, Stopper, limited_memory
+from softjaw.study.run.load_path import PathSolver, give_up, settle
 from softjaw.study.run.plan import Plan, by_cost
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.schedule import Claims, LostRanks
-from softjaw.study.run.stopping import GRACE, Stopper
-from softjaw.study.writing import make_folders
 
 T = TypeVar("T")
 
@@ -43,7 +41,7 @@ class Work:
     Parameters
     ----------
     solve_unit : callable
-        ``solve_unit(unit)`` yields ``(k, CaseResult | CaseFailure)`` for the forces of a ladder, upward.
+        ``solve_unit(unit)`` yields ``(k, CaseResult | CaseFailure)`` for the forces of a load path, upward.
     image : callable, optional
         ``image(result, unit, c)`` turns a result into that of the ``c``-th candidate which the unit serves.
     finalise : callable, optional
@@ -53,7 +51,7 @@ class Work:
     time_limit : float
         Of a single case [s].
     memory : float, "auto" or "none"
-        As for `study.run.memory.limited_memory`.
+        As for `study.run.limits.limited_memory`.
     """
 
     solve_unit: Callable[[Any], Iterable[tuple[int, Any]]]
@@ -144,7 +142,7 @@ class Session:
 
     def __init__(self, plan: Plan, work: Work, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
-        self._standing = Standing(writer.path)
+        self._state = Standing(writer.path)
         todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
         self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
@@ -164,7 +162,7 @@ class Session:
         claims = Claims(self._comm, len(self._todo))
         lost = LostRanks(claims.node, self._work.time_limit)
         try:
-            arrived, name = self._climb(claims, lost)
+            arrived, name = self._solve_share(claims, lost)
         except StudyError as error:
             _end_all(self._comm, claims, error)
             with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
@@ -184,14 +182,14 @@ class Session:
             self._finish_alone(name)
         return code
 
-    def _climb(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
+    def _solve_share(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
         """Solve this rank's share and wait for the others; whether all of them came, and the signal that came."""
-        climber = Climber(self._writer, self._work.solve_unit, self._work.image, claims, lost, self._standing)
+        solver = PathSolver(self._writer, self._work.solve_unit, self._work.image, claims, lost, self._state)
         unseen = claims.node.size == 1 and self._work.time_limit < math.inf
-        stopper = Stopper(climber.on_stop, self._work.time_limit, lost.patience if unseen else None)
+        stopper = Stopper(solver.on_stop, self._work.time_limit, lost.patience if unseen else None)
         with stopper, limited_memory(self._work.memory, claims.node.size):
             for position in claims:
-                climber.climb(self._todo[position], self._codes, stopper, self._look)
+                solver.solve(self._todo[position], self._codes, stopper, self._look)
             request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
             while not request.Test():
                 self._look()

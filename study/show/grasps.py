@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.margin import TIE
+from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE, FAILED

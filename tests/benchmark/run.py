@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # as study.commands.run does
+os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # as study.cli does
 
 import argparse
 import shutil
@@ -25,7 +25,7 @@ from softjaw.fem.pad import foam as element_kernel
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import approach
-from softjaw.study.environment import launch_environment, mpirun
+from softjaw.study.doctor import launch_environment, mpirun
 from tests.benchmark import factors, kernels
 from tests.benchmark.table import fastest, line, title
 

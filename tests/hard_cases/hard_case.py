@@ -12,9 +12,9 @@ import numpy as np
 
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object, check_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.model import check_poses
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.sweep import units
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene import Scene, SceneError, parse_scene

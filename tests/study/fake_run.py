@@ -57,7 +57,7 @@ def fake_result(row):
     return CaseResult(values, patch, "a note" if row % 7 == 3 else "", {"sheet": ("elastic plate", 0.5, 1)})
 
 
-def fake_ladder(options):
+def fake_path(options):
     """The injected solver; rows are named by the first candidate that a unit serves."""
     from softjaw.study.case.result import CaseFailure
 
@@ -106,9 +106,9 @@ def main():
     options = parser.parse_args()
     from mpi4py import MPI
 
+    from softjaw.study.cli.results import summary
     from softjaw.study.messages import StudyError, complain
     from softjaw.study.run.session import Work, run_study
-    from softjaw.study.show.tables.status import summary
 
     comm = MPI.COMM_WORLD
     if options.file_limit:
@@ -119,7 +119,7 @@ def main():
         def image(result, unit, c):
             return 1 / (unit.index - options.bug) and result
 
-    work = Work(fake_ladder(options), image, finalise, summary, options.limit, options.memory)
+    work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
     try:
         return run_study(
             fake_plan(options.digest, options.stations), work, options.file, comm, retry_failed=options.retry_failed

@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = Path(__file__).parent / "fake_run.py"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
@@ -217,7 +217,7 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     assert good in ("", Flag.COARSE.sentence)
     assert "the force stays below 20 N" in ended
     assert ended.endswith("the last good force is 2 N")
-    assert above.startswith("not tried, because the ladder of forces ended at 20 N")
+    assert above.startswith("not tried, because the load path ended at 20 N")
     assert np.isfinite(quality[small, middle]).tolist() == [True, False, False]
     for radius in (small, large):
         assert all("'quarter' needs 2 plane(s) of symmetry" in text for text in messages[radius, beside])

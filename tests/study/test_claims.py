@@ -13,7 +13,7 @@ BOTTLE = "jobs/bottle-rigid.toml"
 def solved(*overrides, file=BOTTLE):
     """Results of all cases of a scene, in the order of its units and forces."""
     from softjaw.study import pipeline
-    from softjaw.study.case.sweep import units
+    from softjaw.study.case.candidates import units
 
     found = []
     for unit in units(load_scene(file, list(overrides)), lambda point: point.axis_symmetry):

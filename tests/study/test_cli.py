@@ -19,9 +19,9 @@ import pytest
 
 from softjaw import study
 from softjaw.study.cli import main, program
-from softjaw.study.environment import launch_environment
+from softjaw.study.cli.quick import petsc_overrides
+from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import MEANING, StudyError
-from softjaw.study.preparation import petsc_overrides
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
@@ -201,7 +201,7 @@ def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypat
     assert main(["plan", str(scene), "-n", "4", "-o", str(target)]) == 0
     text = capsys.readouterr().out
     assert "12 = 3 x 2 x 2 (station, angle, normal_force)" in text
-    assert "3 ladders of 2 forces, 3 candidates are images of others" in text
+    assert "3 load paths of 2 forces, 3 candidates are images of others" in text
     assert "not known before" in text
     assert not target.parent.exists()
 
@@ -281,7 +281,7 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once
     modules, code = once(lambda: loaded(*QUICK[command](scene, finished)))
     assert code == 0
     assert modules.isdisjoint(HEAVY)
-    assert ("numpy" in modules) == (command not in ("help", "check", "init"))
+    assert ("numpy" in modules) == (command not in ("help", "init"))
 
 
 @pytest.mark.long

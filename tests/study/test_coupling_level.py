@@ -11,7 +11,7 @@ COUPLED = 'effects.friction_pressure_coupling="tangential"'
 
 def test_levels_and_what_they_change():
     """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
-    found = {result.effects["friction_pressure_coupling"][::2] for _, ladder in solved(OVAL) for result in ladder}
+    found = {result.effects["friction_pressure_coupling"][::2] for _, path in solved(OVAL) for result in path}
     assert {(level, REASONS[reason]) for level, reason in found} == {
         ("none", "left out, though the indicator is above the target")
     }

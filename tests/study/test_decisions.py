@@ -54,7 +54,7 @@ def test_equal_grasps_keep_their_order(values, seed):
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
-    from softjaw.study.case.margin import TIE
+    from softjaw.study.case.result import TIE
     from softjaw.study.show.tables.ranking import falling
 
     order = falling(np.array(values))
@@ -149,7 +149,8 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
     monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_PLATE * on)
     assert effects.backing_plate_level(scene).elastic
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
-    reason = effects.coupling_level(scene, [SimpleNamespace(state=None)], False)[2]
+    case = effects.Simulated(scene, [SimpleNamespace(state=None)], [], SimpleNamespace(level=None))
+    reason = effects.LEVELS["friction_pressure_coupling"](case)[2]
     assert effects.REASONS[reason].startswith("left out")
     monkeypatch.setattr(wall, "thin_body", lambda shape: None)
     for indentation, ratio, level in (
@@ -233,8 +234,8 @@ def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
 @pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
 def test_equal_places_give_the_first_ones_as_probes(shift):
     """Pads all along a cylinder touch it alike, but for rounding."""
+    from softjaw.study.case.candidates import units
     from softjaw.study.case.probes import demanding, spread
-    from softjaw.study.case.sweep import units
     from softjaw.study.scene import parse_scene
 
     text = """

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from softjaw.study import doctor, environment
-from softjaw.study.environment import Answer, ask, launch_environment, outside_mpi
+from softjaw.study import doctor
+from softjaw.study.doctor import Answer, ask, launch_environment, outside_mpi
 
 
 def answering(code, output="", errors=""):
@@ -104,7 +104,7 @@ def test_a_crash_and_a_hang_are_answers():
 @pytest.mark.launches
 def test_two_ranks_see_each_other_whatever_started_this_process():
     told = "from mpi4py import MPI; sizes = MPI.COMM_WORLD.gather(MPI.COMM_WORLD.size); sizes and print(sizes)"
-    answer = ask(told, prefix=tuple(environment.mpirun(2)))
+    answer = ask(told, prefix=tuple(doctor.mpirun(2)))
     assert answer.output.strip() == "[2, 2]", answer.errors
 
 
@@ -122,7 +122,7 @@ def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
 def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
-    environment.pin_threads()
+    doctor.pin_threads()
     assert os.environ["OMP_NUM_THREADS"] == "1"
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
 

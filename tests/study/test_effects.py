@@ -13,9 +13,9 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.effects import coupling_level, neglected_traction
+from softjaw.study.case.candidates import units
+from softjaw.study.case.effects import LEVELS, Simulated, neglected_traction
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved
@@ -55,13 +55,15 @@ def test_neglected_traction_is_that_of_sheared_columns_until_they_slide():
 ])  # fmt: skip
 def test_friction_that_does_not_act_back_is_told_where_it_matters(moved, overrides, walled, level, reason):
     contacts = [SimpleNamespace(state=pressed(np.array([d, 0.0, 0.0]), 2e3)) for d in (0.0, moved)]
-    found, indicator, why = coupling_level(scene_of(*overrides), contacts, walled)
+    solver = SimpleNamespace(level=SimpleNamespace(number=int(walled)))
+    case = Simulated(scene_of(*overrides), contacts, [], solver)
+    found, indicator, why = LEVELS["friction_pressure_coupling"](case)
     assert (found, REASONS[why]) == (level, reason)
     assert np.isnan(indicator) if walled else indicator == neglected_traction(contacts[1].state, 0.8)
 
 
 def test_reasons_of_levels_that_no_target_chooses():
-    effects = [result.effects for _, ladder in solved(OVAL) for result in ladder]
+    effects = [result.effects for _, path in solved(OVAL) for result in path]
     for name, level, reason in (
         ("friction", "ccm", "never skipped, because it costs next to nothing"),
         ("limit_surface", "convex quartic", "never skipped, because it costs next to nothing"),

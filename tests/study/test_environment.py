@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from softjaw.study import doctor, environment
-from softjaw.study.environment import COMPILED, compiled_loops_pass, keep_compiled_loops
+from softjaw.study import doctor
+from softjaw.study.doctor import COMPILED, compiled_loops_pass, keep_compiled_loops
 
 CODE = """
 import os, sys
-from softjaw.study.environment import keep_compiled_loops
+from softjaw.study.doctor import keep_compiled_loops
 keep_compiled_loops()
 print(os.environ.get("NUMBA_CACHE_DIR", ""), "numba" in sys.modules)
 """
@@ -24,10 +24,10 @@ print(os.environ.get("NUMBA_CACHE_DIR", ""), "numba" in sys.modules)
 def closed(monkeypatch):
     """Make ``_writable`` say no to some folders, and forget the temporary one afterwards."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setattr(environment.atexit, "register", lambda *_, **__: None)
+    monkeypatch.setattr(doctor.atexit, "register", lambda *_, **__: None)
 
     def close(*names):
-        monkeypatch.setattr(environment, "_writable", lambda folder: not any(n in str(folder) for n in names))
+        monkeypatch.setattr(doctor, "_writable", lambda folder: not any(n in str(folder) for n in names))
 
     yield close
     if compiled_loops_pass():
@@ -60,10 +60,10 @@ def test_a_choice_of_the_users_is_kept(closed, monkeypatch):
 
 def test_folders_are_judged_without_being_made(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    assert environment._writable(tmp_path / "a" / "b")
-    assert not environment._writable(tmp_path / "file" / "b")
-    assert not environment._writable(Path("/dev/null/here"))
-    assert not environment._writable(None)
+    assert doctor._writable(tmp_path / "a" / "b")
+    assert not doctor._writable(tmp_path / "file" / "b")
+    assert not doctor._writable(Path("/dev/null/here"))
+    assert not doctor._writable(None)
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]
 
 
@@ -71,23 +71,23 @@ def test_folders_are_judged_without_being_made(tmp_path):
 def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
     def told():
         # a home that cannot be, and packages that numba could not write beside
-        code = "import softjaw.study.environment as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
+        code = "import softjaw.study.doctor as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
         surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
         command = [sys.executable, "-c", code]
         done = subprocess.run(
-            command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=environment.ROOT,
+            command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT,
             check=True,
         )  # fmt: skip
         return done.stdout.split()
 
     folder, loaded = once(told)
-    assert Path(folder).name.startswith(environment.PASSING)
+    assert Path(folder).name.startswith(doctor.PASSING)
     assert not Path(folder).exists()
     assert loaded == "False"
 
 
 def test_every_package_with_compiled_loops_is_looked_at():
-    home = environment.ROOT / "softjaw"
+    home = doctor.ROOT / "softjaw"
     users = {p.parent.relative_to(home).as_posix() for name in ("fem", "friction", "lsfit", "scoring", "study")
              for p in (home / name).rglob("*.py") if "njit(cache" in p.read_text()}  # fmt: skip
     assert users == set(COMPILED)

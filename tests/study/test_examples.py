@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from softjaw.study.cli import program
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from tests.study.launching import ROOT, launch
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]

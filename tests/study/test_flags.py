@@ -13,7 +13,7 @@ import pytest
 from softjaw.friction.frame import FrameFlag
 from softjaw.scoring.quality import ScoreFlag
 from softjaw.study import pipeline
-from softjaw.study.case import sweep
+from softjaw.study.case import candidates as grasps
 from softjaw.study.cli import main
 from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
 from softjaw.study.lookup import GraspMap
@@ -122,7 +122,7 @@ normal_force_n = [1]
 def solved():
     """One coarse case of the pipeline, and its unit."""
     given = parse_scene(CYLINDER)
-    unit = sweep.units(given, lambda point: point.axis_symmetry)[0]
+    unit = grasps.units(given, lambda point: point.axis_symmetry)[0]
     return unit, next(iter(pipeline.solve_unit(unit)))[1]
 
 

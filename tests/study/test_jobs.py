@@ -12,7 +12,7 @@ from tests.study.launching import ROOT, launch
 
 JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}
 COARSE = ("--set", "gripper.elements=[8, 4, 2]")
-# What makes one quick ladder of each scene.
+# What makes one quick load path of each scene.
 ONE = {
     "bottle-rigid": ("candidates.stations=2", "candidates.station_range_mm=[60, 75]", "candidates.angles_deg=[0]"),
     "box-poses": (),

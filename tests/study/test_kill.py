@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows

@@ -37,8 +37,8 @@ def exact(result, f, model, count):
 
 @pytest.mark.parametrize("angle", [0, 30])
 def test_stored_quartics_pass_the_wrenches_of_the_stored_patch_as_closely_as_their_fit_error_says(angle):
-    [(_, ladder)] = solved(OVAL, angles=f"[{angle}]")
-    for result in ladder:
+    [(_, path)] = solved(OVAL, angles=f"[{angle}]")
+    for result in path:
         values = result.values
         for f in range(2):
             for m, model in enumerate(MODELS):

@@ -18,14 +18,13 @@ import scipy.sparse as sp
 from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study import messages
 from softjaw.study.case.result import TimeLimitError
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import Standing
 from softjaw.study.result.store import open_result
-from softjaw.study.run import memory
-from softjaw.study.run.memory import available, limited_memory
-from softjaw.study.run.stopping import GRACE, AbandonedError, Stopper
+from softjaw.study.run import limits
+from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 
@@ -48,7 +47,7 @@ def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
 
 
 def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
-    monkeypatch.setattr("softjaw.study.run.stopping.AGAIN", 0.05)
+    monkeypatch.setattr("softjaw.study.run.limits.AGAIN", 0.05)
 
     def deaf():
         with contextlib.suppress(TimeLimitError):  # as what is raised inside a finaliser is
@@ -149,10 +148,10 @@ def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path,
     files = {"memory.max": "8000000000", "memory.current": "7000000000", "memory.stat": "inactive_file 3000000000\n"}
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    monkeypatch.setattr(memory, "CGROUPS", tmp_path)
-    ask = memory._lines
+    monkeypatch.setattr(limits, "CGROUPS", tmp_path)
+    ask = limits._lines
     asked = {"/proc/self/cgroup": ["0::/"], "/proc/meminfo": ["MemAvailable:   9000000 kB"]}
-    monkeypatch.setattr(memory, "_lines", lambda path: asked.get(str(path)) or ask(path))
+    monkeypatch.setattr(limits, "_lines", lambda path: asked.get(str(path)) or ask(path))
     assert available() == 4e9  # 8 - 7 + 3 GB; the machine itself would have 9.2
     (tmp_path / "memory.max").write_text("max\n")
     assert available() == 1024 * 9e6
@@ -331,7 +330,7 @@ def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
 @pytest.mark.long
 @pytest.mark.launches
 @pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
-def test_more_ranks_than_cores_or_ladders(once, shared_path, stations, ranks):
+def test_more_ranks_than_cores_or_load_paths(once, shared_path, stations, ranks):
     path = shared_path / "many.hdf"
     code, _, errors = once(study, ranks, path, "--stations", stations)
     assert code == 0, errors

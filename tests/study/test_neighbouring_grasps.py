@@ -11,7 +11,7 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
-from softjaw.study.case.sweep import units
+from softjaw.study.case.candidates import units
 from softjaw.study.scene import load_scene
 from tests.friction.test_torque import centred, two_ends
 from tests.study.launching import ROOT
@@ -34,7 +34,7 @@ def grasps(first, last, count, forces="[1, 2]"):
 
 def values(results, name, force):
     """A map's values of the curved model ``(count,)``, or a finger's, of the first finger."""
-    found = np.array([ladder[force].values[name] for ladder in results])
+    found = np.array([path[force].values[name] for path in results])
     return found if found.ndim == 1 else found[:, 0]
 
 

@@ -14,9 +14,9 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import solving
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import parse_scene
@@ -50,7 +50,7 @@ normal_force_n = {forces}
 
 def cases(*arguments, **choices):
     """Values of every case, in order."""
-    return [result.values for _, ladder in solved(*arguments, **choices) for result in ladder]
+    return [result.values for _, path in solved(*arguments, **choices) for result in path]
 
 
 def e_n(*arguments, **choices):
@@ -175,10 +175,10 @@ def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, 
 ])  # fmt: skip
 def test_images_under_the_objects_symmetry_are_what_solving_them_gives(shape, station, angles):
     stations = f"[{station}]"
-    [(unit, ladder)] = solved(shape, stations=stations, angles=str(list(angles)))
+    [(unit, path)] = solved(shape, stations=stations, angles=str(list(angles)))
     assert len(unit.served) == 2
     [(_, own)] = solved(shape, stations=stations, angles=f"[{angles[1]}]")
-    for result, expected in zip(ladder, own, strict=True):
+    for result, expected in zip(path, own, strict=True):
         turned = pipeline.image(result, unit, 1)
         assert differing(turned.values, expected.values, 1e-9, SCALES) == []
         assert [e[0] for e in turned.effects.values()] == [e[0] for e in expected.effects.values()]
@@ -195,8 +195,8 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
             names = [name for name in expected if name.startswith(("maps/", "fingers/"))]
             pick = [{name: values[name] for name in names} for values in (found, expected)]
             assert differing(*pick, 1e-8, SCALES) == []
-    [(_, ladder)] = solved(OVAL)
-    assert [ladder[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
+    [(_, path)] = solved(OVAL)
+    assert [path[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
         "quarter",
         "half",
     ]
@@ -230,8 +230,8 @@ def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, lengt
 
 
 def test_without_friction_nothing_is_held_and_a_flag_says_so():
-    [(_, ladder)] = solved(OVAL, "friction.mu=0")
-    for result, held in zip(ladder, cases(OVAL), strict=True):
+    [(_, path)] = solved(OVAL, "friction.mu=0")
+    for result, held in zip(path, cases(OVAL), strict=True):
         values = result.values
         for name in ("quality", "epsilon", "f_x_max", "f_y_max", "tau_z_max"):
             assert (np.asarray(values[f"maps/{name}"]) == 0.0).all()
@@ -274,11 +274,11 @@ def test_error_maps_are_the_differences_to_the_coarser_mesh_and_shrink_with_refi
 @pytest.mark.parametrize(("shape", "station"), [(OVAL, 0), (BALL, 0), (PLATE, 0), (CONE, 75)])
 def test_the_pad_stands_at_first_touch_and_lies_on_the_object_under_load(shape, station):
     """The contact's laws with weighted gaps: pressures do no work against them, so the sum of load times gap is 0."""
-    [(unit, ladder)] = solved(shape, stations=f"[{station}]")
+    [(unit, path)] = solved(shape, stations=f"[{station}]")
     obj = build_object(unit.scene.object)
     x, y = np.meshgrid(np.linspace(-0.025, 0.025, 501), np.linspace(-0.011, 0.011, 23))
     front = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    for result in ladder:
+    for result in path:
         values, patch = result.values, result.patch
         for f in range(2):
             rotation, origin = values["fingers/pose_rotation"][f], values["fingers/pose_origin"][f]
@@ -295,28 +295,28 @@ def test_the_pad_stands_at_first_touch_and_lies_on_the_object_under_load(shape, 
             assert patch["normal"][f][loaded] == pytest.approx(inward[loaded], abs=1e-9)
             assert values["fingers/S"][f] == pytest.approx(load.sum(), rel=1e-12)
             along = (load * patch["normal"][f][:, 2]).sum()
-            assert along == pytest.approx(unit.scene.load.normal_force[ladder.index(result)], rel=1e-8)
+            assert along == pytest.approx(unit.scene.load.normal_force[path.index(result)], rel=1e-8)
 
 
 @pytest.mark.parametrize("radius", [5, 30])
-def test_a_ladder_that_ends_names_the_last_good_force_and_what_was_not_tried(radius):
-    [(_, ladder)] = solved(f'shape = "sphere"\nradius_mm = {radius}', forces="[2, 20, 30]")
+def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(radius):
+    [(_, path)] = solved(f'shape = "sphere"\nradius_mm = {radius}', forces="[2, 20, 30]")
     if radius == 30:
-        assert not any(isinstance(result, CaseFailure) for result in ladder)
+        assert not any(isinstance(result, CaseFailure) for result in path)
         return
-    good, ended, above = ladder
+    good, ended, above = path
     assert good.values["maps/e_n"][CURVED] > 0
     assert isinstance(ended, CaseFailure)
     assert ended.message.startswith("the force stays below 20 N: reached ")
     assert ended.message.endswith("; the last good force is 2 N")
-    assert above.message.startswith("not tried, because the ladder of forces ended at 20 N: ")
+    assert above.message.startswith("not tried, because the load path ended at 20 N: ")
 
 
-def test_a_ladder_without_a_first_rung_says_so():
+def test_a_load_path_without_a_first_step_says_so():
     first, second = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
     assert "no force below it was tried" in first.message
     assert first.message.endswith("; no force below it was tried")
-    assert second.message.startswith("not tried, because the ladder of forces ended at 2 N")
+    assert second.message.startswith("not tried, because the load path ended at 2 N")
 
 
 def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
@@ -338,10 +338,10 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
     place = ["candidates.stations_mm=[161.76470588235293]", "load.normal_force_n=[7, 10, 13]"]
     scene = parse_scene(path.read_text(), path, place)
     [unit] = units(scene, lambda point: point.object.axis_symmetry)
-    ladder = [result for _, result in pipeline.solve_unit(unit)]
-    assert [bool(result.values["maps/flags"] & 512) for result in ladder] == [False, True, True]
-    assert "nodal gaps were taken" not in ladder[0].message
-    for result in ladder[1:]:
+    path = [result for _, result in pipeline.solve_unit(unit)]
+    assert [bool(result.values["maps/flags"] & 512) for result in path] == [False, True, True]
+    assert "nodal gaps were taken" not in path[0].message
+    for result in path[1:]:
         assert "weighted gaps had no solution, nodal gaps were taken" in result.message
 
 
@@ -400,9 +400,9 @@ def test_contacts_beside_each_other_are_flagged_although_their_normals_are_paral
 def test_pads_that_would_run_into_each_other_are_flagged():
     """Two pads on a ball of 12 mm: together they closing displacement further than the ball is thick."""
     ball = 'shape = "sphere"\nradius_mm = 6'
-    [(_, ladder)] = solved(ball, forces="[1, 20]", elements="[20, 10, 6]")
-    assert [bool(case.values["maps/flags"] & Flag.COLLISION) for case in ladder] == [False, True]
-    assert [2 * case.values["maps/closing"] > 0.012 for case in ladder] == [False, True]
+    [(_, path)] = solved(ball, forces="[1, 20]", elements="[20, 10, 6]")
+    assert [bool(case.values["maps/flags"] & Flag.COLLISION) for case in path] == [False, True]
+    assert [2 * case.values["maps/closing"] > 0.012 for case in path] == [False, True]
 
 
 def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
@@ -422,6 +422,6 @@ def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monke
     jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
     monkeypatch.setattr("softjaw.fem.contact.load_stepping.Following._leaves", jumps)
     found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
-    for _, ladder in found:
-        assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in ladder] == [False, True, True]
-        assert [("depends on the load path" in result.message) for result in ladder] == [False, True, True]
+    for _, path in found:
+        assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in path] == [False, True, True]
+        assert [("depends on the load path" in result.message) for result in path] == [False, True, True]

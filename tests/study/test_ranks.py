@@ -9,14 +9,14 @@ import sys
 import numpy as np
 import pytest
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, contents, differing, launch, wait_for
 
 pytestmark = pytest.mark.launches
 
-# Two stations x three angles: 205 degrees is the image of 25, so there are four ladders of two forces.
+# Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
 SCENE = """
 [object]
 shape = "box"

@@ -114,7 +114,7 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
     code, output, errors = once(study, 2, path, "--fail", 9, "--raises", 25)
     assert code == 6, errors
     assert "1 x no contact at this force\n      at station 20 mm, angle 90 deg, normal_force 1 N\n" in output
-    # The exception ends the ladder: its row and the one above, for both candidates.
+    # The exception ends the load path: its row and the one above, for both candidates.
     told = " ".join(output.split())
     assert "2 x ArithmeticError: the contact solve diverged (fake_run.py:" in told
     assert "2 x not tried, because a lower force of this candidate failed: ArithmeticError: the" in told

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softjaw.study.environment import launch_environment
+from softjaw.study.doctor import launch_environment
 from softjaw.study.run.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
-from softjaw.study.run.scaling import Ladder, Machine, replay, replayed, segmented
+from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
 
 CLAIMS = """
 from mpi4py import MPI
@@ -86,7 +86,7 @@ def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
     assert by_cost([2.0, 3.0, 2.0]) == [1, 0, 2]
 
 
-def test_more_ranks_than_ladders_are_not_sensible():
+def test_more_ranks_than_load_paths_are_not_sensible():
     assert sensible_ranks([1.0] * 35) == 35
     assert sensible_ranks([10.0, 1.0, 1.0]) == 1
     assert sensible_ranks([]) == 1
@@ -101,29 +101,23 @@ def test_times_of_unsolved_units_follow_from_their_cost():
 
 def test_a_replay_without_delays_takes_what_list_scheduling_takes():
     random = np.random.default_rng(2)
-    ladders = [Ladder(tuple(own), own.sum()) for own in random.random((50, 4))]
+    paths = [LoadPath(tuple(own), own.sum()) for own in random.random((50, 4))]
     for ranks in (1, 3, 16, 70):
-        expected = makespan([ladder.cost for ladder in ladders], ranks)
-        assert replayed(ladders, ranks, Machine(100, 0.0, 0.0, 0.0)) == pytest.approx(expected, rel=1e-12)
+        expected = makespan([own.cost for own in paths], ranks)
+        assert replayed(paths, ranks, Machine(100, 0.0, 0.0, 0.0)) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_replay_finds_each_limit_where_its_closed_form_is():
-    """64 ladders of four seconds on 64 ranks: 4 s, and what the counter or the file system adds to that."""
-    ladders = [Ladder((1.0,) * 4, 4.0)] * 64
-    assert replay(ladders, 64, Machine(64, 0.0, 0.0, 0.0)).efficiency == 1.0
-    slow_counter = replay(ladders, 64, Machine(64, 0.5, 0.0, 0.0))
+    """64 load paths of four seconds on 64 ranks: 4 s, and what the counter or the file system adds to that."""
+    paths = [LoadPath((1.0,) * 4, 4.0)] * 64
+    assert replay(paths, 64, Machine(64, 0.0, 0.0, 0.0)).efficiency == 1.0
+    slow_counter = replay(paths, 64, Machine(64, 0.5, 0.0, 0.0))
     assert (slow_counter.seconds, slow_counter.limit) == (64 * 0.5 + 4, "counter")
-    slow_files = replay(ladders, 64, Machine(64, 0.0, 0.1, 0.1))  # 256 cases, one after another, after the first second
+    slow_files = replay(paths, 64, Machine(64, 0.0, 0.1, 0.1))  # 256 cases, one after another, after the first second
     assert (slow_files.seconds, slow_files.limit) == (pytest.approx(1 + 256 * 0.1), "file system")
-    too_many = replay(ladders, 128, Machine(64, 0.0, 0.0, 0.0))
-    assert (too_many.seconds, too_many.efficiency, too_many.limit) == (4.0, 0.5, "longest ladder")
-    uneven = replay(ladders, 60, Machine(60, 0.0, 0.0, 0.0))
-    assert (uneven.seconds, uneven.limit) == (8.0, "division of ladders")
+    too_many = replay(paths, 128, Machine(64, 0.0, 0.0, 0.0))
+    assert (too_many.seconds, too_many.efficiency, too_many.limit) == (4.0, 0.5, "longest load path")
+    uneven = replay(paths, 60, Machine(60, 0.0, 0.0, 0.0))
+    assert (uneven.seconds, uneven.limit) == (8.0, "division of load paths")
     # three nodes get every third ladder: 22, 21 and 21 of them for 20 ranks each
-    assert replayed(ladders, 60, Machine(20, 0.0, 0.0, 0.0)) == 8.0
-
-
-def test_a_part_of_a_ladder_climbs_to_its_first_force():
-    parts = segmented([Ladder((1.0, 2.0, 3.0, 4.0), 10.0)], 2)
-    assert [part.seconds for part in parts] == [(1.0, 2.0), (6.0, 4.0)]
-    assert replayed(parts, 2, Machine(2, 0.0, 0.0, 0.0)) == 10.0
+    assert replayed(paths, 60, Machine(20, 0.0, 0.0, 0.0)) == 8.0

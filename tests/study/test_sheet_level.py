@@ -16,7 +16,7 @@ RIGID = 'effects.sheet="rigid"'
 
 def level(*overrides):
     """Level, indicator and reason, alike in every case."""
-    (found,) = {result.effects["sheet"] for _, ladder in solved(OVAL, *overrides) for result in ladder}
+    (found,) = {result.effects["sheet"] for _, path in solved(OVAL, *overrides) for result in path}
     return found[0], found[1], REASONS[found[2]]
 
 

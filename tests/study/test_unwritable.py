@@ -14,11 +14,10 @@ from matplotlib.figure import Figure
 
 from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
-from softjaw.study.environment import launch_environment
-from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.doctor import launch_environment
+from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
 from softjaw.study.show.figures import drawing as figures
 from softjaw.study.show.report import writing as report
-from softjaw.study.writing import beside, make_folders, write_file
 from tests.study.launching import ROOT, launch
 from tests.study.view_files import make
 

@@ -10,8 +10,8 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.case import wall
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.sweep import units
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
 from softjaw.study.scene import parse_scene
@@ -160,8 +160,8 @@ def test_results_do_not_depend_on_what_was_solved_before():
         return {id(u): [r.values for _, r in pipeline.solve_unit(u)] for u in order}
 
     forth, back = run((one, two)), run((two, one))
-    for key, ladder in forth.items():
-        for a, b in zip(ladder, back[key], strict=True):
+    for key, path in forth.items():
+        for a, b in zip(path, back[key], strict=True):
             assert not differing(a, b, 0.0)
 
 
@@ -178,11 +178,11 @@ def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     from softjaw.fem.shell.grip import Opening
 
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
-    ladder = [r for _, r in pipeline.solve_unit(units_of(CUP, forces="[0.2, 3, 4]")[0])]
-    assert not isinstance(ladder[0], CaseFailure)
-    assert "the wall collapsed: its opposite sides meet at" in ladder[1].message
-    assert "the last good force is 0.2 N" in ladder[1].message
-    assert ladder[2].message.startswith("not tried")
+    path = [r for _, r in pipeline.solve_unit(units_of(CUP, forces="[0.2, 3, 4]")[0])]
+    assert not isinstance(path[0], CaseFailure)
+    assert "the wall collapsed: its opposite sides meet at" in path[1].message
+    assert "the last good force is 0.2 N" in path[1].message
+    assert path[2].message.startswith("not tried")
 
 
 def test_a_grasp_whose_support_bears_more_than_friction_slides_out():

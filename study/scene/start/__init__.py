@@ -11,8 +11,7 @@ from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
-from softjaw.study.writing import write_file
+from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 
 HERE = Path(__file__).parent
 PAD_LENGTH, PAD_WIDTH = 50.0, 22.0  # mm; of objects that are large enough for such pads

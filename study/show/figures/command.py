@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import os
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
 from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, USAGE, StudyError, first_rank
-from softjaw.study.show.figures import JOBS
+from softjaw.study.show.figures import JOBS, drawing
 
 FOLDER = "results/figures"
-
-
-def add_options(parser: ArgumentParser) -> None:
-    """The options of the command."""
-    parser.add_argument("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
-    parser.add_argument("-o", metavar="PNG", dest="output", default=FOLDER,
-                        help=f"picture, or folder for several (default: {FOLDER})")  # fmt: skip
-    parser.add_argument("--results", metavar="FOLDER", default="results",
-                        help="where the scenes' results are or will be (default: results)")  # fmt: skip
 
 
 def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
@@ -28,10 +19,8 @@ def figure(options: Namespace, run: Callable[[Path, Path], int]) -> int:
     ``run(scene, file)`` solves a scene into its file and returns the exit code.
     """
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported, as a run wants it
-    from softjaw.study.show.figures import drawing  # loads plotters, which the options above do not need
-
     wanted = drawing.chosen(options.names)
-    paths = drawing.targets(wanted, Path(options.output))
+    paths = drawing.targets(wanted, Path(options.output or FOLDER))
     results, codes = {}, {DONE}
     for scene in dict.fromkeys(scene for one in wanted for scene in one.scenes):
         results[scene] = Path(options.results) / f"{scene}.hdf"

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.messages import SOME_FAILED, USAGE, StudyError
+from softjaw.study.messages import SOME_FAILED, USAGE, StudyError, write_file
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import open
 from softjaw.study.show.figures import contacts, studies, surfaces
 from softjaw.study.show.grasps import judge
-from softjaw.study.writing import write_file
 
 EVERY, DPI = "all", 140
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study import pictures
-from softjaw.study.messages import CANNOT_WRITE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, heading, page, text
 from softjaw.study.quantities import FIRST
 from softjaw.study.result.grid_surface import edges
@@ -36,7 +36,6 @@ from softjaw.study.show.grasps import (
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
 from softjaw.study.show.view.model import Place, View, read_scene, view_of
 from softjaw.study.show.view.object3d import object_block
-from softjaw.study.writing import write_file
 
 
 def write_report(file: Path, out: Path, candidate: int | None = None, place: Place = (None, None)) -> list[Path]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.margin import TIE
+from softjaw.study.case.result import TIE
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]

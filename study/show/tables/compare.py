@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from softjaw.study.case.margin import TIE
+from softjaw.study.case.result import TIE
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.result.layout import DONE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
@@ -12,11 +13,18 @@ import numpy as np
 from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, PARTS, STATES
 from softjaw.study.result.lock import holder
-from softjaw.study.result.store import place_text
+from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
+
+
+def status(options: Namespace) -> str:
+    """Say what a result file holds so far, as text, JSON or CSV."""
+    forms = {"json": status_json, "csv": status_csv}
+    with open_result(options.file) as result:
+        return forms[options.form](result) if options.form else status_text(result, terminal_width())
 
 
 def status_text(result: Any, width: int = PAPER) -> str:
@@ -64,19 +72,6 @@ def place(result: Any, row: int) -> str:
 def _place(result: Any, row: int) -> list[float]:
     index = np.unravel_index(row, result.layout.shape)
     return [float(axis.values[i]) for axis, i in zip(result.axes, index, strict=True)]
-
-
-def summary(result: Any) -> str:
-    """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
-    # here and not above: 'status' must not wait for xarray
-    from softjaw.study.result.read import dataset
-    from softjaw.study.show.tables.show import as_text, best
-
-    width = terminal_width()
-    table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
-    again = "; run the same command again to resume" if np.any(result.status == MISSING) else ""
-    lines = [counts(result), *reasons(result, width), *time_split(result), *table]
-    return "\n".join([*lines, f"results are in {result.path}{again}"])
 
 
 def counts(result: Any) -> str:

@@ -5,45 +5,21 @@ from __future__ import annotations
 import math
 import os
 import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import Namespace
 from pathlib import Path
 
-from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
-from softjaw.study.writing import beside, write_file
+from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, beside, write_file
+from softjaw.study.result.read import open
+from softjaw.study.show.grasps import judge
+from softjaw.study.show.view import grids, model, object3d, window
 
 ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm"), "vtkhdf": (".vtkhdf", ".hdf")}
-
-
-def add_options(parser: ArgumentParser) -> None:
-    """The options of the command."""
-    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    add_choice(parser)
-    parser.add_argument("--force", type=_number, metavar="N", help="force level nearest to N [N]")
-    parser.add_argument("--quantity", metavar="NAME", help="map on the object (default: quality)")
-    parser.add_argument("--motion", choices=("x", "y", "turn"), default="x",
-                        help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
-    parser.add_argument("--screenshot", metavar="PNG", help="write a picture; needs no screen")
-    parser.add_argument("--html", metavar="HTML", help="write the view as one self-contained HTML file")
-    parser.add_argument("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
-
-
-def add_choice(parser: ArgumentParser) -> None:
-    """Options that choose a candidate; `choice` reads them."""
-    parser.add_argument("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
-    parser.add_argument("--station", type=_number, metavar="MM", help="candidate nearest to this station [mm]")
-    parser.add_argument("--angle", type=_number, metavar="DEG", help="candidate nearest to this angle [deg]")
 
 
 def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
     """Candidate, and station [m] and angle [rad], as far as they were given."""
     angle = None if options.angle is None else math.radians(options.angle)
     return options.candidate, (None if options.station is None else 1e-3 * options.station, angle)
-
-
-def _number(text: str) -> float:
-    if not math.isfinite(value := float(text)):
-        raise ArgumentTypeError(f"found {text}, expected a number")
-    return value
 
 
 def view(options: Namespace) -> None:
@@ -58,11 +34,6 @@ def view(options: Namespace) -> None:
     if not paths and not has_screen():
         text = "no screen for a window: found none of --html, --screenshot and --vtkhdf, expected one of them"
         raise StudyError(USAGE, text)
-    # here, for the command line reads the options above at every start
-    from softjaw.study.result.read import open
-    from softjaw.study.show.grasps import judge
-    from softjaw.study.show.view import grids, model, object3d, window
-
     found, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
     quantity, written = model.quantity_of(found.ds, options.quantity), []
     if "screenshot" in paths:

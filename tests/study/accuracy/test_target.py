@@ -16,8 +16,8 @@ from softjaw.study.accuracy.cost_study import Measured, new_study, plain
 from softjaw.study.accuracy.measure import measure_once
 from softjaw.study.accuracy.parameters import Level, with_level
 from softjaw.study.accuracy.target import mesh_errors, quick_choice, quick_probes
+from softjaw.study.case.candidates import units
 from softjaw.study.case.probes import Probe, demanding
-from softjaw.study.case.sweep import units
 from softjaw.study.scene import load_scene
 from tests.study.accuracy.test_cost import COARSE, CYLINDER, formula_study, scene
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softjaw.study.case import candidates, sweep
+from softjaw.study.case import candidates
 from softjaw.study.scene import load_scene, parse_scene
 
 JOBS = Path(__file__).parents[3] / "jobs"
@@ -49,7 +49,7 @@ def about_z(angle):
 @pytest.mark.parametrize("angle", [0, 30, 90, -120, 360])
 def test_both_pads_face_each_other_with_the_same_long_side(angle, roll):
     scene = parse_scene(CYLINDER, overrides=[f"candidates.angles_deg=[{angle}]", f"candidates.roll_deg={roll}"])
-    for place in sweep.candidates(scene):
+    for place in candidates.candidates(scene):
         one, other = place.poses
         theta = np.radians(angle)
         outwards = np.array([np.cos(theta), np.sin(theta), 0])
@@ -75,7 +75,7 @@ def test_roll_turns_the_gripper_about_the_approach_of_finger_1():
 def test_an_explicit_pose_equals_the_station_that_it_describes():
     theta = np.radians(30)
     approach = (-np.cos(theta), -np.sin(theta), 0.0)
-    (place,) = sweep.candidates(poses(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
+    (place,) = candidates.candidates(poses(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
     for pose, same in zip(place.poses, candidates.axis_poses(0.03, theta, 0.0), strict=True):
         assert pose.rotation == pytest.approx(same.rotation, abs=1e-15)
         assert pose.origin == pytest.approx(same.origin, abs=1e-14)
@@ -88,7 +88,7 @@ def test_axes_end_with_station_angle_and_force_in_si_units():
         "sweep.gripper.material=['linear', 'blatz_ko']",
         "sweep.friction.mu=[0.5]",
     ]
-    axes = sweep.axes(parse_scene(CYLINDER, overrides=over))
+    axes = candidates.axes(parse_scene(CYLINDER, overrides=over))
     assert [a.name for a in axes] == ["semi_axis_b", "material", "mu", "station", "angle", "normal_force"]
     assert [a.units for a in axes] == ["m", "", "", "m", "rad", "N"]
     assert axes[0].values.tolist() == [0.01, 0.02, 0.04]
@@ -99,14 +99,14 @@ def test_axes_end_with_station_angle_and_force_in_si_units():
 
 
 def test_axes_of_explicit_poses_number_the_candidates():
-    axes = sweep.axes(poses(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
+    axes = candidates.axes(poses(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
     assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
 
 
 def test_swept_keys_of_one_name_keep_their_section_in_the_axis_name():
-    apart = sweep._sweep_axes({"object.length_mm": (10.0,), "score.object_length_mm": (10.0,)})
+    apart = candidates._sweep_axes({"object.length_mm": (10.0,), "score.object_length_mm": (10.0,)})
     assert [a.name for a in apart] == ["length", "object_length"]
-    alike = sweep._sweep_axes({"effects.friction": ("auto",), "x.friction": ("a",), "x.angle_deg": (90.0,)})
+    alike = candidates._sweep_axes({"effects.friction": ("auto",), "x.friction": ("a",), "x.angle_deg": (90.0,)})
     assert [a.name for a in alike] == ["effects_friction", "x_friction", "x_angle"]
 
 
@@ -122,7 +122,7 @@ def test_swept_keys_of_one_name_keep_their_section_in_the_axis_name():
 )
 def test_images_under_the_symmetry_of_the_object_are_served_together(order, groups):
     """Angles 0, 30, 90, 180, 210, 360 degrees: alike when they differ by a multiple of 360 / order."""
-    places = sweep.candidates(parse_scene(CYLINDER))
+    places = candidates.candidates(parse_scene(CYLINDER))
     found = [[n for n, _ in group] for group in candidates.groups(places, order)]
     assert found == [[6 * station + n for n in group] for station in range(3) for group in groups]
 
@@ -130,7 +130,7 @@ def test_images_under_the_symmetry_of_the_object_are_served_together(order, grou
 @pytest.mark.parametrize("order", [0, 1, 2, 4])
 @pytest.mark.parametrize("roll", [0, 40])
 def test_the_turn_takes_one_pair_of_pads_into_the_other(order, roll):
-    units = sweep.units(parse_scene(CYLINDER, overrides=[f"candidates.roll_deg={roll}"]), lambda scene: order)
+    units = candidates.units(parse_scene(CYLINDER, overrides=[f"candidates.roll_deg={roll}"]), lambda scene: order)
     for unit in units:
         assert unit.served[0] is unit.candidate
         for place, turn in zip(unit.served, unit.turns, strict=True):
@@ -151,7 +151,7 @@ def test_explicit_poses_are_grouped_whatever_point_of_the_line_was_given():
         ((0, 0, 20), (1, 0, 1), (0, 1, 0)),  # tilted
         ((0, 0, 20), (0, -1, 1), (1, 0, 0)),  # tilted and turned by -90 degrees
     ]
-    places = sweep.candidates(poses(*given))
+    places = candidates.candidates(poses(*given))
     found = {order: [[n for n, _ in group] for group in candidates.groups(places, order)] for order in (0, 1, 2)}
     assert found[0] == [[0, 1, 2, 3], [4], [5], [6], [7, 8]]
     assert found[1] == [[0, 1], [2], [3], [4], [5], [6], [7], [8]]
@@ -175,7 +175,7 @@ def test_nothing_is_grouped_that_is_not_an_image_at_random():
 @pytest.mark.parametrize("swept", [[], ["sweep.object.semi_axis_b_mm=[10, 20]", "sweep.friction.mu=[0.2, 0.5, 0.8]"]])
 def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(order, swept):
     scene = parse_scene(CYLINDER, overrides=swept)
-    axes, units = sweep.axes(scene), sweep.units(scene, lambda s: order)
+    axes, units = candidates.axes(scene), candidates.units(scene, lambda s: order)
     shape = [len(a.values) for a in axes]
     assert sorted(chain.from_iterable(chain.from_iterable(u.rows for u in units))) == list(range(scene.cases))
     assert int(np.prod(shape)) == scene.cases
@@ -194,28 +194,28 @@ def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(order, 
 def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep():
     scene = parse_scene(CYLINDER, overrides=["sweep.object.semi_axis_b_mm=[20, 25]"])
     round_or_not = [
-        u.scene.object.semi_axis_b for u in sweep.units(scene, lambda s: 0 if s.object.semi_axis_b == 0.025 else 2)
+        u.scene.object.semi_axis_b for u in candidates.units(scene, lambda s: 0 if s.object.semi_axis_b == 0.025 else 2)
     ]
     assert (round_or_not.count(0.02), round_or_not.count(0.025)) == (9, 3)
 
 
 def test_a_swept_roll_turns_the_pads():
     scene = parse_scene(CYLINDER, overrides=["sweep.candidates.roll_deg=[0, 90]"])
-    sides = [u.candidate.poses[0].rotation[2, 0] for u in sweep.units(scene, lambda s: 0)]
+    sides = [u.candidate.poses[0].rotation[2, 0] for u in candidates.units(scene, lambda s: 0)]
     assert sides == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-15)
 
 
 def test_finer_meshes_more_forces_and_better_elements_cost_more():
     base = parse_scene(CYLINDER)
-    assert sweep.ladder_cost(base) == 3 * 20 * 10 * 6
+    assert candidates.path_cost(base) == 3 * 20 * 10 * 6
     finer = [{"gripper.element": "hex27"}, {"accuracy.meshes": 2}]
-    assert [sweep.ladder_cost(base.with_values(v)) / sweep.ladder_cost(base) for v in finer] == [8, 1.125]
+    assert [candidates.path_cost(base.with_values(v)) / candidates.path_cost(base) for v in finer] == [8, 1.125]
 
 
 def test_the_bottle_has_70_candidates_and_35_units():
     scene = load_scene(JOBS / "bottle-rigid.toml")
-    assert len(sweep.candidates(scene)) == 70
-    assert len(sweep.units(scene, lambda s: 0)) == 35
+    assert len(candidates.candidates(scene)) == 70
+    assert len(candidates.units(scene, lambda s: 0)) == 35
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softjaw.study import pipeline
-from softjaw.study.case import sweep
+from softjaw.study.case import candidates as grasps
 from softjaw.study.cli import main
 from softjaw.study.lookup import GraspMap
 from softjaw.study.messages import OTHER_FILE, StudyError
@@ -62,7 +62,7 @@ def whole(tmp_path_factory):
     create(path, plan.layout, plan.header)
     writer = ResultWriter(path, plan.layout, None)
     writer.begin_session(start="2024-01-01T00:00:00+00:00", reason="running", ranks=1, host="here")
-    for unit in sweep.units(scene, lambda point: point.axis_symmetry):
+    for unit in grasps.units(scene, lambda point: point.axis_symmetry):
         for k, result in pipeline.solve_unit(unit):
             for c, rows in enumerate(unit.rows):
                 writer.count_attempt(rows[k])

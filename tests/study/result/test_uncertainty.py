@@ -11,7 +11,7 @@ import xarray as xr
 import softjaw
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.closed_form import volume_linf
-from softjaw.study.case import probing, sweep
+from softjaw.study.case import candidates, probing
 from softjaw.study.case.candidates import axis_poses
 from softjaw.study.case.probing import _volume
 from softjaw.study.case.variations import by_formula, moved_poses, variations
@@ -167,7 +167,7 @@ def test_named_probes_are_those_that_are_solved():
     from softjaw.study.case.variations import probe_candidates, with_probes
 
     given = scene(*ALL, 'uncertainty.probes=["20 mm, 90 deg", 0]')
-    units = sweep.units(given, lambda point: point.axis_symmetry)
+    units = candidates.units(given, lambda point: point.axis_symmetry)
     chosen = probe_candidates(given, units)
     assert chosen == (0, 5)
     marked = [unit for unit in with_probes(given, units, chosen) if unit.probe]
@@ -192,13 +192,13 @@ def test_values_of_probes_stand_at_their_places():
 
 
 def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
-    def ladder(_unit, variation):
+    def path_of(_unit, variation):
         yield 1.0, 2.0
         if variation.part == "mesh":
             raise RuntimeError("no convergence")
         yield 3.0, 4.0
 
-    monkeypatch.setattr(probing, "_ladder", ladder)
+    monkeypatch.setattr(probing, "_path", path_of)
     own = probing.Probing(SimpleNamespace(probe=True, scene=scene("uncertainty.mesh=true", "uncertainty.pose_mm=1")))
     assert own.values()["probes/e_n"].tolist() == [1.0, 1.0, 1.0]
     assert np.array_equal(own.values()["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
@@ -280,7 +280,7 @@ def solved(given, name):
     from softjaw.study.case.result import CaseFailure
     from softjaw.study.pipeline import solve_unit
 
-    units = sweep.units(given, lambda point: point.axis_symmetry)
+    units = candidates.units(given, lambda point: point.axis_symmetry)
     found = np.full((len(name), len(units), len(given.load.normal_force)), np.nan)
     for i, unit in enumerate(units):
         for k, case in solve_unit(unit):
@@ -322,8 +322,8 @@ def test_nine_of_ten_mesh_errors_lie_within_the_interval_that_five_probes_give()
     probes = list(probe_candidates(given, units))
     sound = (flags & LOST == 0) & np.isfinite(error).all(axis=0)
     others = sound & ~np.isin(np.arange(len(area)), probes)[:, None]
-    one = next(unit for unit in sweep.units(given, lambda point: point.axis_symmetry) if unit.index == probes[2])
-    again = [e_n for e_n, _ in probing._ladder(one, variations(given)[0])]
+    one = next(unit for unit in candidates.units(given, lambda point: point.axis_symmetry) if unit.index == probes[2])
+    again = [e_n for e_n, _ in probing._path(one, variations(given)[0])]
     assert np.allclose(np.abs(np.array(again) / found[4][probes[2]] - 1), error[0][probes[2]], rtol=1e-5)
     for own in error:
         change = np.where(sound[probes], own[probes], np.nan)

@@ -9,8 +9,9 @@ import pytest
 
 from softjaw.study.case.build import build_object, check_object, shapes_of, warnings
 from softjaw.study.cli import main
+from softjaw.study.cli.quick import petsc_overrides
+from softjaw.study.cli.running import prepare
 from softjaw.study.messages import StudyError
-from softjaw.study.preparation import petsc_overrides, prepare
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch

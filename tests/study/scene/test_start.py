@@ -8,8 +8,9 @@ import tomllib
 
 import pytest
 
-from softjaw.study.cli import KINDS, main
-from softjaw.study.environment import launch_environment
+from softjaw.study.cli import main
+from softjaw.study.cli.options import KINDS
+from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT

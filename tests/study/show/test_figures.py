@@ -91,7 +91,7 @@ def test_failed_cases_are_told_of_where_a_figure_needs_them(tmp_path):
 
 def test_a_scene_that_cannot_be_solved_is_not_drawn(tmp_path, capsys, monkeypatch):
     asked = []
-    monkeypatch.setattr("softjaw.study.commands.run", lambda options: asked.append(options) or OTHER_FILE)
+    monkeypatch.setattr("softjaw.study.cli.running.run", lambda options: asked.append(options) or OTHER_FILE)
     assert main(["figure", "4c", "--results", str(tmp_path), "-o", str(tmp_path / "x.png")]) == OTHER_FILE
     assert [(one.scene, one.output) for one in asked] == [
         (str(JOBS / "fig4-curvature.toml"), str(tmp_path / "fig4-curvature.hdf"))

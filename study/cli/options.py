@@ -1,28 +1,17 @@
-"""The command line: words to options, one screen of help in the order of use, and errors to exit codes."""
+"""Words to options: every command with its options, one screen of help in the order of use, and suggestions."""
 
 from __future__ import annotations
 
 import argparse
 import difflib
-import errno
 import math
-import os
 import shutil
-import sys
 import textwrap
-import traceback
 from collections.abc import Callable, Sequence
-from typing import IO, Any
+from typing import Any
 
-from softjaw.study import commands
-from softjaw.study.environment import keep_compiled_loops, pin_threads
-from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, MEANING, USAGE, StudyError, complain, first_rank
-from softjaw.study.run.memory import is_out_of_memory, no_room
-from softjaw.study.show.figures.command import add_options as add_figure_options
-from softjaw.study.show.view.command import add_choice
-from softjaw.study.show.view.command import add_options as add_view_options
+from softjaw.study.messages import MEANING, first_rank
 
-UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 KINDS = {
     "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
     "cup": "a thin-walled cup: dents, and the range of forces that hold it without spilling",
@@ -30,95 +19,50 @@ KINDS = {
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
-SHELLS = ("bash", "zsh", "fish")
-COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words
+COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words, its module
     "prepare": (
-        ("init", "write a commented scene and a batch script to start from", "init bottle"),
-        ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml"),
-        ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16"),
+        ("init", "write a commented scene and a batch script to start from", "init bottle", "cli.quick"),
+        ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick"),
+        ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16",
+         "cli.quick"),
         ("cost", "what accuracy costs in time: errors and seconds of every setting",
-         "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf"),
+         "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf", "cli.running"),
     ),
     "solve": (
         ("run", "solve a scene into a result file; run again to resume",
-         "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor"),
-        ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5"),
-        ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf"),
-        ("scale", "replay the times of a finished file on many ranks",
-         "scale results/bottle-rigid.hdf -n 64,256,1024 --repeat 10"),
+         "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor", "cli.running"),
+        ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5", "cli.results"),
+        ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf",
+         "show.tables.status"),
     ),
     "look at results": (
-        ("show", "the best grasps as a table", "show results/bottle-rigid.hdf --force 4 --top 3 --json"),
+        ("show", "the best grasps as a table", "show results/bottle-rigid.hdf --force 4 --top 3 --json",
+         "cli.results"),
         ("report", "one self-contained page: maps, definitions, provenance",
-         "report results/bottle-rigid.hdf -o results/bottle-rigid.html"),
+         "report results/bottle-rigid.hdf -o results/bottle-rigid.html", "cli.drawings"),
         ("view", "the map on the object in 3-D: window, page, picture",
-         "view results/bottle-rigid.hdf --force 4 --screenshot view.png"),
-        ("figure", "a figure of the paper, from its scene to the picture", "figure 4c"),
+         "view results/bottle-rigid.hdf --force 4 --screenshot view.png", "cli.drawings"),
+        ("figure", "a figure of the paper, from its scene to the picture", "figure 4c", "cli.drawings"),
         ("compare", "two maps side by side: settings and cases that differ",
-         "compare results/soft.hdf results/stiff.hdf --quantity e_n"),
+         "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results"),
     ),
     "use the numbers": (
         ("export", "every case for planners: maps, frames, limit surfaces",
-         "export results/smoke.hdf --csv -o results/smoke.csv"),
+         "export results/smoke.hdf --csv -o results/smoke.csv", "cli.results"),
         ("patch", "judge a pressure field from elsewhere: friction, score",
-         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60"),
+         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "cli.drawings"),
     ),
     "this program": (
-        ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json"),
-        ("doctor", "does this machine have what softjaw needs", "doctor"),
-        ("completion", "a script by which the shell completes words", "completion bash > softjaw.bash"),
+        ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick"),
+        ("doctor", "does this machine have what softjaw needs", "doctor", "doctor"),
     ),
 }  # fmt: skip
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code is the same on every rank."""
-    pin_threads()
-    keep_compiled_loops()
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    cut = words.index("--") if "--" in words else len(words)
-    parser = program()
-    if not words:
-        parser.print_help()
-        return USAGE
-    try:
-        options = parser.parse_args(words[:cut])
-    except SystemExit as leave:
-        return int(leave.code or 0)
-    options.petsc = words[cut + 1 :]
-    try:
-        if options.petsc and options.command is not commands.run:
-            raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
-        code = options.command(options)
-        sys.stdout.flush()
-        return code
-    except StudyError as error:
-        return complain(error)
-    except OSError as error:
-        if error.errno not in UNWRITABLE or error.filename:
-            return _unforeseen(options, error)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again as it ends
-        if error.errno == errno.EPIPE:  # the reader of a pipe has seen enough
-            return DONE
-        return complain(StudyError(CANNOT_WRITE, f"the output cannot be written ({error.strerror})"))
-    except Exception as error:
-        return _unforeseen(options, error)
-
-
-def _unforeseen(options: argparse.Namespace, error: Exception) -> int:
-    """The exit code of an error that no command expects: too little memory, a damaged file, or a bug."""
-    if is_out_of_memory(error):
-        return complain(StudyError(USAGE, no_room(str(error) or type(error).__name__)))
-    if damage := commands.damage(options, error):
-        return complain(damage)
-    traceback.print_exc()
-    return BUG
 
 
 class Parser(argparse.ArgumentParser):
     """Speaks on the first rank only, whatever started the ranks, and suggests what an unknown word may have meant."""
 
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+    def _print_message(self, message: str, file: Any = None) -> None:
         if first_rank():
             super()._print_message(message, file)
 
@@ -153,13 +97,6 @@ def _meant(word: str, known: Sequence[str]) -> str:
     return f"; did you mean '{near[0]}'?" if near else ";"
 
 
-class Formatter(argparse.HelpFormatter):
-    """Breaks descriptions between words, and leaves examples as they are."""
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return text if "\n" in text else super()._fill_text(text, width, indent)
-
-
 class Program(Parser):
     """The parser of the whole program: its help lists the commands by what they are for."""
 
@@ -170,7 +107,7 @@ class Program(Parser):
         for title, listed in COMMANDS.items():
             entries = [
                 textwrap.fill(text, width, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14)
-                for name, text, _ in listed
+                for name, text, *_ in listed
             ]
             lines += ["", f"{title}:", *entries]
         codes = "; ".join(f"{code} {text}" for code, text in MEANING.items())
@@ -188,21 +125,19 @@ def program() -> Program:
     )
     listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     made = {}
-    for name, text, example in (command for group in COMMANDS.values() for command in group):
+    for name, text, example, module in (command for group in COMMANDS.values() for command in group):
         ranks = "mpirun -n 8 " if name == "run" else ""
         made[name] = listed.add_parser(
-            name, help=text, description=f"{text[0].upper()}{text[1:]}.", formatter_class=Formatter,
-            epilog=f"example:\n  {ranks}softjaw {example}",
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.",
+            epilog=f"example:\n  {ranks}softjaw {example}", formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip
-        made[name].set_defaults(command=getattr(commands, name))
+        made[name].set_defaults(command=name, module=module)
     for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", _add_watch_options),
-                              ("view", add_view_options), ("figure", add_figure_options), ("patch", _add_patch_options),
-                              ("scale", _add_scale_options)):  # fmt: skip
+                              ("view", _add_view_options), ("figure", _add_figure_options),
+                              ("patch", _add_patch_options)):  # fmt: skip
         add_options(made[name])
     _add_scene_options(made)
     _add_result_options(made)
-    made["completion"].set_defaults(program=parser)
-    made["completion"].add_argument("shell", choices=SHELLS, help="the shell that is to learn softjaw's words")
     return parser
 
 
@@ -243,7 +178,10 @@ def _add_scene_options(made: dict[str, Any]) -> None:
         parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
         parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
                             help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
-    made["plan"].add_argument("-n", type=_whole(1), default=1, metavar="RANKS", dest="ranks", help="ranks (default 1)")
+    add = made["plan"].add_argument
+    add("-n", type=_counts, default=(1,), metavar="RANKS", dest="ranks", help="ranks (default 1); several, as in "
+        "16,64,256, replay the times of a finished study on each")  # fmt: skip
+    add("--repeat", type=_whole(1), default=1, metavar="K", help="replay a study of K times as many candidates")
     for parser in (made["plan"], made["run"]):
         parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
     made["run"].add_argument("--retry-failed", action="store_true", help="solve failed cases again")
@@ -266,9 +204,9 @@ def _add_result_options(made: dict[str, Any]) -> None:
         made[name].add_argument("--top", type=_whole(0), default=10, metavar="K", help=f"{listed}, 0: all (default 10)")
     for name in ("compare", "export"):
         made[name].add_argument("--model", choices=("ccm", "pcm", "pcm_projected"), default="ccm",
-                                help="friction model (default curved)")  # fmt: skip
+                                help="friction model (default ccm)")  # fmt: skip
     made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
-    add_choice(made["report"])
+    _add_choice(made["report"])
     made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
 
 
@@ -301,22 +239,33 @@ def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add("--json", action="store_true", help="as JSON, SI units")
 
 
-def _add_scale_options(parser: argparse.ArgumentParser) -> None:
+def _add_choice(parser: argparse.ArgumentParser) -> None:
+    """Options that choose a candidate."""
     add = parser.add_argument
-    add("file", metavar="FILE", help="result file (.hdf) whose cases were timed")
-    add("-n", type=_counts, default=(1, 4, 16, 64, 256, 1024, 4096), metavar="RANKS", dest="ranks",
-        help="numbers of ranks (default 1,4,16,64,256,1024,4096)")  # fmt: skip
-    add("--repeat", type=_whole(1), default=1, metavar="K", help="take a study of K times as many candidates "
-        "(default 1)")  # fmt: skip
-    add("--per-node", type=_whole(1), default=64, metavar="R", help="ranks that share a node and its counter "
-        "(default 64)")  # fmt: skip
-    add("--claim-us", type=_positive, default=20.0, metavar="US", help="time of one look at the counter (default 20)")
-    add("--write-ms", type=_positive, default=0.015, metavar="MS", help="time of one write (default 0.015, as to a "
-        "local disk; 1 is a busy network folder)")  # fmt: skip
-    add("--writes-per-s", type=_positive, default=5e4, metavar="N", help="writes that the file system takes from all "
-        "ranks together (default 50000)")  # fmt: skip
-    add("--mb-per-s", type=_positive, default=1e3, metavar="MB", help="what the file system takes from all "
-        "(default 1000)")  # fmt: skip
+    add("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
+    add("--station", type=_finite, metavar="MM", help="candidate nearest to this station [mm]")
+    add("--angle", type=_finite, metavar="DEG", help="candidate nearest to this angle [deg]")
+
+
+def _add_view_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("file", metavar="FILE", help="result file (.hdf)")
+    _add_choice(parser)
+    add("--force", type=_finite, metavar="N", help="force level nearest to N [N]")
+    add("--quantity", metavar="NAME", help="map on the object (default: quality)")
+    add("--motion", choices=("x", "y", "turn"), default="x",
+        help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
+    add("--screenshot", metavar="PNG", help="write a picture; needs no screen")
+    add("--html", metavar="HTML", help="write the view as one page that needs nothing else")
+    add("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
+
+
+def _add_figure_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
+    add("-o", metavar="PNG", dest="output", help="picture, or folder for several (default: results/figures)")
+    add("--results", metavar="FOLDER", default="results",
+        help="where the scenes' results are or will be (default: results)")  # fmt: skip
 
 
 def _whole(least: int) -> Callable[[str], int]:
@@ -332,6 +281,18 @@ def _whole(least: int) -> Callable[[str], int]:
 
 def _counts(text: str) -> tuple[int, ...]:
     return tuple(map(_whole(1), text.split(",")))
+
+
+def _seconds(text: str) -> float:
+    if not 0.1 <= (value := float(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
+    return value
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise argparse.ArgumentTypeError(f"found {text}, expected a number")
+    return value
 
 
 def _positive(text: str) -> float:

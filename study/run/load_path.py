@@ -1,4 +1,4 @@
-"""One unit of work: a ladder of forces is climbed from its foot, and the rows that are missing are stored."""
+"""One unit of work: the load path of a grasp candidate is solved from its lowest force, missing rows are stored."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Standing
 from softjaw.study.result.write import record
-from softjaw.study.run.memory import is_out_of_memory
+from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.schedule import LostRanks
-from softjaw.study.run.stopping import AbandonedError, Stopper
 
 DEADLY = 2
 KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"
@@ -53,8 +52,8 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
     return codes
 
 
-class Climber:
-    """Climbs ladders on one rank and stores each case as soon as it is solved."""
+class PathSolver:
+    """Solves load paths on one rank and stores each case as soon as it is solved."""
 
     def __init__(
         self,
@@ -63,10 +62,10 @@ class Climber:
         image: Callable | None,
         claims: Any,
         lost: LostRanks,
-        standing: Standing,
+        state: Standing,
     ) -> None:
         self._writer, self._solve_unit, self._image, self._claims = writer, solve_unit, image, claims
-        self._lost, self._standing = lost, standing
+        self._lost, self._state = lost, state
         self._begun: list[int] = []
 
     def on_stop(self) -> None:
@@ -74,7 +73,7 @@ class Climber:
         self._claims.stop()
         self._uncount()
 
-    def climb(self, unit: Any, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
+    def solve(self, unit: Any, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
         """Solve a unit from its beginning and store the rows that ``codes`` calls missing, never a done one.
 
         Raises
@@ -83,15 +82,15 @@ class Climber:
             The file cannot be written any more.
         """
         pending = _pending(unit, codes)
-        ladder = self._ladder(unit)
+        cases = self._cases(unit)
         clock = time.perf_counter()
         while pending and not self._claims.stopped:
-            self._standing.check()
+            self._state.check()
             self._count(pending)
             self._lost.begin(unit.index)
             try:
                 with stopper.case():
-                    k, result = next(ladder)
+                    k, result = next(cases)
             except AbandonedError:
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
@@ -104,9 +103,9 @@ class Climber:
             clock = now
             look()
         self._uncount()
-        _close(ladder)
+        _close(cases)
 
-    def _ladder(self, unit: Any) -> Iterator[tuple[int, Any]]:
+    def _cases(self, unit: Any) -> Iterator[tuple[int, Any]]:
         yield from self._solve_unit(unit)
 
     def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
@@ -114,17 +113,17 @@ class Climber:
         self._begun = [row for row in self._begun if row not in rows]
         for c, row in served:
             if isinstance(result, CaseFailure):
-                with self._standing.writing():
+                with self._state.writing():
                     self._writer.fail(row, result.message)
                 continue
             mine = self._image(result, unit, c) if self._image else result
             values = record(self._writer.layout, _with_work(mine, c, seconds))
-            with self._standing.writing():
+            with self._state.writing():
                 self._writer.write(row, values)
 
     def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
         self._begun = []
-        with self._standing.writing():
+        with self._state.writing():
             fail_from(self._writer, pending, message)
         pending.clear()
 
@@ -132,14 +131,14 @@ class Climber:
         rows = [row for _, row in pending[min(pending)]]
         if rows != self._begun:
             self._uncount()
-            with self._standing.writing():
+            with self._state.writing():
                 for row in rows:
                     self._writer.count_attempt(row)
             self._begun = rows
 
     def _uncount(self) -> None:
         rows, self._begun = self._begun, []
-        with self._standing.writing():
+        with self._state.writing():
             for row in rows:
                 self._writer.count_attempt(row, -1)
 
@@ -178,7 +177,7 @@ def _sentence(error: BaseException, limit: float) -> str:
     if isinstance(error, TimeLimitError):
         return TOO_SLOW.format(limit=limit)
     if isinstance(error, StopIteration):
-        return "the ladder of forces ended before this one; this is a bug"
+        return "the load path ended before this force; this is a bug"
     if is_out_of_memory(error):
         return NO_MEMORY.format(text=str(error) or "no more could be had")
     text = f"{type(error).__name__}: {error}"
@@ -188,8 +187,8 @@ def _sentence(error: BaseException, limit: float) -> str:
     return text
 
 
-def _close(ladder: Any) -> None:
+def _close(cases: Any) -> None:
     try:
-        ladder.close()
+        cases.close()
     except Exception as error:  # the rows are stored; what the solver says while it is being closed changes nothing
-        print(f"warning: closing a ladder: {error}", flush=True)
+        print(f"warning: closing a solver: {error}", flush=True)

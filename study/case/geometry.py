@@ -1,0 +1,88 @@
+"""Objects that take compiled loops to build or to judge: meshes, stacked sections, and thin walls.
+
+`study.case.build` imports this module when a scene has such an object: numba and scipy take longer to load than the
+rest of ``check`` takes.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.fem.objects.gap import GapObject
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.outer_surface import OuterSurface
+from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport, traced
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.scene.objects import Mesh, Walled
+
+
+@lru_cache(maxsize=8)
+def mesh_object(shape: Mesh) -> MeshObject:
+    """The object of a mesh file; `ValueError` for a mesh that is open or crosses itself."""
+    return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
+
+
+def stacked(surface: OuterSurface) -> GapObject:
+    """The object of stacked sections."""
+    return Stacked(surface)
+
+
+@lru_cache(maxsize=8)
+def traced_surface(shape: Mesh) -> tuple[TracedSurface, TraceReport]:
+    """Smooth surface of a mesh's wall, and how far it is from the mesh."""
+    return traced(mesh_object(shape), shape.wall_heights)
+
+
+def trace_warning(shape: Mesh) -> str:
+    """How far the wall that is simulated lies from the mesh that it was traced on."""
+    _, report = traced_surface(shape)
+    z, theta = report.place
+    return (
+        f"the wall traced on {shape.mesh} lies {1e3 * report.rms:.2g} mm (rms), at most {1e3 * report.largest:.2g} mm,"
+        f" from the mesh, farthest at z = {1e3 * z:.3g} mm, {math.degrees(theta):.3g} deg; waves shorter than"
+        f" {1e3 * report.wavelength:.2g} mm are smoothed out"
+    )
+
+
+def material_of(shape: Walled) -> WallMaterial:
+    """Material of a wall, from the table or from the scene's own numbers."""
+    name = None if shape.wall_material == "custom" else shape.wall_material
+    return wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+
+
+def check_wall(shape: Any, surface: OuterSurface) -> None:
+    """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely.
+
+    Raises
+    ------
+    StudyError
+        With the key and what is wrong with it.
+    """
+    lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
+    size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
+    wall = shape.wall if isinstance(shape.wall, float) else [list(pair) for pair in shape.wall]
+    try:
+        body_mesh(surface, wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
+    except ValueError as error:
+        key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
+        raise StudyError(USAGE, f"object.{key}: {error}") from error
+
+
+def wall_lines(
+    scene: Any, turned: Any, heights: tuple[float, float], half: float, mirrors: tuple[bool, bool]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lines of a wall's mesh round the object [rad] and along its outline, finer between ``heights`` [m].
+
+    ``scene`` is a `Scene` whose object has a wall, ``turned`` its outer surface as the fingers see it.
+    """
+    accuracy = scene.accuracy
+    size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
+    return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top, 0.0)

@@ -1,0 +1,103 @@
+"""The command line: the module that a command needs is imported when it runs, and every error becomes an exit code."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import traceback
+from argparse import Namespace
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from softjaw.study.cli.options import program
+from softjaw.study.doctor import keep_compiled_loops, pin_threads
+from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, say
+from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
+
+UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
+SOLVING = ("run", "cost", "figure")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit code is the same on every rank."""
+    pin_threads()
+    keep_compiled_loops()
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    cut = words.index("--") if "--" in words else len(words)
+    parser = program()
+    if not words:
+        parser.print_help()
+        return USAGE
+    try:
+        options = parser.parse_args(words[:cut])
+    except SystemExit as leave:
+        return int(leave.code or 0)
+    options.petsc = words[cut + 1 :]
+    try:
+        if options.petsc and options.command != "run":
+            raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
+        code = command(options)
+        sys.stdout.flush()
+        return code
+    except StudyError as error:
+        return complain(error)
+    except OSError as error:
+        if error.errno not in UNWRITABLE or error.filename:
+            return _unforeseen(options, error)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again as it ends
+        if error.errno == errno.EPIPE:  # the reader of a pipe has seen enough
+            return DONE
+        return complain(StudyError(CANNOT_WRITE, f"the output cannot be written ({error.strerror})"))
+    except Exception as error:
+        return _unforeseen(options, error)
+
+
+def command(options: Namespace) -> int:
+    """Import the module of a command and run it; a text that it returns is printed."""
+    if options.command in SOLVING:
+        require_room()
+    if options.command in ("run", "figure"):
+        os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
+    if options.command == "figure":
+        options.solve = _solve
+    if options.command in ("run", "cost"):  # a wrong scene is refused before the solvers are loaded
+        options.scene_read = _module("cli.quick").scene_of(options)
+    answer = getattr(_module(options.module), options.command)(options)
+    if isinstance(answer, str):
+        say(answer)
+        return DONE
+    return int(answer or DONE)
+
+
+def _module(name: str) -> Any:
+    return import_module(f"softjaw.study.{name}")
+
+
+def _solve(scene: Path, file: Path) -> int:
+    """Solve a scene of a figure into a file; the exit code of the run."""
+    options = program().parse_args(["run", str(scene), "-o", str(file)])
+    options.petsc = []
+    return command(options)
+
+
+def _unforeseen(options: Namespace, error: Exception) -> int:
+    """The exit code of an error that no command expects: too little memory, a damaged file, or a bug."""
+    if is_out_of_memory(error):
+        print(f"error: {no_room(str(error) or type(error).__name__)}", file=sys.stderr, flush=True)
+        return _ended(STOPPED if options.command == "run" else USAGE)
+    if options.command != "run" and (damage := _module("cli.results").damage(options, error)):
+        return complain(damage)
+    traceback.print_exc()
+    sys.stderr.flush()
+    return _ended(BUG)
+
+
+def _ended(code: int) -> int:
+    """The exit code; of several ranks the others are ended, because they wait for this one."""
+    mpi: Any = sys.modules.get("mpi4py.MPI")
+    if mpi and mpi.COMM_WORLD.size > 1:
+        mpi.COMM_WORLD.Abort(code)
+    return code

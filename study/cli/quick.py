@@ -1,0 +1,97 @@
+"""Commands that answer at once: what they import loads neither MPI nor PETSc nor xarray."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from softjaw.study.case.build import build_object, check_object, warnings
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.run.plan import make_plan, plan_text
+from softjaw.study.run.scaling import scaling_text
+from softjaw.study.scene import Scene, SceneError, load_scene, start
+from softjaw.study.scene.objects import Mesh
+from softjaw.study.show.tables.columns import hanging, terminal_width
+from softjaw.study.show.tables.overview import scene_text
+
+
+def init(options: Namespace) -> str:
+    """Write a scene and a batch script to start from."""
+    return start.init(options, _mesh_size)
+
+
+def _mesh_size(options: Namespace) -> list[float]:
+    """Extents across and along the axis [mm] of a mesh that a study can take."""
+    mesh = str(Path(options.mesh).absolute())
+    shape = Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": options.axis})
+    try:
+        bounds: Any = build_object(shape).bounds
+    except (ValueError, OSError) as error:
+        raise StudyError(USAGE, f"--mesh: {error}") from error
+    return [1e3 * float(high - low) for low, high in zip(*bounds, strict=True)]
+
+
+def check(options: Namespace) -> str:
+    """Find every error of a scene, or say what would be run."""
+    scene = scene_of(options)
+    check_object(scene)
+    return hanging(scene_text(scene, options.scene), terminal_width())
+
+
+def plan(options: Namespace) -> str:
+    """Say what a run will take."""
+    scene = scene_of(options)
+    path = target(options, scene)
+    made = make_plan(scene, options.scene, options.overrides)
+    lines = [plan_text(made, scene, path, options.ranks[0]), *(f"warning: {text}" for text in warnings(scene))]
+    if scene.accuracy.e_n is not None:
+        lines.append("accuracy.e_n chooses mesh and effects when the run starts; this plan has those of the scene")
+    if len(options.ranks) > 1 or options.repeat > 1:
+        lines.append(scaling_text(made, path, options.ranks, options.repeat))
+    return hanging("\n".join(lines), terminal_width())
+
+
+def schema(_options: Namespace) -> str:
+    """Print the JSON schema of a scene."""
+    return json.dumps(Scene.model_json_schema(), indent=2)
+
+
+def scene_of(options: Namespace) -> Scene:
+    """The scene that the command line names, with what it changes."""
+    try:
+        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
+
+
+def target(options: Namespace, scene: Scene) -> Path:
+    """The result file of a run; refuse names that no viewer of results would open."""
+    if options.output is None:
+        return Path(scene.output.file)
+    path = Path(options.output)
+    if path.suffix != ".hdf":
+        better = path / Path(scene.output.file).name if path.is_dir() else path.with_name(path.name + ".hdf")
+        text = f"-o: found '{path}', expected a file ending in .hdf, which all viewers open; write -o {better}"
+        raise StudyError(USAGE, text)
+    return path
+
+
+def petsc_overrides(words: Sequence[str]) -> list[str]:
+    """PETSc options of the command line as overrides of the scene's ``[petsc]`` table.
+
+    >>> petsc_overrides(["-contact_snes_monitor", "-contact_snes_rtol", "1e-9"])
+    ['petsc.contact_snes_monitor=true', 'petsc.contact_snes_rtol=1e-9']
+    """
+    found: list[list[str]] = []
+    for word in words:
+        if word.startswith("-contact_"):
+            found.append([word[1:], "true"])
+        elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
+            text = f"PETSc option '{word}' after '--': softjaw takes only options of the contact solver, -contact_..."
+            raise StudyError(USAGE, f"{text}; others go into the environment variable PETSC_OPTIONS")
+        else:
+            found[-1][1] = word
+    return [f"petsc.{name}={value}" for name, value in found]

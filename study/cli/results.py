@@ -1,0 +1,79 @@
+"""Commands that read whole result files, as tables and numbers."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.messages import OTHER_FILE, StudyError, write_file
+from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.read import dataset, open
+from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.scene.problems import SceneError
+from softjaw.study.show.tables import export as exported
+from softjaw.study.show.tables import watch as watching
+from softjaw.study.show.tables.columns import terminal_width
+from softjaw.study.show.tables.compare import compare as compared
+from softjaw.study.show.tables.compare import comparison_csv, comparison_json, comparison_text
+from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
+from softjaw.study.show.tables.status import counts, reasons, time_split
+
+
+def watch(options: Namespace) -> int:
+    """Show how a run goes on until it ends."""
+    return watching.watch(Path(options.file), options.every)
+
+
+def show(options: Namespace) -> str:
+    """Print the best grasps."""
+    table = best(open(options.file), options.force, options.top, whole_lines=options.form is None)
+    forms = {"json": as_json, "csv": as_csv}
+    return forms[options.form](table) if options.form else as_text(table, terminal_width())
+
+
+def compare(options: Namespace) -> str:
+    """Print two maps side by side."""
+    one, other = map(open, options.files)
+    found = compared(one, other, options.quantity, options.model)
+    forms = {"json": comparison_json, "csv": comparison_csv}
+    return forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
+
+
+def export(options: Namespace) -> str:
+    """Write every case for planners."""
+    text = {"json": exported.as_json, "csv": exported.as_csv}[options.form](open(options.file), options.model)
+    if options.output is None:
+        return text
+    write_file(Path(options.output), f"{text}\n")
+    return f"written: {options.output}"
+
+
+def summary(result: Any) -> str:
+    """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
+    width = terminal_width()
+    table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
+    again = "; run the same command again to resume" if np.any(result.status == MISSING) else ""
+    lines = [counts(result), *reasons(result, width), *time_split(result), *table]
+    return "\n".join([*lines, f"results are in {result.path}{again}"])
+
+
+def damage(options: Namespace, error: Exception) -> StudyError | None:
+    """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
+    files = [*getattr(options, "files", []), getattr(options, "file", "")]
+    for file in (Path(name) for name in files if str(name).endswith(".hdf")):
+        try:
+            with open_result(file) as result:
+                layout = result.layout
+            torn = torn_rows(file, layout)
+        except StudyError as found:
+            return found
+        if torn:
+            text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
+            return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
+        if isinstance(error, SceneError):
+            text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
+            return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")
+    return None
