@@ -37,7 +37,7 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
     along = offset @ N
     away = np.linalg.norm(offset - along[:, None] * N, axis=1)
     slope = faces.normal @ N
-    # a line along a face has no foot on its plane: the place beside the centre stands for it
+    # a line along a face has no foot on its plane: the place beside the centre is taken
     steep = np.abs(slope) < STEEP
     s = np.where(steep, along, (offset * faces.normal).sum(axis=1) / np.where(steep, 1.0, slope))
     corners = faces.corners

@@ -135,7 +135,7 @@ def _unit(normal: FloatArray) -> FloatArray:
 
 
 def slivers(corners: FloatArray) -> NDArray[np.bool_]:
-    """Which faces ``(n, k, 3)`` have no area, or none that could be told from rounding."""
+    """Which faces ``(n, k, 3)`` have no area, or none beyond rounding."""
     twice_area, error = area_vectors(corners)
     return np.linalg.norm(twice_area, axis=1) <= error
 

@@ -220,9 +220,9 @@ def draw(rows: list[Row]) -> bytes:
                 for marker in SURFACES.values():
                     panel.plot(x[some & (shape == marker)], error[some & (shape == marker)], marker, ms=3.2, **look)
             wrong = np.count_nonzero(error[skipped] > TARGET)
-            told = f"{np.count_nonzero(skipped)} of {len(x)} {WORDS.get(effect, 'skipped')}, {wrong} wrongly"
+            label = f"{np.count_nonzero(skipped)} of {len(x)} {WORDS.get(effect, 'skipped')}, {wrong} wrongly"
             panel.set(xscale="log", yscale="log", xlim=(low, high), ylim=(0.7 * FLOOR, 2), xlabel=text,
-                      title=f"{effect}\n{told if limit else 'never skipped'}")  # fmt: skip
+                      title=f"{effect}\n{label if limit else 'never skipped'}")  # fmt: skip
         for panel in axes[:, 0]:
             panel.set(ylabel="relative error where skipped")
         axes[1, 2].set(ylabel="error of the quality")

@@ -188,7 +188,7 @@ def _missed(dimension: int) -> float:
 
 
 CLOSED = 1e-12
-"""Share of a form's largest value on the sphere that its smallest one must exceed to be told from zero.
+"""Share of a form's largest value on the sphere that its smallest one must exceed to be distinct from zero.
 
 Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
 times as far as its narrowest width is at this margin, since the reach is ``P^(-1/4)``.
@@ -257,7 +257,7 @@ def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | N
     OpenBodyError
         If the form is negative somewhere.
     UndecidedError
-        If its smallest value is too small to be told from zero.
+        If its smallest value is too small to be distinct from zero.
     """
     answer, value, u = closed(coefficients, dimension)
     if answer is Closed.YES:

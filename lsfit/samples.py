@@ -11,7 +11,7 @@ from softjaw.lsfit.surface import FitFlag
 FloatArray = NDArray[np.float64]
 UNIT = 1e-5  # how far the length of a unit motion may be from 1
 THIN = 1e-3  # below this ratio of their principal lengths, samples are called thin
-FLAT = 1e-9  # below this they count as flat; what lies between is told by the flag THIN
+FLAT = 1e-9  # below this they count as flat; what lies between carries the flag THIN
 NOTHING = 1e-12  # below this share of the largest, a wrench or a semi-axis is the rounding of none
 
 

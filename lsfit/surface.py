@@ -22,7 +22,7 @@ class OpenBodyError(FitError):
 
 
 class UndecidedError(FitError):
-    """A question that rounding would answer: the value that decides is too small to be told from zero."""
+    """A question that rounding would answer: the value that decides is too small to be distinct from zero."""
 
 
 class FitFlag(IntFlag):

@@ -9,7 +9,7 @@ each, so the integral is
 
 ``a_i`` the area of the shadow of ``K_i`` along T, ``S_i`` the integral of its fibres, J the volume between the planes.
 
-Derivation, L1. Let ``a_i . t`` be the normal force of contact i that the wrench t of T stands for, and
+Derivation, L1. Let ``a_i . t`` be the normal force of contact i of the wrench t of T, and
 ``delta = a_1 - a_2``. Of all ways to divide a wrench among the contacts the one with the least sum of normal forces has
 the first share as far as it goes along ``-delta``: at the edge of cone 1 while share 2 is anywhere in its cone, or at
 the edge of cone 2, or both on the flanks of their cones, with delta between the normals ``-n_1`` and ``n_2``. With the

@@ -21,7 +21,7 @@ from softjaw.study.messages import CANNOT_WRITE, DONE, USAGE
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ROOT = Path(__file__).parents[2]  # where the package softjaw lies
 # folders with loops that numba compiles
-COMPILED = ("fem", "fem/contact", "fem/objects", "fem/pad", "fem/shell", "friction", "lsfit", "scoring")
+COMPILED = ("fem", "fem/objects", "fem/pad", "fem/shell", "friction", "lsfit")
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
@@ -72,8 +72,8 @@ def _writable(folder: Path | None) -> bool:
     if folder is None:
         return False
     # Path.exists would raise where a folder above may not be searched
-    standing = next((place for place in (folder, *folder.parents) if os.access(place, os.F_OK)), folder)
-    return os.access(standing, os.W_OK | os.X_OK) and standing.is_dir()
+    existing = next((place for place in (folder, *folder.parents) if os.access(place, os.F_OK)), folder)
+    return os.access(existing, os.W_OK | os.X_OK) and existing.is_dir()
 
 
 def outside_mpi(environment: Mapping[str, str]) -> dict[str, str]:
@@ -88,7 +88,7 @@ def outside_mpi(environment: Mapping[str, str]) -> dict[str, str]:
 def launch_environment() -> dict[str, str]:
     """Variables for starting mpirun: this process's own, one thread per rank, and leave to run as root if it is root.
 
-    Open MPI refuses root unless told twice; inside a container there is often no other user.
+    Open MPI refuses root unless two variables allow it; inside a container there is often no other user.
     """
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"} if os.geteuid() == 0 else {}
     return {**dict.fromkeys(THREADS, "1"), **outside_mpi(os.environ), **allowed}

@@ -112,5 +112,5 @@ def flag_sentences(value: int) -> str:
 
 def flag_definitions() -> str:
     """What the bits of a file mean, for the file itself."""
-    told = (f"{int(f)} {f.sentence}{f': {f.more}' * bool(f.more)}" for f in Flag if f & OF_FILE)
-    return f"Sum of: {'; '.join(told)}."
+    texts = (f"{int(f)} {f.sentence}{f': {f.more}' * bool(f.more)}" for f in Flag if f & OF_FILE)
+    return f"Sum of: {'; '.join(texts)}."

@@ -71,8 +71,8 @@ def _probed(result: CaseResult, probing: Probing) -> CaseResult:
     values = result.values | probing.values()
     for name in ("rest", "total"):
         values[f"work/seconds_{name}"] += time.perf_counter() - start
-    told = "; ".join(text for text in (result.message, *probing.failures) if text)
-    return replace(result, values=values, message=told)
+    message = "; ".join(text for text in (result.message, *probing.failures) if text)
+    return replace(result, values=values, message=message)
 
 
 def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:

@@ -120,7 +120,7 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
     if ellipticity > BARELY_ELLIPTIC:
         return ConvergenceError(
             f"the pad is compressed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "
-            f"{det:.2g}; its surface creases or its elements are too distorted to go on ({error})"
+            f"{det:.2g}; its surface creases or its elements are too distorted to continue ({error})"
         )
     return ConvergenceError(
         f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "

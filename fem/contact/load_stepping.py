@@ -11,10 +11,11 @@ thickness and do not depend on the forces that were asked for. Steps in which th
 Foam that is strained further than `STRAINED` may buckle: there a stable state has to lead to a stable one, whose
 tangent on the free displacements, the nodes in contact held to the object, is positive definite.
 
-Where even a step of `SHORTEST_FORETOLD` leads from a stable state to an unstable one, the path forks: its states go on
-and are taken, but a pad that is disturbed may leave them. Where such a step leaves the path, the pad jumps: the path
-ends at a limit or folds. With weighted gaps this is an error, because nodal gaps often know of no jump; else the state
-beyond is taken. In both cases ``jumped`` is set: this state and those that follow depend on the load path.
+Where even a step of `SHORTEST_FORETOLD` leads from a stable state to an unstable one, the path forks: its states
+continue and are taken, but a pad that is disturbed may leave them. Where such a step leaves the path, the pad jumps:
+the path ends at a limit or folds. With weighted gaps this is an error, because nodal gaps often know of no jump;
+else the state beyond is taken. In both cases ``jumped`` is set: this state and those that follow depend on the load
+path.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ class Work:
 
 
 class LoadPath:
-    """What follows a load path with one solver, and may go on with another problem where the first has no solution."""
+    """What follows a load path with one solver, and may continue with another problem where it has no solution."""
 
     solver: NonlinearSolver
 
@@ -97,7 +98,7 @@ class LoadPath:
         raise NotImplementedError
 
     def _start_again(self) -> None:
-        """Set up another solver after a change of the problem; its clock goes on."""
+        """Set up another solver after a change of the problem; its clock continues."""
         seconds = self.solver.seconds
         self.solver.destroy()
         self._set_up()

@@ -1,7 +1,7 @@
 """Press a pad on an object along a load path, each normal force started from the one before.
 
 A force that Newton's method does not reach in one step is approached by step halving. Where that fails, or the pad
-jumps, and a fallback pad with nodal gaps is given, the load path goes on with that one, from first contact (weighted
+jumps, and a fallback pad with nodal gaps is given, the load path continues with that one, from first contact (weighted
 gaps couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever).
 Where that fails too, or there is none, displacement control takes over until the force is bracketed. Every state that
 is passed on has converged and has been checked.

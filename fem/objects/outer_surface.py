@@ -24,7 +24,7 @@ from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.profile import Curve, through
 from softjaw.fem.objects.revolution import Revolution
 
-TINY = 1e-100  # stands for zero below a logarithm
+TINY = 1e-100  # zero below a logarithm
 AT_LINE = 1e-12  # heights this close to a sample of the outline are at it [m]
 RIGHT_ANGLE = 1e-9  # how close to a multiple of 90 degrees keeps planes of symmetry [rad]
 

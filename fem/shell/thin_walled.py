@@ -111,7 +111,7 @@ class ThinWalled:
     base_thickness : float, optional
         [m]
     springs : float
-        Weak springs that stand for what friction holds, all together and per direction [N/m].
+        Weak springs in place of what friction holds, all together and per direction [N/m].
     """
 
     surface: OuterSurface

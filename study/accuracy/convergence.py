@@ -63,7 +63,7 @@ def extrapolate(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> E
     values : (levels, cases) array
         NaN where a case has no value at a level.
     formal : float
-        Highest order that is used: a larger observed one is not believed to go on.
+        Highest order that is used: a larger observed one is not extrapolated.
 
     Examples
     --------

@@ -85,4 +85,4 @@ def wall_lines(
     """
     accuracy = scene.accuracy
     size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
-    return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top, 0.0)
+    return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top)

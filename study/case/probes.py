@@ -1,4 +1,4 @@
-"""Which cases stand for all: candidates spread over what the cheapest model says of them, and three forces."""
+"""Which cases represent all: candidates spread over what the cheapest model says of them, and three forces."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HARD = 5  # one of so many units is harder than the second probe of a choice
 
 @dataclass(frozen=True)
 class Probe:
-    """A candidate that stands for others: its unit of work, and the forces at which it is solved [N]."""
+    """A candidate that represents others: its unit of work, and the forces at which it is solved [N]."""
 
     label: str
     unit: Any
@@ -152,8 +152,8 @@ def _point(scene: Scene, unit: Any) -> str:
     if not scene.sweep:
         return ""
     values = unit.scene.effective()
-    told = [f"{key} = {values[key.partition('.')[0]][key.partition('.')[2]]}" for key in scene.sweep]
-    return f" ({', '.join(told)})"
+    values_text = [f"{key} = {values[key.partition('.')[0]][key.partition('.')[2]]}" for key in scene.sweep]
+    return f" ({', '.join(values_text)})"
 
 
 # --- Winkler foundation -----------------------------------------------------------------------------------------------

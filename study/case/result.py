@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 MARGIN = 1e-6  # of a limit: what is nearer to it is undecided
-TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal as far as can be told
+TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal within rounding
 
 
 @dataclass(frozen=True)

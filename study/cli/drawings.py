@@ -1,11 +1,10 @@
-"""Commands that draw: the report, the 3-D view, the figures of the paper, and a patch from elsewhere."""
+"""Commands that draw: the report, the 3-D view and the figures of the paper."""
 
 from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
 
-from softjaw.study.patch.answer_text import answer_text
 from softjaw.study.show.figures import command as figures
 from softjaw.study.show.report.writing import write_report
 from softjaw.study.show.view import command as viewing
@@ -15,11 +14,6 @@ def report(options: Namespace) -> str:
     """Write one page with everything."""
     page = Path(options.output or Path(options.file).with_suffix(".html"))
     return "\n".join(f"written: {path}" for path in write_report(Path(options.file), page, *viewing.choice(options)))
-
-
-def patch(options: Namespace) -> str:
-    """Judge a pressure field from elsewhere."""
-    return answer_text(options)
 
 
 def view(options: Namespace) -> None:

@@ -50,7 +50,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
         ("export", "every case for planners: maps, frames, limit surfaces",
          "export results/smoke.hdf --csv -o results/smoke.csv", "cli.results"),
         ("patch", "judge a pressure field from elsewhere: friction, score",
-         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "cli.drawings"),
+         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
     ),
     "this program": (
         ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick"),
@@ -144,10 +144,8 @@ def program() -> Program:
 def _add_watch_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
     parser.add_argument("--every", type=_seconds, default=2.0, metavar="S", help="seconds between looks (default 2)")
-    parser.description = (
-        f"{parser.description} Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are"
-        " not computed. Ctrl-C ends the view, not the run."
-    )
+    ending = "Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are not computed."
+    parser.description = textwrap.fill(f"{parser.description} {ending} Ctrl-C ends the view, not the run.", 78)
 
 
 def _seconds(text: str) -> float:

@@ -23,7 +23,7 @@ from softjaw.study.show.tables.status import counts, reasons, time_split
 
 
 def watch(options: Namespace) -> int:
-    """Show how a run goes on until it ends."""
+    """Follow a run until it ends."""
     return watching.watch(Path(options.file), options.every)
 
 

@@ -138,7 +138,7 @@ class GraspPoint:
         raise ValueError("the cases around have no fitted surface of one kind: take fitted=False")
 
     def __str__(self) -> str:
-        """What people want to know at one point, in a few lines."""
+        """Main quantities at one point, in a few lines."""
         if self.shape:
             return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
         axes, (station, angle, force) = self.map.axes, self.place[0].tolist()

@@ -60,17 +60,17 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
         key = axis.long_name
         factor = _size(key)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
-        told = f"{key} = {', '.join(map(_text, options))}"
+        known = f"{key} = {', '.join(map(_text, options))}"
         if key not in left and axis.name not in left:
             if len(options) > 1:
-                raise ValueError(f"where is missing {key}: give one of {told}")
+                raise ValueError(f"where is missing {key}: give one of {known}")
             given = options[0]
         else:
             given = left.pop(key) if key in left else left.pop(axis.name)
             given = given / factor if key not in where and not isinstance(given, str) else given
         found = [i for i, option in enumerate(options) if _same(option, given)]
         if not found:
-            raise ValueError(f"where has {key} = {_text(given)}: expected one of {told}; nothing is interpolated there")
+            raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")
         index.append(found[0])
         point[key] = options[found[0]]
     if left:

@@ -40,8 +40,8 @@ LOOK: dict[str, dict[str, Any]] = {
 }
 
 
-def answer_text(options: Namespace) -> str:
-    """Read, evaluate and score; the text or the JSON of it."""
+def patch(options: Namespace) -> str:
+    """Judge a pressure field from elsewhere: read, evaluate and score; the text or the JSON of it."""
     if options.other and options.distance:
         raise StudyError(USAGE, "--distance: found beside --other, which gives the distance itself; remove one of them")
     scored = options.other or options.distance

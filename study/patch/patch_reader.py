@@ -14,7 +14,6 @@ import numpy as np
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, shortened
 from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
-from softjaw.study.result.guarded import trouble
 from softjaw.study.scene.problems import Problem, shown
 
 ENDINGS = (".csv", ".vtu", ".vtp")
@@ -89,7 +88,9 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
         raise StudyError(USAGE, f"{text}; export the contact surface alone")
     if ending == ".csv":
         return checked(_read_table(path, reading), reading.flip_normals)
-    from softjaw.study.patch.vtk_faces import read_vtk  # slow to import, and not needed for tables
+    # slow to import (VTK, HDF5), and not needed for tables
+    from softjaw.study.patch.vtk_faces import read_vtk
+    from softjaw.study.result.guarded import trouble
 
     if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")

@@ -83,12 +83,12 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     """Checksum of what is written once, when the file is made: axes, options, scene, definitions, labels."""
     axes = [f"axes/{name}" for name in layout.names]
     study = file.attributes(ROOT)
-    told = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
+    parts = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
-        told.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
-        told += [[str(text) for text in found["options"]]] if "options" in found else []
-    crc = zlib.crc32(repr(told).encode())
+        parts.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+        parts += [[str(text) for text in found["options"]]] if "options" in found else []
+    crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
     arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)
     for name in (*arrays, *["probes/candidate"] * bool(layout.probes)):

@@ -176,7 +176,7 @@ def trouble(attempt: Callable[[], object]) -> str:
             code = 0
         except MemoryError:
             pass
-        except BaseException as error:  # told by the parent, which meets it too
+        except BaseException as error:  # reported by the parent, which meets it too
             code = NO_MEMORY if "alloc" in str(error).lower() else 0
         finally:
             os._exit(code)

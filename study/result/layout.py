@@ -78,7 +78,7 @@ class Layout:
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
     candidates ``probes``. ``surface`` counts the points and triangles of the
-    object, ``front`` the faces along and across a pad, as `study.result.vtkhdf` shows them; zeros where it does not.
+    object, ``pad_faces`` the faces along and across a pad, as `study.result.vtkhdf` shows them, or zeros.
     """
 
     axes: tuple[Any, ...]
@@ -92,7 +92,7 @@ class Layout:
     samples: int = 0
     sampled: tuple[int, ...] = ()
     surface: tuple[int, int] = (0, 0)
-    front: tuple[int, int] = (0, 0)
+    pad_faces: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
 
@@ -217,8 +217,8 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface", "front",
-                 "probes", "variations")  # fmt: skip
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface",
+                 "pad_faces", "probes", "variations")  # fmt: skip
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -239,12 +239,12 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
-        surface, front = (_pair(options.get(name, (0, 0))) for name in ("surface", "front"))
+        surface, pad_faces = (_pair(options.get(name, (0, 0))) for name in ("surface", "pad_faces"))
         probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
         return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
-                      front, probes, variations)  # fmt: skip
+                      pad_faces, probes, variations)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

@@ -106,7 +106,7 @@ def holder(result: Path) -> str:
         os.close(fd)
 
 
-class Standing:
+class OpenedFile:
     """The file that a run has opened, under the name that it had then.
 
     An open file outlives its name: without a look at the name, a run would fill a file that nobody can find any more.

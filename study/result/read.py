@@ -208,6 +208,6 @@ def _attributes(result: Result) -> dict[str, Any]:
         "overrides": tuple(filter(None, str(scene.get("overrides", "")).split("\n"))),
         "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,
         "provenance": result.sessions, "planar": layout.planar, "has": layout.has, "meshes": layout.meshes,
-        "patches": layout.patches, "pad_faces": layout.front, "poses": not result.axes[-3].units,
+        "patches": layout.patches, "pad_faces": layout.pad_faces, "poses": not result.axes[-3].units,
         "derived": tuple(d.name for d in layout.derived),
     }  # fmt: skip

@@ -1,10 +1,10 @@
 """``/VTKHDF`` of a result file and grids in files of their own: what ParaView and `pyvista.read` open.
 
-The grid of a result runs over the normal force: the object's surface, coloured by the maps, and the fronts of every
-candidate's two pads with their pressure. All steps share the cells of the first; only points and values advance. Of a
-sweep it shows the first point. The space is reserved when the file is made; `fill_grid` fills it at the end.
-`write_grid` makes a file of its own. All is written so that also the oldest readers take it (at one moment: version
-1.0, VTK 9.1 on; over forces: 2.0 with one topology for all steps).
+The grid of a result runs over the normal force: the object's surface, coloured by the maps, and the contact faces of
+every candidate's two pads with their pressure. All steps share the cells of the first; only points and values
+advance. Of a sweep it shows the first point. The space is reserved when the file is made; `fill_grid` fills it at
+the end. `write_grid` makes a file of its own. All is written so that also the oldest readers take it (at one moment:
+version 1.0, VTK 9.1 on; over forces: 2.0 with one topology for all steps).
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ PATH = "/VTKHDF"
 KINDS = {3: 5, 4: 9}  # VTK's numbers for triangles and quadrilaterals, by their corners
 OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those that no candidate grasps
 ABOUT = (
-    "The object's surface (part 0) and both pads' fronts of every candidate (parts 1 and 2), over the normal force [N]"
-    " as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that indent its wall"
+    "The object's surface (part 0) and both pads' contact faces of every candidate (parts 1 and 2), over the normal"
+    " force [N] as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that"
+    " indent its wall"
     " stand in it. Curved contact model (CCM), SI units; NaN: no value. Filled when all cases are computed."
 )
 
@@ -54,7 +55,7 @@ def sizes(layout: Any) -> tuple[int, int]:
     """Points and cells of one step."""
     points, cells = layout.surface
     pads = FINGERS * int(np.prod(layout.shape[-3:-1]))
-    i, j = layout.front
+    i, j = layout.pad_faces
     return points + pads * (i + 1) * (j + 1) * bool(i), cells + pads * i * j
 
 
@@ -80,7 +81,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
     yield made("CellData/candidate", (cells,), "<i4", NOBODY, "", text)
     text = ", ".join([*(f"{code} {state}" for code, state in enumerate(STATES)), "-1 no candidate"])
     yield made("CellData/status", (steps * cells,), "i1", MISSING, "", text)
-    if layout.front[0]:
+    if layout.pad_faces[0]:
         yield made("CellData/pressure", (steps * cells,), "<f4", np.nan, "Pa", "contact pressure")
     for q in maps_of(layout).values():
         yield made(f"CellData/{q.name}", (steps * cells,), "<f4", np.nan, q.unit, f"{q.label}, ccm")
@@ -90,14 +91,14 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
 
 def _advances(layout: Any, cells: int) -> dict[str, int]:
     """By how much the values of each array on the cells advance from step to step."""
-    moving = ("status", *["pressure"] * bool(layout.front[0]), *maps_of(layout))
+    moving = ("status", *["pressure"] * bool(layout.pad_faces[0]), *maps_of(layout))
     return {"part": 0, "candidate": 0, **dict.fromkeys(moving, cells)}
 
 
 def skeleton(layout: Any, surface: Surface) -> dict[str, np.ndarray]:
     """What is known before a case is solved, by dataset; pads wait in a corner of the object, without area."""
     points, cells = sizes(layout)
-    counts, (n, m) = layout.front, surface.counts
+    counts, (n, m) = layout.pad_faces, surface.counts
     pads = FINGERS * int(np.prod(layout.shape[-3:-1])) * bool(counts[0])
     quads = quads_of(counts, n, pads) if pads else np.empty((0, 4), int)
     corner = surface.points[:1] if n else np.zeros((1, 3))
@@ -130,14 +131,14 @@ def fill_grid(writer: Any) -> None:
             values = writer.read(path)[first].reshape(states.shape)[:, k]
             shown = np.where(state == DONE, values, np.nan)
             writer.fill(f"{PATH}/CellData/{name}", start, np.where(candidate == NOBODY, np.nan, shown[candidate]))
-        if layout.front[0]:
+        if layout.pad_faces[0]:
             _fill_pads(writer, layout, k, state)
 
 
 def _fill_pads(writer: Any, layout: Any, k: int, state: np.ndarray) -> None:
     """Fronts and pressures of all candidates at one force; of those that are not solved nothing is seen."""
     points, cells = sizes(layout)
-    i, j = layout.front
+    i, j = layout.pad_faces
     width, faces = FINGERS * (i + 1) * (j + 1), FINGERS * i * j
     for c in np.flatnonzero(state == DONE):
         index = (*(0,) * (len(layout.shape) - 3), *divmod(int(c), layout.shape[-2]), k)
@@ -146,8 +147,8 @@ def _fill_pads(writer: Any, layout: Any, k: int, state: np.ndarray) -> None:
         R, o = (writer.read(f"fingers/pose_{name}", index) for name in ("rotation", "origin"))
         if not all(np.isfinite(v).all() for v in (centroid, pressure, R, o)):
             continue
-        front = np.stack([corners_of(x.reshape(i, j, 3)).reshape(-1, 3) for x in centroid])
-        placed = np.einsum("fab,fnb->fna", R, front) + o[:, None]
+        face = np.stack([corners_of(x.reshape(i, j, 3)).reshape(-1, 3) for x in centroid])
+        placed = np.einsum("fab,fnb->fna", R, face) + o[:, None]
         writer.fill(f"{PATH}/Points", k * points + layout.surface[0] + c * width, placed.reshape(-1, 3))
         writer.fill(f"{PATH}/CellData/pressure", k * cells + layout.surface[1] + c * faces, pressure.ravel())
 

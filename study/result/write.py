@@ -212,7 +212,7 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
         # How the object was cut into triangles may differ in the last bit on another machine; the file's own counts.
         same = replace(layout, surface=result.layout.surface)
         if result.layout.shape != layout.shape or result.layout.options() != same.options():
-            text = f"{path}: made by a version that stored other values; it can be read, but not gone on with"
+            text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
         for dataset in (*result.layout.datasets, *result.layout.grid):
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:

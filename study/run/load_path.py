@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
 from softjaw.study.result.layout import FAILED, MISSING
-from softjaw.study.result.lock import Standing
+from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.write import record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.schedule import LostRanks
@@ -62,7 +62,7 @@ class PathSolver:
         image: Callable | None,
         claims: Any,
         lost: LostRanks,
-        state: Standing,
+        state: OpenedFile,
     ) -> None:
         self._writer, self._solve_unit, self._image, self._claims = writer, solve_unit, image, claims
         self._lost, self._state = lost, state

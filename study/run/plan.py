@@ -55,7 +55,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     """The plan of a scene; builds its objects, so a mesh is read here."""
     check_object(scene)
     patches = scene.output.patches != "none"
-    front = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
+    pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
     surface = surface_of(scene, axes)
     units = grasps.units(scene, lambda point: point.axis_symmetry)
@@ -72,7 +72,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     )
     layout = Layout(
         axes,
-        math.prod(front),
+        math.prod(pad_faces),
         scene.accuracy.meshes,
         patches,
         tuple(derived(scene)),
@@ -82,7 +82,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         scene.limit_surface.samples,
         scene.sampled,
         surface.counts,
-        front,
+        pad_faces,
         probes,
         changes(scene) if probes else (),
     )

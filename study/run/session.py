@@ -21,7 +21,7 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
-from softjaw.study.result.lock import Lock, Standing
+from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
@@ -142,7 +142,7 @@ class Session:
 
     def __init__(self, plan: Plan, work: Work, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
-        self._state = Standing(writer.path)
+        self._state = OpenedFile(writer.path)
         todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
         self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))

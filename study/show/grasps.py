@@ -170,7 +170,7 @@ def order(ds: xr.Dataset, k: int) -> list[Index]:
 
 
 def images(ds: xr.Dataset, index: Index) -> list[Index]:
-    """Other cases at the same force with the same score: images by symmetry, or equal as far as can be told."""
+    """Other cases at the same force with the same score: images by symmetry, or equal within rounding."""
     score = ds.attrs["score"]
     best = at(ds, score, index)
     return [i for i in order(ds, index[-1]) if i != index and abs(at(ds, score, i) - best) <= TIE * abs(best)]

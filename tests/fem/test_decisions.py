@@ -686,7 +686,7 @@ def test_lines_of_a_surface_that_rounding_doubles_are_one(seed):
         jets=lambda T, S: np.stack([np.cos(T), np.sin(T), S], -1).reshape(-1, 1, 3),
     )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("softjaw.fem.objects.spline_surface.spline_surface", lambda theta, s, X, closed: s)
+        patch.setattr("softjaw.fem.objects.stacked.spline_surface", lambda theta, s, X, closed: s)
         s = wall_surface(outer, *moved(breaks[[0, 4]], seed))
     assert len(s) == 256 + 2 * 15 + 3
     assert np.diff(s).min() > 1e-9

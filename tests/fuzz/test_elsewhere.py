@@ -97,7 +97,7 @@ def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
     with pytest.raises(MeshError, match="no regular file"):
         read_triangles(tmp_path / "a.stl")
     assert "regular file" in told("patch", tmp_path / "a.csv")[1]
-    assert "no regular file" in told("status", tmp_path / "a.hdf")[1]
+    assert "not a regular file" in told("status", tmp_path / "a.hdf")[1]
 
 
 @pytest.mark.long
@@ -191,7 +191,7 @@ def test_a_trial_survives_what_it_tries():
 
 
 def commands(path, other, page):
-    yield from ((*words, path) for words in (("status",), ("show", "--csv"), ("export", "--csv"), ("scale",)))
+    yield from ((*words, path) for words in (("status",), ("show", "--csv"), ("export", "--csv")))
     yield ("compare", path, other)
     yield ("view", path, "--html", page)
 

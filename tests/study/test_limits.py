@@ -21,7 +21,7 @@ from softjaw.study.case.result import TimeLimitError
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED, StudyError
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.lock import Standing
+from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.store import open_result
 from softjaw.study.run import limits
 from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory
@@ -160,7 +160,7 @@ def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path,
 def test_a_file_that_was_moved_or_replaced_is_noticed(tmp_path):
     path = tmp_path / "out.hdf"
     path.write_text("1")
-    standing = Standing(path)
+    standing = OpenedFile(path)
     standing.check()
     path.rename(tmp_path / "moved.hdf")
     with pytest.raises(StudyError, match="was moved or removed while the run was writing it"):

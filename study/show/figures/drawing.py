@@ -21,7 +21,7 @@ EVERY, DPI = "all", 140
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: its number with its letters, the scenes it is drawn from, and what draws it.
+    """One figure: its number with its parts, the scenes it is drawn from, and what draws it.
 
     ``draw`` takes the judged dataset of each scene's result and gives the drawing, and a sentence of what was
     measured. ``gaps`` says whether it can be drawn where cases have failed.
@@ -51,11 +51,11 @@ FIGURES = (
 
 
 def find(name: str) -> list[Figure]:
-    """Figures by number and letters: ``4`` has two, ``6a`` is part of ``6ab``; empty for others."""
+    """Figures by number and parts: ``4`` has two, ``6a`` is part of ``6ab``; empty for others."""
     if name == EVERY:
         return list(FIGURES)
-    number, letters = name[:1], set(name[1:])
-    return [f for f in FIGURES if f.name[0] == number and (letters <= set(f.name[1:]) or not f.name[1:])]
+    number, parts = name[:1], set(name[1:])
+    return [f for f in FIGURES if f.name[0] == number and (parts <= set(f.name[1:]) or not f.name[1:])]
 
 
 def chosen(names: list[str]) -> list[Figure]:

@@ -103,7 +103,7 @@ def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int,
     if not alike:
         return f"the best grasp is better than the second beyond the errors ({one} against {other}){also}"
     between = "" if all(apart is False for apart in judged[:alike]) else ", though some between them can"
-    return f"the first {alike + 1} grasps cannot be told apart ({one} to {other}){between}{also}"
+    return f"the first {alike + 1} grasps cannot be distinguished ({one} to {other}){between}{also}"
 
 
 def _moved(found: Sure) -> str:

@@ -1,4 +1,4 @@
-"""The best grasps of a result file, as a table for people and as JSON or CSV for programs."""
+"""The best grasps of a result file, as a table, JSON or CSV."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines:
         why += _solved_elsewhere(ds)
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    told = verdict(sure(ds, scored[0], k), holding, same, scored[1])
-    told = " ".join(filter(None, [told, _passed_over(score[done], flags[done])]))
-    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), told)
+    answer = verdict(sure(ds, scored[0], k), holding, same, scored[1])
+    answer = " ".join(filter(None, [answer, _passed_over(score[done], flags[done])]))
+    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), answer)
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:
@@ -140,9 +140,9 @@ def as_json(table: Table) -> str:
     """One object with the title, the force [N], the units (SI) and a list of grasps; what is not there is null."""
     names = [name for name, _ in table.columns]
     rows = [dict(zip(names, map(_plain, row), strict=True)) for row in table.rows]
-    told = {"title": table.title, "verdict": table.verdict, "force": table.force}
-    told |= {"units": dict(table.columns), "grasps": rows}
-    return json.dumps(told, indent=2)
+    record = {"title": table.title, "verdict": table.verdict, "force": table.force}
+    record |= {"units": dict(table.columns), "grasps": rows}
+    return json.dumps(record, indent=2)
 
 
 def as_csv(table: Table) -> str:
@@ -166,14 +166,18 @@ def as_text(table: Table, width: int = PAPER) -> str:
     """
     if not table.rows:
         return table.title
-    told = _for_people(table)
-    names, heads, body = [name for name, _ in told.columns], [_head(*column) for column in told.columns], _body(told)
+    displayed = _displayed(table)
+    names, heads, body = (
+        [name for name, _ in displayed.columns],
+        [_head(*column) for column in displayed.columns],
+        _body(displayed),
+    )
     kept = _fitting([heads, *body], names, width)
     left = [k for k, i in enumerate(kept) if names[i] in ("flags", "label")]
     lines = aligned([heads[i] for i in kept], [[row[i] for i in kept] for row in body], left)
     hidden = [name for i, name in enumerate(names) if i not in kept]
     verdict = [wrapped(table.verdict, width, more="  ")] * bool(table.verdict)
-    return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(told, hidden, width)])
+    return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(displayed, hidden, width)])
 
 
 def _fitting(cells: Sequence[Sequence[str]], names: Sequence[str], width: int) -> list[int]:
@@ -204,14 +208,14 @@ def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:
     """What the words of the table mean, and which columns it does not show."""
     names = [name for name, _ in table.columns]
     marks = int(np.bitwise_or.reduce([row[names.index("flags")] for row in table.rows]))
-    told = [f"{flag.word}: {flag.sentence}" for flag in flags_in(marks)]
-    told += [f"{RANGE}: {RANGE_MEANS}"] * (RANGE in names)
+    lines = [f"{flag.word}: {flag.sentence}" for flag in flags_in(marks)]
+    lines += [f"{RANGE}: {RANGE_MEANS}"] * (RANGE in names)
     kinds = {_kind(name) for name in names}
     meanings = {"interval": INTERVAL_MEANS, "error": f"{ERROR_MEANS}{', in %' * ('interval' in kinds)}"}
-    told += [f"{ERROR}: {text}" for kind, text in meanings.items() if kind in kinds] or [NO_ERRORS]
+    lines += [f"{ERROR}: {text}" for kind, text in meanings.items() if kind in kinds] or [NO_ERRORS]
     if hidden:
-        told.append(f"columns hidden to fit {width} characters: {', '.join(hidden)} (use --csv or --json for all)")
-    return [wrapped(text, width, more="  ") for text in told]
+        lines.append(f"columns hidden to fit {width} characters: {', '.join(hidden)} (use --csv or --json for all)")
+    return [wrapped(text, width, more="  ") for text in lines]
 
 
 def _kind(name: str) -> str:
@@ -269,7 +273,7 @@ def _several(texts: list[str]) -> str:
     return ", ".join(texts) if len(texts) < 3 else f"{texts[0]}..{texts[-1]}"
 
 
-def _for_people(table: Table) -> Table:
+def _displayed(table: Table) -> Table:
     """Both bounds of the safe force range in one column of text; explicit poses by number and label alone."""
     if ("label", "") in table.columns:
         kept = [i for i, (name, _) in enumerate(table.columns) if name != "angle"]
@@ -290,7 +294,7 @@ def _for_people(table: Table) -> Table:
 
 
 def _range_text(bounds: dict[str, float]) -> str:
-    """The safe force range as people read it.
+    """The safe force range as it is displayed.
 
     >>> _range_text({"force_low": 0.8, "force_high": 2.5}), _range_text({"force_high": 2.5})
     ('0.8..2.5', '..2.5')
@@ -306,7 +310,7 @@ def _range_text(bounds: dict[str, float]) -> str:
 
 
 def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
-    """A row as people read it; what stands before the quality are coordinates."""
+    """A row as it is displayed; what stands before the quality are coordinates."""
     first = [name for name, _ in columns].index("quality")
     pairs = zip(row, columns, strict=True)
     return [_cell(value, name, units, i < first) for i, (value, (name, units)) in enumerate(pairs)]

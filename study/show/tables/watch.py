@@ -55,7 +55,7 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
             while view.look(path):
                 sleep(every)
     except KeyboardInterrupt:
-        console.print("no longer watching; the run goes on")
+        console.print("no longer watching; the run continues")
         return INTERRUPTED
     for line in view.last_words:
         console.print(line, soft_wrap=True)

@@ -63,4 +63,4 @@ def _fronts(view: View, index: Index) -> tuple[np.ndarray, np.ndarray, dict[str,
     values = {name: np.concatenate([getattr(pad, name).ravel() for pad in both]) for name in ("pressure", "area")}
     values["normal"] = np.concatenate([pad.normal.reshape(-1, 3) for pad in both])
     values["finger"] = np.repeat([1, 2], i * j)
-    return np.concatenate([pad.front.reshape(-1, 3) for pad in both]), quads_of((i, j), 0, 2), values
+    return np.concatenate([pad.face.reshape(-1, 3) for pad in both]), quads_of((i, j), 0, 2), values

@@ -13,7 +13,7 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.result.vtkhdf import corners_of
 from softjaw.study.show.grasps import Index, at
 
-LIFT = 2e-4  # how far off the object its fronts are drawn, besides where they overlap it [m]
+LIFT = 2e-4  # how far off the object contact faces are drawn, besides where they overlap it [m]
 MOTIONS = ("x", "y", "turn")
 ARROWS = 14  # along the longer side of a pad, at most
 Faces = dict[str, np.ndarray]
@@ -23,14 +23,14 @@ Faces = dict[str, np.ndarray]
 class Pad:
     """One finger's pad in the object's frame [m, Pa].
 
-    ``front (i + 1, j + 1, 3)`` are the corners of the contact faces, ``back (4, 3)`` those of the moved back in the
-    order of the front's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
+    ``face (i + 1, j + 1, 3)`` are the corners of the contact faces, ``back (4, 3)`` those of the moved back in the
+    order of the face's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
     faces; they are empty where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
     ``origin (3,)`` is its origin; ``rotation`` and ``position`` place the pad's own frame.
     Fronts overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
     """
 
-    front: np.ndarray
+    face: np.ndarray
     back: np.ndarray
     frame: np.ndarray
     origin: np.ndarray
@@ -58,7 +58,7 @@ class Pad:
 
     def quads(self) -> np.ndarray:
         """Corners of the faces, ``(i j, 4, 3)``, in the order of the faces."""
-        f = self.front
+        f = self.face
         return np.stack([f[:-1, :-1], f[1:, :-1], f[1:, 1:], f[:-1, 1:]], axis=2).reshape(-1, 4, 3)
 
     def pressed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -69,13 +69,13 @@ class Pad:
         return 1e3 * (self.quads()[loaded] - self.lift * self.approach), 1e-3 * self.pressure.ravel()[loaded]
 
     def rim(self) -> np.ndarray:
-        """The front's border, once round ``(n, 3)``."""
-        f = self.front
+        """The face's border, once round ``(n, 3)``."""
+        f = self.face
         return np.concatenate([f[:-1, 0], f[-1, :-1], f[:0:-1, -1], f[0, :0:-1]])
 
     def sides(self) -> np.ndarray:
-        """Straight sides between the front's border and the back, and the back, as ``(k, 4, 3)``."""
-        i, j = (n - 1 for n in self.front.shape[:2])
+        """Straight sides between the face's border and the back, and the back, as ``(k, 4, 3)``."""
+        i, j = (n - 1 for n in self.face.shape[:2])
         b = self.back
         edges = [(b[k], b[(k + 1) % 4], (i, j, i, j)[k]) for k in range(4)]
         behind = np.concatenate([p + (q - p) * np.arange(n)[:, None] / n for p, q, n in edges])
@@ -86,7 +86,7 @@ class Pad:
     def lines(self) -> np.ndarray:
         """Edges of the pad as segments ``(k, 2, 3)``."""
         rim, b = self.rim(), self.back
-        corners = self.front[[0, -1, -1, 0], [0, 0, -1, -1]]
+        corners = self.face[[0, -1, -1, 0], [0, 0, -1, -1]]
         pairs = [np.stack([p, np.roll(p, -1, axis=0)], axis=1) for p in (rim, b)]
         return np.concatenate([*pairs, np.stack([corners, b], axis=1)])
 
@@ -138,12 +138,12 @@ def _pad(gripper: Any, faces: Faces, R: Any, o: Any, closing: Any, axes: Any, or
     per_side = 3 if gripper.element == "hex27" else 2
     grid = tuple(per_side * n for n in gripper.elements[:2])
     if not faces or faces["pressure"].size != np.prod(grid):  # only the block before it is pressed
-        front = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
+        face = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
         grid, faces = (0, 0), {name: np.empty(0) for name in ("centroid", "normal", "pressure", "area")}
     else:
-        front = corners_of(faces["centroid"].reshape(*grid, 3))
+        face = corners_of(faces["centroid"].reshape(*grid, 3))
     placed = {
-        "front": front,
+        "face": face,
         "back": np.column_stack([x, y, np.full(4, closing - thickness)]),
         "origin": origin,
         "centroid": faces["centroid"].reshape(*grid, 3),

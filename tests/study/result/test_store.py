@@ -121,7 +121,7 @@ def test_every_dimension_has_a_scale_beside_the_data(path):
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), front=(2, 2),
+    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), pad_faces=(2, 2),
                    probes=(1,), variations=("mu", "pose"))  # fmt: skip
     surface = Surface(np.eye(3), np.array([[0, 1, 2]]), np.array([0]))
     create(tmp_path / "whole.hdf", layout, replace(HEADER, surface=surface))

@@ -214,9 +214,9 @@ def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
     ("value", "own", "common", "told"),
     [
         ([0.12, 0.10, 0.09], [0.002] * 3, {}, "the best grasp is better than the second beyond the errors"),
-        ([0.12, 0.11, 0.09], [0.01] * 3, {}, "the first 2 grasps cannot be told apart"),
-        ([0.12, 0.10, 0.11], [0.01] * 3, {}, "the first 2 grasps cannot be told apart"),
-        ([0.12, 0.11, 0.10], [0.002, 0.002, 0.05], {}, "the first 3 grasps cannot be told apart"),
+        ([0.12, 0.11, 0.09], [0.01] * 3, {}, "the first 2 grasps cannot be distinguished"),
+        ([0.12, 0.10, 0.11], [0.01] * 3, {}, "the first 2 grasps cannot be distinguished"),
+        ([0.12, 0.11, 0.10], [0.002, 0.002, 0.05], {}, "the first 3 grasps cannot be distinguished"),
         ([0.12, 0.11, 0.10], [0.0] * 3, {"mu": [0.06, 0.055, 0.05]}, "better than the second"),  # 50 % of each
         ([0.12, 0.11, 0.10], [0.0] * 3, {"modulus": [0.02, -0.02, 0.01]}, "the first 2 grasps"),
         ([0.12, 0.11, 0.10], [0.002, np.nan, 0.002], {}, "not known"),
@@ -260,7 +260,7 @@ def test_show_compare_export_and_lookup_take_intervals_from_the_file(tmp_path):
     names = [name for name, _ in table.columns]
     assert table.rows[0][names.index("quality_interval")] == pytest.approx(0.2)
     assert (
-        "the first 2 grasps cannot be told apart (2.000 +- 0.2 to 1.750 +- 0.1" in text
+        "the first 2 grasps cannot be distinguished (2.000 +- 0.2 to 1.750 +- 0.1" in text
     )  # 0.25 < root(0.2^2 + 0.175^2)
     assert "half-width" in text
     assert GraspMap(path).at(station=0.01, angle=0, force=3).value("e_n_interval") == pytest.approx(1e-3)

@@ -146,9 +146,9 @@ def test_pads_stand_where_the_file_says(shown):
     view, index = shown
     assert index == (1, 0, 1)
     one, two = view.pads(index)
-    assert one.front[..., 0] == pytest.approx(np.full((5, 5), 0.025))
-    assert two.front[..., 0] == pytest.approx(np.full((5, 5), -0.025))
-    assert np.ptp(one.front.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
+    assert one.face[..., 0] == pytest.approx(np.full((5, 5), 0.025))
+    assert two.face[..., 0] == pytest.approx(np.full((5, 5), -0.025))
+    assert np.ptp(one.face.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
     assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - CLOSING))
     assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, CLOSING - SIZE[2]))
     assert one.sides().shape == (17, 4, 3)
@@ -182,7 +182,7 @@ def test_no_pads_are_invented(file, tmp_path, shown):
         bare, index = view_of(judge(dataset(result)), 2, (None, None), 5)
         one = bare.pads(index)[0]
         assert one.pressure.size == 0
-        assert one.front.shape == (2, 2, 3)
+        assert one.face.shape == (2, 2, 3)
         assert len(one.friction("x")[0]) == 0
 
 

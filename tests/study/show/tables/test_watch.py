@@ -93,7 +93,7 @@ def test_ctrl_c_ends_the_view_and_not_the_run(tmp_path, monkeypatch):
 
     stream = io.StringIO()
     assert watch(run.path, 1.0, stream, interrupted) == INTERRUPTED
-    assert stream.getvalue().endswith("no longer watching; the run goes on\n")
+    assert stream.getvalue().endswith("no longer watching; the run continues\n")
 
 
 @pytest.mark.parametrize("words", [["watch", "no.hdf"], ["watch", "a.hdf", "--every", "0"]])
