@@ -34,7 +34,7 @@ def build_object(shape: Shape) -> GapObject:
     if shape.shape == "mesh":
         from softjaw.fem.objects.mesh_object import MeshObject
 
-        return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
+        return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step, shape.crease_angle_deg)
     import numpy as np
 
     from softjaw.fem.objects import shapes as objects
@@ -168,7 +168,9 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (station_warnings(shape, axis_span(shape), scene.candidates, scene.gripper) for shape in shapes)
     walls = [_distance(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls)
+    meshes = dict.fromkeys(shape for shape in shapes if shape.shape == "mesh")
+    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in build_object(shape).notes]
+    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls, *mended)
 
 
 def _distance(shape: Walled) -> str:

@@ -216,6 +216,9 @@ class Mesh(Walled):
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(
         "auto", description="step of the grid on which the distance to the mesh is sampled"
     )
+    crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
+        30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
+    )
     wall_heights_mm: Annotated[tuple[float, float], Field(strict=False)] | None = Field(
         None, description="part of the mesh along its axis that a thin wall is traced on, [low, high]; else all of it"
     )

@@ -106,7 +106,7 @@ def finger_on(obj, gripper):
     from softjaw.study.case import model
     from softjaw.study.case.candidates import axis_poses
 
-    return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
+    return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper)
 
 
 def test_springs_on_a_plane_carry_alike():

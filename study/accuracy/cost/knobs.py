@@ -21,7 +21,7 @@ HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side ov
 HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
-STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
+STEPS_PER_ELEMENT = 4  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
 OWN = ("friction", "limit_surface")  # effects with knobs of their own, see `judging_knobs`
 EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
@@ -188,7 +188,8 @@ def _object_mesh(scene: Scene) -> Iterable[Knob]:
         yield Knob("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), -1, 2.0)
     elif scene.object.shape == "mesh":
         own = scene.object.grid_step_mm
-        start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
+        sides = zip(scene.gripper.pad_size[:2], scene.gripper.elements, strict=False)
+        start = 1e3 * min(side / n for side, n in sides) / STEPS_PER_ELEMENT if own == "auto" else own
         steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
         levels = [Level("auto" if s == "auto" else f"{s:.3g} mm", (("object.grid_step_mm", s),),
                         start if s == "auto" else s) for s in steps]  # fmt: skip
