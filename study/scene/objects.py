@@ -205,7 +205,7 @@ class Sections(Walled):
 
 
 class Mesh(Walled):
-    """A closed triangle mesh from a file."""
+    """A triangle mesh from a file."""
 
     shape: Literal["mesh"]
     mesh: str = Field(

@@ -118,6 +118,15 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
     assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_an_edge_that_turns_by_just_the_crease_angle_stays(seed):
+    """A prism of twelve sides, moved by rounding; a little above the angle its edges are facets."""
+    x, triangles = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 12)
+    x = np.nextafter(x, x + np.random.default_rng(seed).choice([-1.0, 1.0], x.shape))
+    assert smooth_triangles(x, triangles, 30.0).crease.sum() == 36
+    assert smooth_triangles(x, triangles, 30.01).crease.sum() == 24
+
+
 def test_gradient_and_hessian_are_those_of_the_gap():
     region = MeshObject(*turned(bottle(0.003))).near(side(0.11, radius=0.02), *BOX, 0.002)
     x, h = region.pose.to_object(in_box(200, 0.95)), 1e-6
