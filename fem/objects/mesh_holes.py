@@ -12,6 +12,7 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray
 
 SMALL_HOLE, LARGEST_HOLE = 0.02, 0.5  # of the object's diagonal: smaller are filled, larger refused, others get a lid
+FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
 MOST_PLACES = 3  # of defects that one note names
 MOST_SIDES = 60  # of a loop that is filled without a new point: the effort grows with the cube
 
@@ -40,9 +41,10 @@ def without_holes(
                 f"the mesh is not closed: a hole of {across * 1e3:.3g} mm near {named_place(middle)} leaves open what "
                 "is inside; fill it in a mesh editor, or give the object as a profile"
             )
-        new = filling(points, loop, taken) if across <= SMALL_HOLE * size else None
+        small = across <= (SMALL_HOLE if len(loop) > FEW_SIDES else LARGEST_GAP) * size
+        new = filling(points, loop, taken) if small else None
         (covered if new is None else filled).append(f"{across * 1e3:.3g} mm near {named_place(middle)}")
-        is_lid.append(np.full(len(loop) if new is None else len(new), across > SMALL_HOLE * size))
+        is_lid.append(np.full(len(loop) if new is None else len(new), not small))
         if new is None:
             centre, new = lid(points, loop)
             points = np.concatenate([points, centre[None]])

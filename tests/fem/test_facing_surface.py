@@ -10,6 +10,7 @@ from softjaw.fem.objects.mesh_check import sound_mesh
 from softjaw.fem.objects.mesh_holes import border_loops, filling
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.smooth_triangles import smooth_triangles
+from softjaw.fem.objects.traced_surface import traced
 from softjaw.fem.objects.triangle_tree import TriangleTree, first_hit
 
 BOX = np.array([[-0.012, -0.008, -0.005], [0.012, 0.008, 0.010]])
@@ -203,6 +204,24 @@ def test_a_small_hole_is_filled_without_moving_a_point_and_said():
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(4 / 3 * np.pi * 0.03**3, rel=4e-3)
 
 
+def test_a_missing_triangle_is_put_back_though_it_is_large_and_a_flipped_one_is_turned():
+    x, triangles = ball(16, 32)
+    torn = np.delete(triangles, [100, 300], axis=0)
+    torn[7] = torn[7, ::-1]
+    sound = sound_mesh(x, np.concatenate([torn, torn[:2]]))
+    assert not len(sound.lids)
+    assert len(sound.notes) == 3  # doubled, filled, turned
+    assert {tuple(sorted(map(tuple, sound.points[t]))) for t in sound.triangles} == {
+        tuple(sorted(map(tuple, x[t]))) for t in triangles
+    }
+
+
+def test_the_outer_wall_of_a_hollow_mesh_is_traced():
+    hollow, solid = (traced(MeshObject(*turned(bottle(wall))))[0] for wall in (0.003, None))
+    theta, s = np.meshgrid(np.linspace(0, 6, 20), np.linspace(*solid.wall, 30))
+    assert hollow.jets(theta, s)[:, 0] == pytest.approx(solid.jets(theta, s)[:, 0], abs=1e-5)
+
+
 def test_a_large_hole_matters_only_under_a_pad():
     whole = MeshObject(*ball())
     sound = sound_mesh(*punctured(ball(), [0, 0.03, 0], 0.008))
@@ -252,6 +271,38 @@ def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
         if hit >= 0:
             p, n = o + t * d, tree.face_normals[hit]
             assert abs((p - x[triangles[hit, 0]]) @ n) < 1e-12
+
+
+def test_every_force_on_a_hollow_bowl_is_solved(tmp_path):
+    """A station where the inner wall, 2 mm under the outer one, used to spoil the gap."""
+    from softjaw.study import pipeline
+    from softjaw.study.case.result import CaseResult
+    from softjaw.study.case.sweep import units
+    from softjaw.study.scene import load_scene
+
+    x, triangles = turned(bowl(0.002), 48)
+    facets = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    facets["corners"] = 1e3 * x[triangles]
+    (tmp_path / "bowl.stl").write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
+    (tmp_path / "bowl.toml").write_text("""
+        [object]
+        shape = "mesh"
+        mesh = "bowl.stl"
+        unit = "mm"
+        [gripper]
+        pad_length_mm = 20
+        pad_width_mm = 14
+        pad_thickness_mm = 12
+        elements = [8, 6, 4]
+        [candidates]
+        stations_mm = [39]
+        angles_deg = [4]
+        [load]
+        normal_force_n = [1, 3]
+    """)
+    (unit,) = units(load_scene(tmp_path / "bowl.toml"), lambda _: 1)
+    found = [result for _, result in pipeline.solve_unit(unit)]
+    assert [type(result) for result in found] == [CaseResult, CaseResult]
 
 
 def test_nothing_is_seen_from_behind():
