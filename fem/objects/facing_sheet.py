@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray, Pose
@@ -34,6 +34,7 @@ THIN = 1 / 3  # of the box's depth: a wall thinner than this has one side only
 MOST_SPOTS = 40  # places along one side of a triangle that are looked at
 COARSE = 4  # steps of the grid between samples that are taken far from the sheet
 EXACT = 5  # steps from the sheet within which every sample is taken
+STAIRS = 1.5  # steps of the grid over which shadow lines are smoothed
 FOLLOWED = 1 / 200  # of the grid's step: how well flat pieces follow the smooth triangles
 
 
@@ -148,16 +149,20 @@ class FacingSheet:
         """
         part = (slice(None, None, COARSE),) * 3
         known = self.signed(x[part].reshape(-1, 3))[0].reshape(x[part].shape[:3])
-        known = _with_shadows(known, COARSE * step)
+        known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
         places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
         g = evaluate(coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
         near = np.abs(g) < EXACT * step
         g[near] = self.signed(x[near])[0]
-        return _with_shadows(g, step)
+        return _with_shadows(g, step, STAIRS)
 
 
-def _with_shadows(g: FloatArray, step: float) -> FloatArray:
-    """Distances ``g`` to the sheet, on an even grid, no larger than those to the shadow lines between the samples."""
+def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
+    """Distances ``g`` to the sheet, on an even grid, no larger than those to the shadow lines between the samples.
+
+    The shadow lines come out in stairs of the grid; where they are nearest, and the sheet is not near, these are
+    smoothed over ``stairs`` steps.
+    """
     shadow = np.zeros(g.shape, dtype=bool)
     for axis in range(3):
         one, two = (tuple([slice(None)] * axis + [part]) for part in (slice(None, -1), slice(1, None)))
@@ -167,7 +172,10 @@ def _with_shadows(g: FloatArray, step: float) -> FloatArray:
         shadow[two] |= change
     if not shadow.any():
         return g
-    return np.where(g < 0, -1.0, 1.0) * np.minimum(np.abs(g), step * (distance_transform_edt(~shadow) + 0.5))
+    away = step * (distance_transform_edt(~shadow) + 0.5)
+    bound = np.where(g < 0, -1.0, 1.0) * np.minimum(np.abs(g), away)
+    rough = np.clip(np.abs(g) / step - 1.0, 0.0, 1.0) * np.clip((np.abs(g) - away) / step, 0.0, 1.0)
+    return bound + rough * (gaussian_filter(bound, stairs, mode="nearest") - bound)
 
 
 def facing_sheet(
