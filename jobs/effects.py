@@ -89,7 +89,7 @@ def solvers(scene: Scene, **levels: str) -> Iterator[Solver]:
     scene = scene.with_values({f"effects.{name}": level for name, level in levels.items()})
     for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
         obj, poses = build_object(scene.object), unit.candidate.poses
-        solving = solver(scene, [model.approach(obj, pose, scene.gripper.pad_size) for pose in poses], poses)
+        solving = solver(scene, [model.approach(obj, pose, scene.gripper) for pose in poses], poses)
         yield solving
         solving.destroy()
 

@@ -30,7 +30,7 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     scene = unit.scene
     obj = build_object(scene.object)
     settings = settings_of(scene, obj)
-    fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in unit.candidate.poses]
+    fingers = [model.approach(obj, pose, scene.gripper) for pose in unit.candidate.poses]
     solving, probing = solver(scene, fingers, unit.candidate.poses), Probing(unit)
     try:
         for k, outcome in enumerate(_outcomes(solving, scene.load.normal_force)):

@@ -77,15 +77,15 @@ class GapObject(GapFunction, Protocol):
         """Points ``(k, 3)`` [m] and triangles ``(m, 3)`` for drawing."""
         ...
 
-    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray) -> GapFunction:
-        """Gap function for use inside a box of the pad's frame."""
+    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
+        """Gap function for use inside a box of the pad's frame, by a pad with elements of this size [m]."""
         ...
 
 
 class Analytic:
     """Shapes whose gap function costs the same everywhere."""
 
-    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray) -> Self:
+    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> Self:
         """Return the shape itself: a closed form needs no region."""
         return self
 

@@ -1,11 +1,14 @@
 """What a triangle mesh has to be before a distance to it means anything: closed, simple, turned outwards.
 
+Small defects are mended with a note that says what and where; no point moves. A hole that is large but leaves inside
+and outside decided gets a lid, which matters only under a pad (`facing_sheet`).
+
 Triangles that cross each other are found pair by pair where their boxes meet, exactly up to rounding.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,6 +19,7 @@ from scipy.spatial import cKDTree
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray
 from softjaw.fem.objects.mesh_file import LENGTHS, MOST_TRIANGLES
+from softjaw.fem.objects.mesh_holes import named_place, without_holes
 
 MOST_PIECES = 50
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
@@ -97,14 +101,34 @@ def crossing_pairs(points: FloatArray, triangles: IntArray, most: int = 10_000) 
     return _swept(points, triangles, lower, upper, order, axis, most, noise)
 
 
-def sound_mesh(
-    points: FloatArray, triangles: IntArray, unit: str = "m"
-) -> tuple[FloatArray, IntArray, tuple[str, ...]]:
-    """Mesh in metres, points merged, closed, oriented outwards, and notes on what was repaired or tolerated.
+class SoundMesh(NamedTuple):
+    """Closed mesh in metres, oriented outwards.
 
-    Repaired: doubled points, collapsed triangles, orientation, specks of debris, shells inside the object. Tolerated: a
-    few crossing triangles. Refused: all else that leaves inside and outside undefined, also where they are undecided:
-    pieces without volume, and pieces whose corners all lie on another one.
+    Attributes
+    ----------
+    points : (k, 3) array
+        Corners [m].
+    triangles : (m, 3) array of int
+        Corners of each triangle.
+    notes : tuple of str
+        What was mended or tolerated, and where in the file's frame.
+    lids : (l,) array of int
+        Triangles that close a large hole.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    notes: tuple[str, ...]
+    lids: IntArray
+
+
+def sound_mesh(points: FloatArray, triangles: IntArray, unit: str = "m") -> SoundMesh:
+    """Mesh in metres, points merged, closed, oriented outwards, and notes on what was mended or tolerated.
+
+    Mended: doubled points and triangles, collapsed triangles, orientation, small holes, specks of debris, shells inside
+    the object. Tolerated: a few crossing triangles, larger holes, which get lids. Refused: all else that leaves inside
+    and outside undefined, also where they are undecided: pieces without volume, and pieces whose corners all lie on
+    another one.
 
     Parameters
     ----------
@@ -125,22 +149,23 @@ def sound_mesh(
         raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     _check_numbers(points, triangles)
     points, triangles, notes = _merged(points, triangles)
-    points, triangles, notes = _merged(_snapped(points), triangles, notes)
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
+    given = len(triangles)
+    points, triangles, lids, closed = without_holes(points, triangles)
     neighbours = _closed(triangles)
     triangles, turned = _oriented(points, triangles, *neighbours)
-    crossings = crossing_pairs(points, triangles)
-    if len(crossings) > TOLERATED_CROSSINGS * len(triangles):
-        place = ", ".join(f"{x:.4g}" for x in points[triangles[crossings[0, 0]]].mean(axis=0))
+    crossings = crossing_pairs(points, triangles[:given])
+    if len(crossings) > TOLERATED_CROSSINGS * given:
         raise MeshError(
-            f"the mesh intersects itself: {len(crossings)} pairs of triangles cross, the first near ({place}) m of the "
-            "file's frame; unite its parts into one outer surface (a boolean union or remeshing does it)"
+            f"the mesh intersects itself: {len(crossings)} pairs of triangles cross, the first near "
+            f"{named_place(points[triangles[crossings[0, 0]]].mean(axis=0))}; unite its parts into one outer surface "
+            "(a boolean union or remeshing does it)"
         )
     if len(crossings):
-        notes.append(f"{len(crossings)} pairs among {len(triangles)} triangles cross; tolerated")
-    points, triangles, dropped = _outer_pieces(points, triangles)
-    return points, triangles, tuple(notes + turned + dropped)
+        notes.append(f"{len(crossings)} pairs among {given} triangles cross; tolerated")
+    points, triangles, lids, dropped = _outer_pieces(points, triangles, lids)
+    return SoundMesh(points, triangles, (*notes, *closed, *turned, *dropped), np.flatnonzero(lids))
 
 
 def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
@@ -179,26 +204,30 @@ def _check_size(extent: float, unit: str) -> None:
     )
 
 
-def _snapped(points: FloatArray) -> FloatArray:
-    """Points within rounding of each other moved to the first of them."""
-    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
-    links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
-    group = connected_components(links, directed=False)[1]
-    return points[np.unique(group, return_index=True)[1]][group]
-
-
-def _merged(
-    points: FloatArray, triangles: IntArray, notes: Sequence[str] = ()
-) -> tuple[FloatArray, IntArray, list[str]]:
-    """Equal points as one, unused ones left out, triangles that collapse dropped; adds to the notes."""
-    used, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Points within rounding of each other as one, unused ones left out, collapsed and doubled triangles dropped."""
+    points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
+    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+    notes = []
+    if len(close):
+        links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
+        group = connected_components(links, directed=False)[1]
+        first = np.unique(group, return_index=True)[1]
+        used, inverse = np.unique(first[group][triangles], return_inverse=True)
+        points, triangles = points[used], inverse.reshape(-1, 3).astype(np.int64)
     a, b, c = triangles.T
     whole = (a != b) & (b != c) & (c != a)
-    notes = [*notes, *([] if whole.all() else [f"dropped {np.sum(~whole)} triangles without area"])]
     if not whole.any():
         raise MeshError("the mesh is empty: all its triangles have collapsed to lines or points")
-    return used, triangles[whole], notes
+    if not whole.all():
+        notes.append(f"dropped {np.sum(~whole)} triangles without area")
+    triangles = triangles[whole]
+    first = np.sort(np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1])
+    if len(first) < len(triangles):
+        notes.append(f"dropped {len(triangles) - len(first)} doubled triangles")
+    used, inverse = np.unique(triangles[first], return_inverse=True)
+    return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
 
 
 def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -206,15 +235,15 @@ def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     forward = edges[:, 0] < edges[:, 1]
     unique, inverse, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    if (count == 1).any():
-        raise MeshError(
-            f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
-            "triangle only; fill the holes in a mesh editor, or give the object as a profile"
-        )
     if (count > 2).any():
         raise MeshError(
             f"the mesh is not manifold: at {np.sum(count > 2)} edges more than two triangles meet; remove "
             "the inner walls or doubled triangles there"
+        )
+    if (count == 1).any():
+        raise MeshError(
+            f"the mesh is not closed: {np.sum(count == 1)} of its {len(unique)} edges border on one "
+            "triangle only; fill the holes in a mesh editor, or give the object as a profile"
         )
     order = np.argsort(inverse.ravel(), kind="stable").reshape(-1, 2)
     return order[:, 0] // 3, order[:, 1] // 3, forward[order[:, 0]] == forward[order[:, 1]]
@@ -264,16 +293,19 @@ def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
     return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
-def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+def _outer_pieces(
+    points: FloatArray, triangles: IntArray, lids: np.ndarray
+) -> tuple[FloatArray, IntArray, np.ndarray, list[str]]:
     """Mesh without debris and without shells inside another piece: the object is grasped from outside."""
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
     links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
     count, label = connected_components(links, directed=False)
     if count == 1:
-        return points, triangles, []
+        return points, triangles, lids, []
     if count > MOST_PIECES:
         raise MeshError(f"the mesh falls into {count} separate pieces; keep the object's outer surface only")
-    pieces = [triangles[label[triangles[:, 0]] == k] for k in range(count)]
+    owner = label[triangles[:, 0]]
+    pieces = [triangles[owner == k] for k in range(count)]
     size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
     speck = size < DEBRIS * size.max()
     inner = np.array(
@@ -285,14 +317,14 @@ def _outer_pieces(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
     keep = ~speck & ~inner
     if not keep.any():
         raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
-    triangles = np.concatenate([piece for piece, wanted in zip(pieces, keep, strict=True) if wanted])
-    used, inverse = np.unique(triangles, return_inverse=True)
+    lids = lids[keep[owner]]
+    used, inverse = np.unique(triangles[keep[owner]], return_inverse=True)
     notes = [
         f"dropped {number} {kind}"
         for number, kind in ((speck.sum(), "specks of debris"), ((inner & ~speck).sum(), "shells inside the object"))
         if number
     ]
-    return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
+    return points[used], inverse.reshape(-1, 3).astype(np.int64), lids, notes
 
 
 def _lies_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:

@@ -1,111 +1,40 @@
 """Triangle meshes as objects: read, checked, and turned into a smooth signed distance round the contact.
 
-The distance to the triangles themselves has a normal that jumps and a curvature that sits in the edges alone. In the
-box where a pad works it is therefore sampled on a grid and interpolated by a tricubic B-spline: g is twice continuously
-differentiable and costs the same for every mesh. The spline passes through the samples; it rounds edges over about one
-grid step and keeps everything larger, facets included. A quarter of the pad's element size is a good step; one far
-below the triangles' size only renders the facets more sharply.
+A finger sees the part of the surface that faces it (`facing_sheet`), with facets made smooth (`smooth_triangles`). The
+distance to it is sampled on a grid in the box where the pad works and interpolated by a tricubic B-spline
+(`spline_grid`): g is twice continuously differentiable and costs the same for every mesh. Real edges are rounded over
+about one step of the grid, which is a quarter of the pad's element; what is finer the pad cannot feel. Errors: that of
+the spline, of fourth order in the step where the surface is smooth, and a two-hundredth of a step of the sheet.
 
-VTK is imported where it is used: loading it took a quarter of every start, and most objects need none of it.
+The grid lies evenly about the middle of the box, so that the mirror image of a mesh has the mirror image of its gap.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
-from numba import njit
-from scipy.ndimage import spline_filter
 
 from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
 from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, Pose, Surface
 from softjaw.fem.objects.mesh_check import sound_mesh
 from softjaw.fem.objects.mesh_file import read_triangles
+from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
+from softjaw.fem.objects.spline_grid import coefficients, evaluate
+from softjaw.fem.objects.triangle_tree import TriangleTree
 
-if TYPE_CHECKING:
-    import pyvista as pv
-    from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
-
-PADDING = 8  # cells of continuation; the filter forgets its end by a factor 0.27 per cell
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
-STEPS_PER_BOX = 80  # default grid: steps along the longest side of the box
-MARGIN = 3  # cells sampled beyond the box
+STEPS_PER_BOX = 80  # grid where no element size is given: steps along the longest side of the box
+STEPS_PER_ELEMENT = 4
+MARGIN = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
+MOST_CHOSEN = 1_000_000  # samples of a grid whose step is not the user's own
 MOST_CENTRES = 4_000  # cells at whose centres the interpolation is compared with the distance itself
 TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
-
-
-def coefficients(samples: FloatArray) -> FloatArray:
-    """B-spline coefficients of the samples ``(n_0, n_1, n_2)``, padded by ``PADDING`` on every side.
-
-    The samples are continued by reflection in their end points (which keeps the slope), so that the end conditions of
-    the filter stay far away from the values that are used.
-    """
-    extended = np.pad(samples, PADDING, mode="reflect", reflect_type="odd")
-    return np.ascontiguousarray(spline_filter(extended, order=3, output=np.float64, mode="mirror"))
-
-
-@njit(cache=True)
-def _weights(t, w):
-    """Cubic B-spline weights ``w (3, 4)`` at ``t`` in [0, 1]: values, first and second derivatives."""
-    u = 1.0 - t
-    w[0, 0], w[0, 1] = u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0
-    w[0, 2], w[0, 3] = (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0
-    w[1, 0], w[1, 1] = -u * u / 2.0, t * (3.0 * t - 4.0) / 2.0
-    w[1, 2], w[1, 3] = -u * (3.0 * u - 4.0) / 2.0, t * t / 2.0
-    w[2, 0], w[2, 1], w[2, 2], w[2, 3] = u, 3.0 * t - 2.0, 3.0 * u - 2.0, t
-
-
-@njit(cache=True)
-def evaluate(c, lower, step, x):
-    """Value ``(n,)``, gradient ``(n, 3)`` and Hessian ``(n, 3, 3)`` of the spline at ``x (n, 3)``.
-
-    ``c`` are padded coefficients, ``lower (3,)`` is the place of the first sample. The points must lie on the grid.
-    """
-    n = len(x)
-    g, gradient, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
-    w = np.empty((3, 3, 4))
-    base = np.empty(3, np.int64)
-    for i in range(n):
-        for d in range(3):
-            s = (x[i, d] - lower[d]) / step
-            k = min(max(int(np.floor(s)), 0), c.shape[d] - 2 * PADDING - 2)
-            base[d] = k + PADDING - 1
-            _weights(s - k, w[d])
-        v = v_x = v_y = v_z = v_xx = v_yy = v_zz = v_xy = v_xz = v_yz = 0.0
-        for a in range(4):
-            p = p_y = p_z = p_yy = p_zz = p_yz = 0.0
-            for b in range(4):
-                q = q_z = q_zz = 0.0
-                for e in range(4):
-                    f = c[base[0] + a, base[1] + b, base[2] + e]
-                    q += w[2, 0, e] * f
-                    q_z += w[2, 1, e] * f
-                    q_zz += w[2, 2, e] * f
-                p += w[1, 0, b] * q
-                p_y += w[1, 1, b] * q
-                p_yy += w[1, 2, b] * q
-                p_z += w[1, 0, b] * q_z
-                p_yz += w[1, 1, b] * q_z
-                p_zz += w[1, 0, b] * q_zz
-            v += w[0, 0, a] * p
-            v_x += w[0, 1, a] * p
-            v_xx += w[0, 2, a] * p
-            v_y += w[0, 0, a] * p_y
-            v_xy += w[0, 1, a] * p_y
-            v_z += w[0, 0, a] * p_z
-            v_xz += w[0, 1, a] * p_z
-            v_yy += w[0, 0, a] * p_yy
-            v_yz += w[0, 0, a] * p_yz
-            v_zz += w[0, 0, a] * p_zz
-        g[i] = v
-        gradient[i] = v_x / step, v_y / step, v_z / step
-        hessian[i, 0], hessian[i, 1], hessian[i, 2] = (v_xx, v_xy, v_xz), (v_xy, v_yy, v_yz), (v_xz, v_yz, v_zz)
-        hessian[i] /= step * step
-    return g, gradient, hessian
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,15 +48,21 @@ class MeshObject:
     triangles : (m, 3) array of int
         Corners of each triangle, counterclockwise from outside.
     grid_step : float or None
-        Step of the sampling grid [m]; by default 1/80 of the longest side of the box that is asked for.
+        Step of the sampling grid [m]; by default a quarter of the pad's element.
     notes : tuple of str
-        What was repaired or tolerated when the mesh was checked.
+        What was mended or tolerated when the mesh was checked.
+    crease_angle : float
+        Edges that turn by less are taken for facets of a smooth surface [deg]; 0 keeps every facet flat.
+    lids : (l,) array of int
+        Triangles that close a large hole: they tell inside from outside, and no pad may stand on them.
     """
 
     points: FloatArray
     triangles: IntArray
     grid_step: float | None = None
     notes: tuple[str, ...] = ()
+    crease_angle: float = CREASE_ANGLE
+    lids: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __post_init__(self) -> None:
         """Refuse a step that is no length."""
@@ -135,7 +70,10 @@ class MeshObject:
             raise ValueError(f"grid_step must be a positive length in metres, found {self.grid_step}")
 
     @classmethod
-    def from_file(cls, path: str | Path, unit: str, axis: str = "z", grid_step: float | None = None) -> Self:
+    def from_file(
+        cls, path: str | Path, unit: str, axis: str = "z", grid_step: float | None = None,
+        crease_angle: float = CREASE_ANGLE,
+    ) -> Self:  # fmt: skip
         """Mesh from an STL, OBJ, PLY or OFF file, checked and moved to the object's frame.
 
         ``axis`` of the file becomes z, by a cyclic exchange of the coordinates; z starts at 0 and the bounding box is
@@ -145,56 +83,62 @@ class MeshObject:
             raise MeshError(f"the mesh's axis must be one of {', '.join(TURNS)}, found {axis!r}")
         corners, triangles = read_triangles(Path(path))
         try:
-            points, triangles, notes = sound_mesh(corners, triangles, unit)
+            sound = sound_mesh(corners, triangles, unit)
         except MeshError as problem:
             raise MeshError(f"{path}: {problem}") from problem
-        points = points[:, TURNS[axis]]
+        points = sound.points[:, TURNS[axis]]
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-        return cls(np.ascontiguousarray(points - origin), triangles, grid_step, notes)
+        points = np.ascontiguousarray(points - origin)
+        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, sound.lids)
 
     def gap(self, x: FloatArray) -> Gap:
-        """Signed distance ``(n,)`` [m] to the triangles, its normal ``(n, 3)`` and a Hessian ``(n, 3, 3)`` of zeros.
+        """Signed distance ``(n,)`` [m] to the flat triangles, its unit gradient ``(n, 3)`` and a Hessian of zeros.
 
-        Exact and as rough as the triangles: meant for points far away. Where a pad touches, take ``near``.
+        Of all triangles, exact and as rough as they are: meant for points far away. Where a pad touches, take ``near``.
         """
-        g, closest = self.distance(x), self._closest(x)
-        d = x - closest
-        far = np.abs(g) > 1e-9 * np.ptp(self.points)
-        normal = self._flat_normals(x)
-        normal[far] = d[far] / g[far, None]
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        g, normal, _ = self._tree.signed(x)
         return g, normal, np.zeros((len(x), 3, 3))
 
     def distance(self, x: FloatArray) -> FloatArray:
-        """Signed distance ``(n,)`` [m] to the triangles; the sign comes from normals weighted by angle."""
-        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkDoubleArray
+        """Signed distance ``(n,)`` [m] to the flat triangles, all of them."""
+        return self._tree.signed(x)[0]
 
-        out = vtkDoubleArray()
-        self._implicit.FunctionValue(numpy_to_vtk(np.ascontiguousarray(x, dtype=float)), out)
-        return vtk_to_numpy(out).copy()
-
-    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray) -> MeshRegion:
+    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> MeshRegion:
         """Smooth signed distance inside the box from ``lower (3,)`` to ``upper (3,)`` of the pad's frame [m].
 
-        Depends on the arguments alone, so every rank gets the same region.
+        ``element`` is the size of the pad's elements [m]. Depends on the arguments alone, so every rank gets the same
+        region.
+
+        Raises
+        ------
+        MeshError
+            If a hole of the mesh lies under the pad.
         """
-        lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
-        if not (upper > lower).all():
-            raise ValueError(f"the box from {lower.tolist()} to {upper.tolist()} m is empty; swap its corners")
-        step = self.grid_step or float((upper - lower).max()) / STEPS_PER_BOX
-        cells = np.ceil((upper - lower) / step - 1e-9) + 2 * MARGIN
+        box = np.array([lower, upper], dtype=float)
+        size = box[1] - box[0]
+        if not (size > 0).all():
+            raise ValueError(f"the box from {box[0].tolist()} to {box[1].tolist()} m is empty; swap its corners")
+        step = self._step(size, element)
+        cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
             raise ValueError(
                 f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
                 f"more than {MOST_SAMPLES}; raise grid_step"
             )
-        first = lower - MARGIN * step
-        axes = [first[d] + step * np.arange(int(cells[d]) + 1) for d in range(3)]
+        sheet = facing_sheet(self._smooth, self._tree, self.lids, pose, box, step)
+        axes = [0.5 * box[:, d].sum() + step * (np.arange(int(cells[d]) + 1) - 0.5 * cells[d]) for d in range(3)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        samples = self.distance(pose.to_object(grid.reshape(-1, 3))).reshape(grid.shape[:3])
-        return MeshRegion(self, pose, lower, upper, step, first, samples, coefficients(samples))
+        samples = sheet.sampled(pose.to_object(grid.reshape(-1, 3)).reshape(grid.shape), step)
+        first = np.array([axis[0] for axis in axes])
+        return MeshRegion(sheet, pose, box[0], box[1], step, first, samples, coefficients(samples))
+
+    def _step(self, size: FloatArray, element: float | None) -> float:
+        """Step of the grid over a box of this size [m]."""
+        if self.grid_step:
+            return self.grid_step
+        wanted = element / STEPS_PER_ELEMENT if element else float(size.max()) / STEPS_PER_BOX
+        return max(wanted, float(np.cbrt(np.prod(size) / MOST_CHOSEN)))
 
     @property
     def bounds(self) -> FloatArray:
@@ -210,44 +154,30 @@ class MeshObject:
         """Points and triangles; large meshes are decimated."""
         if len(self.triangles) <= 20_000:
             return self.points, self.triangles
-        mesh = self._polydata.decimate(1 - 10_000 / len(self.triangles))
+        import pyvista as pv  # loading VTK takes a quarter of a start, and few objects need it
+
+        mesh = pv.PolyData.from_regular_faces(self.points, self.triangles).decimate(1 - 10_000 / len(self.triangles))
         return np.asarray(mesh.points, dtype=float), mesh.regular_faces.astype(np.int64)
 
     @cached_property
-    def _polydata(self) -> pv.PolyData:
-        """Mesh as VTK knows it."""
-        import pyvista as pv
-
-        return pv.PolyData.from_regular_faces(self.points, self.triangles)
+    def _tree(self) -> TriangleTree:
+        """The flat triangles."""
+        return TriangleTree(self.points, self.triangles)
 
     @cached_property
-    def _implicit(self) -> vtkImplicitPolyDataDistance:
-        """VTK's signed distance."""
-        from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
-
-        implicit = vtkImplicitPolyDataDistance()
-        implicit.SetInput(self._polydata)
-        return implicit
-
-    def _closest(self, x: FloatArray) -> FloatArray:
-        """Closest points ``(n, 3)`` of the triangles [m]."""
-        return self._polydata.find_closest_cell(x, return_closest_point=True)[1]
-
-    def _flat_normals(self, x: FloatArray) -> FloatArray:
-        """Normal ``(n, 3)`` of the triangle closest to each point."""
-        cells = self._polydata.find_closest_cell(x)
-        a, b, c = self.points[self.triangles[cells]].transpose(1, 0, 2)
-        return np.cross(b - a, c - a)
+    def _smooth(self) -> SmoothTriangles:
+        """The triangles made smooth."""
+        return smooth_triangles(self.points, self.triangles, self.crease_angle)
 
 
 @dataclass(frozen=True, eq=False)
 class MeshRegion:
-    """Signed distance to a mesh, twice continuously differentiable inside a box of the pad's frame.
+    """Signed distance to what a finger sees of a mesh, twice continuously differentiable inside a box of its frame.
 
-    Outside the box the distance to the triangles is taken: slower and rougher, but of the right sign and growing.
+    Outside the box the distance to the sheet itself is taken: slower and rougher, but of the right sign and growing.
     """
 
-    mesh: MeshObject
+    sheet: FacingSheet
     pose: Pose
     lower: FloatArray
     upper: FloatArray
@@ -265,17 +195,10 @@ class MeshRegion:
         inside = self._covers(y)
         if inside.all():
             return self._spline(y)
-        g, normal, hessian = np.empty(len(y)), np.empty((len(y), 3)), np.empty((len(y), 3, 3))
+        g, normal, hessian = np.empty(len(y)), np.empty((len(y), 3)), np.zeros((len(y), 3, 3))
         g[inside], normal[inside], hessian[inside] = self._spline(y[inside])
-        g[~inside], normal[~inside], hessian[~inside] = self.mesh.gap(x[~inside])
+        g[~inside], normal[~inside] = self.sheet.signed(x[~inside])
         return g, normal, hessian
-
-    @cached_property
-    def vertex_error(self) -> float:
-        """Largest |g| [m] of the mesh's own corners inside the box; NaN if there are none."""
-        y = self.pose.to_pad(self.mesh.points)
-        y = y[self._covers(y)]
-        return float(np.abs(self._spline(y)[0]).max()) if len(y) else np.nan
 
     @cached_property
     def centre_error(self) -> float:
@@ -285,7 +208,7 @@ class MeshRegion:
         y = y[self._covers(y)]
         if not len(y):
             return np.nan
-        return float(np.abs(self._spline(y)[0] - self.mesh.distance(self.pose.to_object(y))).max())
+        return float(np.abs(self._spline(y)[0] - self.sheet.signed(self.pose.to_object(y))[0]).max())
 
     def _covers(self, y: FloatArray) -> np.ndarray:
         """Whether points of the pad's frame lie in the box, ``(n,)``."""

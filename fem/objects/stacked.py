@@ -47,7 +47,7 @@ class Stacked:
         x = np.asarray(x, dtype=float)
         return self._gap(x, np.abs(self._triangles.distance(x)) < NEAR)
 
-    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray) -> GapFunction:
+    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use close to the wall, which need not ask the triangles first."""
         return _NearWall(self)
 

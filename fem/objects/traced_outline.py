@@ -101,10 +101,16 @@ def cast(points: FloatArray, triangles: IntArray, z: FloatArray, centre: FloatAr
     segments, cut = sections(points, triangles, z)
     which, ray, distance = _hits(segments - centre[cut][:, None], count)
     place, size = cut[which] * count + ray, len(z) * count
+    hits = np.bincount(place, minlength=size)
+    order = np.lexsort([distance, place])
+    place, distance = place[order], distance[order]
+    # at a height where every ray starts in a cavity, the first crossing of each is the inner wall
+    hollow = ((hits.reshape(-1, count) % 2 == 0) & (hits.reshape(-1, count) > 0)).all(axis=1)
+    outside = ~hollow[place // count] | np.insert(place[1:] == place[:-1], 0, False)
+    place, distance = place[outside], distance[outside]
     outer, inner = np.full(size, -np.inf), np.full(size, np.inf)
     np.maximum.at(outer, place, distance)
     np.minimum.at(inner, place, distance)
-    hits = np.bincount(place, minlength=size)
     outer[hits == 0] = inner[hits == 0] = np.nan
     return Rays(*(v.reshape(len(z), count) for v in (outer, inner, hits)))
 

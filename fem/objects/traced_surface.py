@@ -297,7 +297,11 @@ def _shape(q: BSpline, around: int) -> SplineSurface:
 
 def _report(surface: TracedSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
     """Distances between mesh and surface."""
-    x = np.concatenate([mesh.points, mesh.points[mesh.triangles].mean(axis=1)])
+    X = mesh.points[mesh.triangles]
+    middle, normal = X.mean(axis=1), np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
+    away = middle[:, :2] - np.stack([surface.shift_x(middle[:, 2]), surface.shift_y(middle[:, 2])], axis=1)
+    outwards = np.einsum("ni,ni->n", away, normal[:, :2]) > 0  # not the inner wall of a hollow mesh
+    x = np.concatenate([mesh.points[np.unique(mesh.triangles[outwards])], middle[outwards]])
     s = np.linspace(*surface.wall, 8 * len(surface.curve.breaks))
     z = surface.curve.derivative(s)[:, 0]
     x = x[(x[:, 2] >= z[0]) & (x[:, 2] <= z[-1])]

@@ -55,7 +55,7 @@ def solved(probe: Probe) -> SolvedProbe:
     """
     scene = probe.unit.scene
     obj = build_object(scene.object)
-    fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in probe.unit.candidate.poses]
+    fingers = [model.approach(obj, pose, scene.gripper) for pose in probe.unit.candidate.poses]
     start = time.process_time()
     solving = solver(scene, fingers, probe.unit.candidate.poses)
     try:
@@ -142,6 +142,6 @@ def winkler_case(found: SolvedProbe, force: float) -> FloatArray:
     """Quantities of a rigid object between two Winkler foundations, from the scene alone."""
     scene, contacts = found.probe.unit.scene, []
     for pose in found.probe.unit.candidate.poses:
-        finger = model.approach(found.obj, pose, scene.gripper.pad_size)
+        finger = model.approach(found.obj, pose, scene.gripper)
         contacts.append(Contact(winkler_pad(scene.gripper, finger).patch(force), scene.friction.mu, finger.pose))
     return np.array([*_limits(contacts, "pcm"), quality(contacts, found.settings, "pcm")])

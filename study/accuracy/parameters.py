@@ -24,7 +24,7 @@ HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
 LIMITS = get_args(WallSize)[1].metadata  # of the sizes that a scene may give
-STEPS_PER_BOX = 80  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
+STEPS_PER_ELEMENT = 4  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
 OWN = ("friction", "limit_surface")  # effects whose levels are evaluation parameters
 EACH_ALONE = -1
 WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
@@ -191,7 +191,8 @@ def _object_mesh(scene: Scene) -> Iterable[Parameter]:
         yield Parameter("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), formal=2.0)
     elif scene.object.shape == "mesh":
         own = scene.object.grid_step_mm
-        start = 1.2e3 * max(scene.gripper.pad_size) / STEPS_PER_BOX if own == "auto" else own
+        sides = zip(scene.gripper.pad_size[:2], scene.gripper.elements, strict=False)
+        start = 1e3 * min(side / n for side, n in sides) / STEPS_PER_ELEMENT if own == "auto" else own
         steps = dict.fromkeys((2 * start, 2**0.5 * start, "auto" if own == "auto" else own, start / 2**0.5))
         grid = {step: start if step == "auto" else float(step) for step in steps}
         levels = [Level("auto" if step == "auto" else f"{size:.3g} mm", (("object.grid_step_mm", step),), size)

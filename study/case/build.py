@@ -137,7 +137,9 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls)
+    meshes = dict.fromkeys(shape for shape in shapes if shape.shape == "mesh")
+    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in build_object(shape).notes]
+    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls, *mended)
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

@@ -27,7 +27,7 @@ from softjaw.study.scene.objects import Mesh, Walled
 @lru_cache(maxsize=8)
 def mesh_object(shape: Mesh) -> MeshObject:
     """The object of a mesh file; `ValueError` for a mesh that is open or crosses itself."""
-    return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step)
+    return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step, shape.crease_angle_deg)
 
 
 def stacked(surface: OuterSurface) -> GapObject:

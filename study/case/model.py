@@ -23,6 +23,8 @@ from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
+BACK = 0.1  # of the pad's thickness: where it stands before it is brought to the smooth surface
+OFF = 1e-9  # gap at first touch [m]
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
@@ -55,17 +57,26 @@ class Finger:
         return g, normal @ R, R.T @ hessian @ R
 
 
-def approach(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Finger:
-    """Move a pad of this size from afar along its approach to first touch.
+def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
+    """Move a pad from afar along its approach to first touch.
 
     Raises
     ------
     NoContactError
         If the pad passes the object.
+    MeshError
+        If the object is a mesh with a hole under the pad.
     """
+    size = gripper.pad_size
     touch = touching(obj, pose, size)
     box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
-    return Finger(touch, obj.near(touch, box * [-1, -1, -0.5], box))
+    element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
+    surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
+    if abs(surface.gap(touch.to_object(_contact_face(size)))[0].min()) > OFF:  # smoothed: met earlier or later
+        back = Pose(touch.rotation, touch.origin - BACK * size[2] * touch.rotation[:, 2])
+        distance = first_touch(surface, back, _contact_face(size), 2 * BACK * size[2])
+        touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
+    return Finger(touch, surface)
 
 
 def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:

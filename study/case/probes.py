@@ -132,7 +132,7 @@ def _seen(unit: Any) -> _Seen | None:
     """None where a pad passes the object."""
     gripper, forces = unit.scene.gripper, unit.scene.load.normal_force
     try:
-        finger = model.approach(build_object(unit.scene.object), unit.candidate.poses[0], gripper.pad_size)
+        finger = model.approach(build_object(unit.scene.object), unit.candidate.poses[0], gripper)
         arm = _arm(winkler_pad(gripper, finger, FINGER_POINTS), forces[-1])
         fine, *coarse = (_arm(winkler_pad(gripper, finger, points), forces[0]) for points in (POINTS, *COARSE_POINTS))
     except (ValueError, RuntimeError, NoContactError):

@@ -66,7 +66,7 @@ def _path(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
     scene = unit.scene.with_values(variation.values) if variation.values else unit.scene
     poses = moved_poses(unit.candidate.poses, variation.shift, variation.turn)
     obj = build_object(scene.object)
-    fingers = [model.approach(obj, pose, scene.gripper.pad_size) for pose in poses]
+    fingers = [model.approach(obj, pose, scene.gripper) for pose in poses]
     solving, settings = solver(scene, fingers, poses), settings_of(scene, obj)
     try:
         for outcome in solving.load_path(scene.load.normal_force):

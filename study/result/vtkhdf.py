@@ -28,7 +28,7 @@ OBJECT, NOBODY = 0, -1  # part of the object's triangles; candidate of those tha
 ABOUT = (
     "The object's surface (part 0) and both pads' contact faces of every candidate (parts 1 and 2), over the normal"
     " force [N] as time. Choose pads by thresholds on part and candidate. The object is not deformed: pads that"
-    " indent its wall stand in it. Curved contact model (CCM), SI units; NaN: no value. Filled when all cases are computed."
+    " indent its wall stand in it. Curved contact model (CCM), SI units; NaN: no value. Filled at the end."
 )
 
 

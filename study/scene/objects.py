@@ -272,7 +272,7 @@ class Sections(Walled):
 
 
 class Mesh(Walled):
-    """A closed triangle mesh from a file."""
+    """A triangle mesh from a file."""
 
     shape: Literal["mesh"]
     mesh: Text = Field(
@@ -282,6 +282,9 @@ class Mesh(Walled):
     axis: Literal["x", "y", "z"] = Field("z", description="axis of the mesh file that becomes the object's axis")
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(
         "auto", description="step of the grid on which the distance to the mesh is sampled"
+    )
+    crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
+        30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
     )
     wall_heights_mm: Interval | None = Field(
         None, description="part of the mesh along its axis that a thin wall is traced on, [low, high]; else all of it"

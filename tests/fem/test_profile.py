@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import BSpline, PchipInterpolator
 
 from softjaw.fem.objects.outer_surface import Section, of_sections
@@ -48,6 +50,18 @@ def test_two_straight_runs_of_one_direction_have_no_corner(outline):
     assert np.abs(g).max() < 1e-6  # the points' own rounding
     assert normal == pytest.approx(np.broadcast_to([e[0], 0, -e[1]], (500, 3)), abs=2e-3)
     assert body.smallest_radius > 0.1
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.integers(3, 40), st.floats(20, 200), st.floats(5, 60), st.floats(5, 60))
+def test_every_frustum_rounded_to_a_micrometre_is_one(n, height, low, high):
+    points = rounded_frustum(n, height, low, high)
+    body = Revolution(points)
+    s = np.linspace(0.2, 0.8, 100)
+    z, r = (points[0] + s[:, None] * (points[-1] - points[0])).T
+    g, _, hessian = body.gap(np.column_stack([r, 0 * r, z]))
+    assert np.abs(g).max() < 1e-5
+    assert np.isfinite(hessian).all()
 
 
 @pytest.mark.parametrize("turn", [1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2])

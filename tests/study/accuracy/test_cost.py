@@ -113,7 +113,7 @@ def test_the_front_is_what_nothing_beats():
 
 
 def finger_on(obj, gripper):
-    return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper.pad_size)
+    return model.approach(obj, axis_poses(0.0, 0.0, 0.0)[0], gripper)
 
 
 def test_springs_on_a_plane_carry_alike():

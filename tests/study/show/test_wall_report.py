@@ -128,7 +128,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     scene = solved[0]
     size = wall_size(scene)
     unit = make_plan(scene).units[1]  # the middle station of an even number
-    fingers = [model.approach(build_object(scene.object), p, scene.gripper.pad_size) for p in unit.candidate.poses]
+    fingers = [model.approach(build_object(scene.object), p, scene.gripper) for p in unit.candidate.poses]
     made = solver(scene, fingers, unit.candidate.poses)
     assert size.shell == pytest.approx(6 * made.grips[0].problem.model.shell.nodes, rel=0.1)  # the axis is one node
     made.destroy()

@@ -1,0 +1,233 @@
+"""The part of a mesh that faces a finger, as an open sheet of small triangles, and the signed distance to it.
+
+A pad that comes along the approach a, and gives way sideways as it is pressed, reaches what straight lines reach whose
+direction lies within ``CONE`` of a. So the object *for this finger* is the set of points that no such line reaches from
+outside: cavities, inner walls, and whatever lies behind the surface that the finger sees, are its inside. ``g`` is the
+signed distance to the border of this set. Where the border is the object's own surface (the sheet) g is exact for the
+smooth triangles; the rest of the border are shadow lines behind the object, which start where the surface turns away
+from a by more than 90 degrees + ``CONE`` and are located to half a step of the grid.
+
+The lines are tried in 1 + 8 + 8 directions: a itself and two cones round it, placed so that the mirror images of the
+pad's frame map them onto each other. A triangle that only slanted lines reach and that has the seen surface close
+behind its back is the back of a thin wall (the inside of a bowl's rim) and is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.gap import FloatArray, IntArray, Pose
+from softjaw.fem.objects.smooth_triangles import SmoothTriangles
+from softjaw.fem.objects.spline_grid import coefficients, evaluate
+from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
+
+CONE = np.radians(30.0)
+GRAZING = 0.01  # a line at a smaller sine to a triangle runs along it and does not see it
+LIFT = 1e-7  # of the mesh's size: how far above a triangle a line of sight starts
+MARGIN = 0.5  # of the box's depth: triangles so far beside the box still count
+THIN = 1 / 3  # of the box's depth: a wall thinner than this has one side only
+MOST_SPOTS = 40  # places along one side of a triangle that are looked at
+COARSE = 4  # steps of the grid between samples that are taken far from the sheet
+EXACT = 5  # steps from the sheet within which every sample is taken
+STAIRS = 1.5  # steps of the grid over which shadow lines are smoothed
+FOLLOWED = 1 / 200  # of the grid's step: how well flat pieces follow the smooth triangles
+
+
+def lines_of_sight(pose: Pose) -> FloatArray:
+    """Directions ``(17, 3)`` in the object's frame; the approach comes first."""
+    ring = np.arange(8) * np.pi / 4
+    rows = [[0.0, 0.0, 1.0]]
+    for tilt in (CONE, CONE / 2):
+        rows += [[np.sin(tilt) * np.cos(phi), np.sin(tilt) * np.sin(phi), np.cos(tilt)] for phi in ring]
+    return np.array(rows) @ pose.rotation.T
+
+
+@njit(cache=True)
+def _seen(which, normals, directions, spacing, rotation, origin, lower, upper, lift, nodes):
+    """How each triangle is seen at some place in the box: 2 straight, 1 on a slant, 0 not at all."""
+    corners, order, low, high, start, count = nodes
+    stack, spot, y = np.empty(DEPTH, np.int64), np.empty(3), np.empty(3)
+    found = np.zeros(len(which), np.int64)
+    for m in range(len(which)):
+        p, normal = corners[which[m]], normals[which[m]]
+        longest = 0.0
+        for k in range(3):
+            longest = max(longest, ((p[(k + 1) % 3] - p[k]) ** 2).sum())
+        n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), MOST_SPOTS)
+        for i in range(n * n):
+            b, c = (i // n + 1.0 / 3.0) / n, (i % n + 1.0 / 3.0) / n
+            if found[m] == 2 or b + c >= 1.0:
+                continue
+            for d in range(3):
+                spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + lift * normal[d]
+            inside = True
+            for d in range(3):
+                y[d] = 0.0
+                for e in range(3):
+                    y[d] += (spot[e] - origin[e]) * rotation[e, d]
+                inside = inside and lower[d] <= y[d] <= upper[d]
+            if not inside:
+                continue
+            for k in range(len(directions)):
+                if found[m] == 1 and k > 0:
+                    break
+                if (normal * directions[k]).sum() > -GRAZING:
+                    continue
+                hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
+                                stack)[1]  # fmt: skip
+                if hit < 0:
+                    found[m] = 2 if k == 0 else 1
+                    break
+    return found
+
+
+@njit(cache=True)
+def _behind(which, normals, lift, nodes):
+    """Triangle that the line from each triangle's middle into the object meets first, and how far away."""
+    corners, order, low, high, start, count = nodes
+    stack = np.empty(DEPTH, np.int64)
+    hit, distance = np.full(len(which), -1), np.full(len(which), np.inf)
+    for m in range(len(which)):
+        p = corners[which[m]]
+        middle = (p[0] + p[1] + p[2]) / 3.0
+        distance[m], hit[m] = first_hit(middle, -normals[which[m]], lift, which[m], False, corners, order, low, high,
+                                        start, count, stack)  # fmt: skip
+    return hit, distance
+
+
+@njit(cache=True)
+def _reached(x, directions, nodes):
+    """Whether a line of sight reaches the points, ``(n,)``."""
+    corners, order, low, high, start, count = nodes
+    stack = np.empty(DEPTH, np.int64)
+    out = np.zeros(len(x), np.bool_)
+    for i in range(len(x)):
+        for k in range(len(directions)):
+            if first_hit(x[i], -directions[k], 0.0, -1, True, corners, order, low, high, start, count, stack)[1] < 0:
+                out[i] = True
+                break
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class FacingSheet:
+    """What a finger sees of a mesh.
+
+    Attributes
+    ----------
+    sheet : TriangleTree
+        Small triangles of the surface that is seen.
+    whole : TriangleTree
+        The mesh.
+    directions : (k, 3) array
+        Lines of sight, away from the finger.
+    """
+
+    sheet: TriangleTree
+    whole: TriangleTree
+    directions: FloatArray
+
+    def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distance ``(n,)`` [m] to the sheet and its unit gradient ``(n, 3)``; in a shadow it is negative."""
+        g, normal, border = self.sheet.signed(x)
+        if border.any():
+            out = _reached(np.ascontiguousarray(x[border]), self.directions, self.whole.nodes)
+            turn = np.where(out == (g[border] >= 0), 1.0, -1.0)
+            g[border] *= turn
+            normal[border] *= turn[:, None]
+        return g, normal
+
+    def sampled(self, x: FloatArray, step: float) -> FloatArray:
+        """Signed distance at the points ``(n_0, n_1, n_2, 3)`` of an even grid, to shadow lines as well [m].
+
+        Far from the sheet every ``COARSE``-th sample is taken and the rest interpolated; the grid has to end on one.
+        """
+        part = (slice(None, None, COARSE),) * 3
+        known = self.signed(x[part].reshape(-1, 3))[0].reshape(x[part].shape[:3])
+        known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
+        places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
+        g = evaluate(coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
+        near = np.abs(g) < EXACT * step
+        g[near] = self.signed(x[near])[0]
+        return _with_shadows(g, step, STAIRS)
+
+
+def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
+    """Distances ``g`` to the sheet, on an even grid, no larger than those to the shadow lines between the samples.
+
+    The shadow lines come out in stairs of the grid; where they are nearest, and the sheet is not near, these are
+    smoothed over ``stairs`` steps.
+    """
+    shadow = np.zeros(g.shape, dtype=bool)
+    for axis in range(3):
+        one, two = (tuple([slice(None)] * axis + [part]) for part in (slice(None, -1), slice(1, None)))
+        # a sign that changes farther from the sheet than the sheet could explain
+        change = ((g[one] < 0) != (g[two] < 0)) & (np.abs(g[one]) + np.abs(g[two]) > (1 + 1e-6) * step)
+        shadow[one] |= change
+        shadow[two] |= change
+    if not shadow.any():
+        return g
+    away = step * (distance_transform_edt(~shadow) + 0.5)
+    bound = np.where(g < 0, -1.0, 1.0) * np.minimum(np.abs(g), away)
+    rough = np.clip(np.abs(g) / step - 1.0, 0.0, 1.0) * np.clip((np.abs(g) - away) / step, 0.0, 1.0)
+    return bound + rough * (gaussian_filter(bound, stairs, mode="nearest") - bound)
+
+
+def facing_sheet(
+    smooth: SmoothTriangles, whole: TriangleTree, lids: IntArray, pose: Pose, box: FloatArray, step: float
+) -> FacingSheet:
+    """What a finger at ``pose`` sees of a mesh in the ``box (2, 3)`` of its frame, and a little beside it.
+
+    Parameters
+    ----------
+    smooth, whole
+        The mesh.
+    lids : (l,) array of int
+        Triangles that close a hole of the mesh and stand for nothing.
+    pose : Pose
+        The pad's frame.
+    box : (2, 3) array
+        Lower and upper corner [m].
+    step : float
+        Step of the grid on which the distance is to be sampled [m].
+
+    Raises
+    ------
+    MeshError
+        If the finger looks into a hole of the mesh.
+    """
+    depth = box[1, 2] - box[0, 2]
+    lower, upper = box[0] - MARGIN * depth, box[1] + MARGIN * depth
+    y = pose.to_pad(whole.points)[whole.triangles]
+    near = np.flatnonzero(((y.max(axis=1) >= lower) & (y.min(axis=1) <= upper)).all(axis=1))
+    normals = whole.face_normals
+    lines, lift = lines_of_sight(pose), LIFT * float(np.ptp(whole.points, axis=0).max())
+    spacing = 2 * step
+
+    def seen(which: IntArray, corner: FloatArray, other: FloatArray) -> IntArray:
+        R = np.ascontiguousarray(pose.rotation)
+        return _seen(which, normals, lines, spacing, R, pose.origin, corner, other, lift, whole.nodes)
+
+    open_here = seen(np.intersect1d(near, lids), box[0], box[1]) > 0
+    if open_here.any():
+        place = whole.points[whole.triangles[np.intersect1d(near, lids)[open_here][0]]].mean(axis=0)
+        raise MeshError(
+            f"the mesh has a hole under the pad, near ({', '.join(f'{1e3 * v:.4g}' for v in place)}) mm of the "
+            "object's frame; fill it in a mesh editor, or grasp elsewhere"
+        )
+    how = seen(near, lower, upper)
+    straight = np.zeros(len(normals), dtype=bool)
+    straight[near[how == 2]] = True
+    slanted = near[how == 1]
+    hit, far = _behind(slanted, normals, lift, whole.nodes)
+    slanted = slanted[~(straight[hit] & (far < THIN * depth))]
+    chosen = np.union1d(np.flatnonzero(straight), slanted)
+    if not len(chosen):
+        return FacingSheet(whole, whole, lines)
+    x, small = smooth.refined(chosen, smooth.pieces_for(chosen, FOLLOWED * step))
+    return FacingSheet(TriangleTree(x, small), whole, lines)

@@ -1,0 +1,311 @@
+"""What a finger sees of a mesh: hollow bodies, holes, facets, mirror images."""
+
+import numpy as np
+import pytest
+
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.facing_sheet import facing_sheet
+from softjaw.fem.objects.gap import Pose, grid_triangles
+from softjaw.fem.objects.mesh_check import sound_mesh
+from softjaw.fem.objects.mesh_holes import border_loops, filling
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.smooth_triangles import smooth_triangles
+from softjaw.fem.objects.traced_surface import traced
+from softjaw.fem.objects.triangle_tree import TriangleTree, first_hit
+
+BOX = np.array([[-0.012, -0.008, -0.005], [0.012, 0.008, 0.010]])
+
+
+def turned(profile, columns=64):
+    """Closed surface of revolution of the points ``(z, r)`` [m], which start and end on the axis."""
+    z, r = np.asarray(profile, float)[1:-1].T
+    phi = 2 * np.pi * np.arange(columns) / columns
+    ring = np.stack([np.cos(phi), np.sin(phi)], axis=1)
+    x = np.concatenate([np.insert(radius * ring, 2, height, axis=1) for height, radius in zip(z, r, strict=True)])
+    first, last = len(x), len(x) + 1
+    x = np.concatenate([x, [[0, 0, profile[0][0]], [0, 0, profile[-1][0]]]])
+    i, j, top = np.arange(columns), (np.arange(columns) + 1) % columns, (len(z) - 1) * columns
+    fans = np.stack([0 * i + first, j, i], 1), np.stack([0 * i + last, i + top, j + top], 1)
+    return x, np.concatenate([grid_triangles(len(z), columns, closed=True), *fans])
+
+
+def bottle(wall, neck=0.012, radius=0.03, height=0.15):
+    """Outline of a bottle with a neck, up to the mouth; with ``wall`` down again on the inside."""
+    z = np.linspace(0.0, height, 40)
+    r = neck + (radius - neck) * 0.5 * (1 - np.tanh((z - 0.7 * height) / 0.012))
+    outer = [[0.0, 0.0], *np.column_stack([z, r])]
+    if not wall:
+        return [*outer, [height, 0.0]]
+    inside = np.column_stack([z, r - wall])[z > wall][::-1]
+    return [*outer, *inside, [wall, inside[-1, 1]], [wall, 0.0]]
+
+
+def bowl(wall, radius=0.05, height=0.06):
+    """A bowl like half an egg with an open top."""
+    t = np.linspace(0.0, np.pi / 2, 30)
+    outer = np.column_stack([height * (1 - np.cos(t)), radius * np.sin(t)])
+    if not wall:
+        return [*outer, [height, 0.0]]
+    inner = np.column_stack([height - (height - wall) * np.cos(t), (radius - wall) * np.sin(t)])
+    return [*outer, *inner[::-1]]
+
+
+def side(z, angle=0.1, radius=0.03):
+    """Pose of a pad whose front stands at the given distance from the axis; its long side lies along z."""
+    a = -np.array([np.cos(angle), np.sin(angle), 0.0])
+    return Pose(np.column_stack([[0, 0, 1.0], np.cross(a, [0, 0, 1.0]), a]), np.array([0, 0, z]) - radius * a)
+
+
+def in_box(n=600, shrunk=0.999, seed=5):
+    return np.random.default_rng(seed).uniform(shrunk * BOX[0], shrunk * BOX[1], (n, 3))
+
+
+@pytest.mark.parametrize("wall", [0.002, 0.005])
+@pytest.mark.parametrize(("shape", "place"), [
+    (bottle, (0.06, 0.03)), (bottle, (0.105, 0.0215)), (bottle, (0.14, 0.012)), (bowl, (0.025, 0.042)),
+    (bowl, (0.045, 0.05)),
+])  # fmt: skip
+def test_an_inner_wall_changes_nothing(shape, place, wall):
+    """The gap of a hollow body is that of its outer surface alone, up to half a wall inside it and behind."""
+    pose = side(place[0], radius=place[1])
+    hollow, solid = (MeshObject(*turned(shape(w))).near(pose, *BOX, 0.002) for w in (wall, None))
+    y = in_box()
+    below = pose.to_object(y)[:, 2] < (0.15 if shape is bottle else 0.06) - 3e-3  # a rim differs from a lid
+    x = pose.to_object(y[below])
+    (g, normal, _), (expected, direction, _) = hollow.gap(x), solid.gap(x)
+    outside = expected > -0.4 * wall
+    assert outside.sum() > 150
+    assert np.abs(g - expected)[outside].max() < 1e-5
+    assert np.abs(normal - direction)[outside & (np.abs(expected) < 0.2 * wall)].max() < 6e-3
+    if place[0] not in (0.14, 0.045):  # slanted lines look into a mouth that is so near
+        assert (g[~outside] < 0).all()
+
+
+def ball(rows=24, columns=48, radius=0.03):
+    t = np.pi * np.arange(rows + 1) / rows
+    return turned(np.column_stack([-radius * np.cos(t), radius * np.sin(t)]), columns)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(24, 48), (12, 24)])
+def test_a_faceted_ball_is_nearly_a_ball(rows, columns):
+    """Facets of h on radius R: flat ones are off by h^2 / (8 R) and more, smooth ones by an order less in h^2 / R^2."""
+    x, triangles = ball(rows, columns)
+    flat, smooth = (MeshObject(x, triangles, None, (), angle).near(side(0.0), *BOX, 0.002) for angle in (0.0, 30.0))
+    points = flat.pose.to_object(in_box())
+    exact = np.linalg.norm(points, axis=1) - 0.03
+    close = np.abs(exact) < 2e-3
+    rough, fine = (np.abs(region.gap(points)[0] - exact)[close].max() for region in (flat, smooth))
+    assert rough > 0.03 * (np.pi / rows) ** 2 / 8
+    assert fine < rough / 12
+
+
+def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
+    """A cylinder of 24 facets: its wall bulges to the round one, its two edges become circles, its ends stay flat."""
+    x, triangles = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 24)
+    smooth = smooth_triangles(x, triangles)
+    assert smooth.crease.sum() == 48
+    y, small = smooth.refined(np.arange(len(triangles)), 5)
+    edges = np.sort(small[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    r = np.hypot(y[:, 0], y[:, 1])
+    end = (np.abs(y[:, 2]) < 1e-12) | (np.abs(y[:, 2] - 0.05) < 1e-12)
+    assert np.abs(r[~end] - 0.02).max() < 3e-6  # the facets' own sagitta is 171e-6
+    assert y[:, 2].min() > -1e-12
+    assert y[:, 2].max() < 0.05 + 1e-12
+    assert len(y[end]) > 2 * 24 * 5
+    octagon = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 8)
+    assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_edge_that_turns_by_just_the_crease_angle_stays(seed):
+    """A prism of twelve sides, moved by rounding; a little above the angle its edges are facets."""
+    x, triangles = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 12)
+    x = np.nextafter(x, x + np.random.default_rng(seed).choice([-1.0, 1.0], x.shape))
+    assert smooth_triangles(x, triangles, 30.0).crease.sum() == 36
+    assert smooth_triangles(x, triangles, 30.01).crease.sum() == 24
+
+
+def test_gradient_and_hessian_are_those_of_the_gap():
+    region = MeshObject(*turned(bottle(0.003))).near(side(0.11, radius=0.02), *BOX, 0.002)
+    x, h = region.pose.to_object(in_box(200, 0.95)), 1e-6
+    _, normal, hessian = region.gap(x)
+    for k, e in enumerate(np.eye(3)):
+        up, down = region.gap(x + h * e), region.gap(x - h * e)
+        assert np.abs((up[0] - down[0]) / (2 * h) - normal[:, k]).max() < 1e-5
+        assert np.abs((up[1] - down[1]) / (2 * h) - hessian[:, :, k]).max() < 2e-3 * np.abs(hessian).max()
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_mirror_image_of_a_mesh_has_the_mirror_image_of_its_gap(axis):
+    """A lopsided body, in the pad's frame, mirrored across a plane of the pad."""
+    rng = np.random.default_rng(2)
+    x, triangles = ball(16, 30)
+    x = x + rng.normal(scale=3e-4, size=x.shape)
+    pose = side(0.004)
+    flip = np.ones(3)
+    flip[axis] = -1
+    image = pose.to_object(pose.to_pad(x) * flip), triangles[:, ::-1]
+    y = in_box()
+    g, normal, hessian = MeshObject(x, triangles).near(pose, *BOX, 0.002).gap(pose.to_object(y))
+    other = MeshObject(*image).near(pose, *BOX, 0.002).gap(pose.to_object(y * flip))
+    R = pose.rotation
+    assert np.abs(g - other[0]).max() < 1e-12
+    assert np.abs((normal @ R) * flip - other[1] @ R).max() < 1e-9
+    assert np.abs(R.T @ hessian @ R * np.outer(flip, flip) - R.T @ other[2] @ R).max() < 1e-5
+
+
+def test_the_back_of_a_thin_plate_counts_for_nothing():
+    """A plate of 3 mm, across the approach: behind its front everything is inside, and the gap is the way to it."""
+    half = np.array([0.0015, 0.03, 0.03])
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * half
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    plate = MeshObject(corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]))
+    region = plate.near(side(0.0, 0.0, 0.0015), *BOX, 0.002)
+    y = in_box()
+    assert region.gap(region.pose.to_object(y))[0] == pytest.approx(-y[:, 2], abs=1e-7)
+
+
+def test_behind_a_small_ball_the_gap_has_no_jump_and_beyond_its_sides_it_grows():
+    """A ball smaller than the pad is deep: beside it g is the distance, and no point beside it is inside."""
+    x, triangles = ball(24, 48, 0.006)
+    region = MeshObject(x, triangles).near(side(0.0, 0.0, 0.006), *BOX, 0.002)
+    y = in_box(3000)
+    g, normal, _ = region.gap(region.pose.to_object(y))
+    exact = np.linalg.norm(y - [0, 0, 0.006], axis=1) - 0.006
+    for depth, error in ((0.001, 5e-6), (0.004, 1e-4)):
+        seen = (y[:, 2] < 0.006) & (np.abs(exact) < depth)
+        assert g[seen] == pytest.approx(exact[seen], abs=error)
+    beside = np.hypot(y[:, 0], y[:, 1]) > 0.0065
+    assert (g[beside] > 0).all()
+    assert np.linalg.norm(normal, axis=1).max() < 2.0  # a jump of the samples would show as a steep gradient
+
+
+def punctured(mesh, place, size):
+    """The mesh without the triangles whose middles lie within ``size`` of a place."""
+    x, triangles = mesh
+    return x, triangles[np.linalg.norm(x[triangles].mean(axis=1) - place, axis=1) > size]
+
+
+def test_a_small_hole_is_filled_without_moving_a_point_and_said():
+    mesh = ball(100, 200)
+    x, triangles = punctured(mesh, [0.03, 0, 0], 0.0007)
+    assert len(border_loops(triangles)) == 2
+    sound = sound_mesh(x, triangles)
+    assert not len(sound.lids)
+    assert len(sound.notes) == 1
+    assert "holes filled" in sound.notes[0]
+    assert {tuple(p) for p in sound.points} <= {tuple(p) for p in mesh[0]}
+    edges = np.sort(sound.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    a, b, c = sound.points[sound.triangles].transpose(1, 0, 2)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(4 / 3 * np.pi * 0.03**3, rel=4e-3)
+
+
+def test_a_missing_triangle_is_put_back_though_it_is_large_and_a_flipped_one_is_turned():
+    x, triangles = ball(16, 32)
+    torn = np.delete(triangles, [100, 300], axis=0)
+    torn[7] = torn[7, ::-1]
+    sound = sound_mesh(x, np.concatenate([torn, torn[:2]]))
+    assert not len(sound.lids)
+    assert len(sound.notes) == 3  # doubled, filled, turned
+    assert {tuple(sorted(map(tuple, sound.points[t]))) for t in sound.triangles} == {
+        tuple(sorted(map(tuple, x[t]))) for t in triangles
+    }
+
+
+def test_the_outer_wall_of_a_hollow_mesh_is_traced():
+    hollow, solid = (traced(MeshObject(*turned(bottle(wall))))[0] for wall in (0.003, None))
+    theta, s = np.meshgrid(np.linspace(0, 6, 20), np.linspace(*solid.wall, 30))
+    assert hollow.jets(theta, s)[:, 0] == pytest.approx(solid.jets(theta, s)[:, 0], abs=1e-5)
+
+
+def test_a_large_hole_matters_only_under_a_pad():
+    whole = MeshObject(*ball())
+    sound = sound_mesh(*punctured(ball(), [0, 0.03, 0], 0.008))
+    assert len(sound.lids) > 5
+    torn = MeshObject(sound.points, sound.triangles, lids=sound.lids)
+    y = in_box()
+    x = side(0.0).to_object(y)
+    assert torn.near(side(0.0), *BOX, 0.002).gap(x)[0] == pytest.approx(whole.near(side(0.0), *BOX, 0.002).gap(x)[0],
+                                                                       abs=1e-12)  # fmt: skip
+    with pytest.raises(MeshError, match="hole under the pad"):
+        torn.near(side(0.0, np.pi / 2), *BOX, 0.002)
+
+
+def test_two_holes_that_share_a_point_are_two():
+    _, triangles = ball(8, 12)
+    beside = [k for k, t in enumerate(triangles) if set(t) <= {12, 13, 24, 25} or set(t) <= {13, 14, 1, 2}]
+    loops = border_loops(np.delete(triangles, beside, axis=0))
+    assert sorted(map(len, loops)) == [4, 4]
+    assert sum(13 in loop for loop in loops) == 2
+
+
+def test_filling_has_the_least_area():
+    """An L of six points: four triangles inside it, though the straight fan would leave it."""
+    L = 0.01 * np.array([(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)], float)
+    triangles = filling(L, [1, 2, 3, 4, 5, 0], set())
+    a, b, c = L[triangles].transpose(1, 0, 2)
+    area = np.cross(b - a, c - a)[:, 2] / 2
+    assert (area > 0).all() or (area < 0).all()
+    assert np.abs(area).sum() == pytest.approx(3e-4)
+
+
+def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
+    x, triangles = turned(bottle(0.003), 12)
+    tree = TriangleTree(x, triangles)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.04, 0.16, (300, 3))
+    g, _, border = tree.signed(points)
+    alone = np.array([np.abs(TriangleTree(x, triangles[k : k + 1]).signed(points)[0]) for k in range(len(triangles))])
+    assert np.abs(g) == pytest.approx(alone.min(axis=0), abs=1e-15)
+    assert not border.any()
+    stack = np.empty(128, np.int64)
+    for o, d in zip(points[:100], rng.normal(size=(100, 3)), strict=True):
+        t, hit = first_hit(o, d, 0.0, -1, False, *tree.nodes, stack)
+        every = [first_hit(o, d, 0.0, -1, False, *TriangleTree(x, triangles[k : k + 1]).nodes, stack)[0]
+                 for k in range(0, len(triangles))]  # fmt: skip
+        assert t == pytest.approx(min(every), abs=1e-12)
+        if hit >= 0:
+            p, n = o + t * d, tree.face_normals[hit]
+            assert abs((p - x[triangles[hit, 0]]) @ n) < 1e-12
+
+
+def test_every_force_on_a_hollow_bowl_is_solved(tmp_path):
+    """A station where the inner wall, 2 mm under the outer one, used to spoil the gap."""
+    from softjaw.study import pipeline
+    from softjaw.study.case.candidates import units
+    from softjaw.study.case.result import CaseResult
+    from softjaw.study.scene import load_scene
+
+    x, triangles = turned(bowl(0.002), 48)
+    facets = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    facets["corners"] = 1e3 * x[triangles]
+    (tmp_path / "bowl.stl").write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
+    (tmp_path / "bowl.toml").write_text("""
+        [object]
+        shape = "mesh"
+        mesh = "bowl.stl"
+        unit = "mm"
+        [gripper]
+        pad_length_mm = 20
+        pad_width_mm = 14
+        pad_thickness_mm = 12
+        elements = [8, 6, 4]
+        [candidates]
+        stations_mm = [39]
+        angles_deg = [4]
+        [load]
+        normal_force_n = [1, 3]
+    """)
+    (unit,) = units(load_scene(tmp_path / "bowl.toml"), lambda _: 1)
+    found = [result for _, result in pipeline.solve_unit(unit)]
+    assert [type(result) for result in found] == [CaseResult, CaseResult]
+
+
+def test_nothing_is_seen_from_behind():
+    """Without a facing triangle in the box the whole mesh stands in."""
+    mesh = MeshObject(*ball())
+    pose = side(0.0, np.pi, -0.02)
+    sheet = facing_sheet(mesh._smooth, mesh._tree, mesh.lids, pose, BOX + 0.001, 1e-3)
+    assert len(sheet.sheet.triangles)
