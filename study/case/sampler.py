@@ -1,12 +1,12 @@
 """Antipodal grasps of any triangle surface: sampled, set straight, ranked on a spring foundation, thinned.
 
-A gripper closes along a line, so what each pad meets is a height field over its face: of every line along the approach the
-first point of the object from one side and from the other. Both fields come from one pass over the triangles. They need no
-closed mesh and no normals, and inner walls or thin parts behind do not count.
+A gripper closes along a line, so what each pad meets is a height field over its face: of every line along the approach
+the first point of the object from one side and from the other. Both fields come from one pass over the triangles. They
+need no closed mesh and no normals, and inner walls or thin parts behind do not count.
 
-From points of the surface the gripper is turned and shifted until both pads meet the object squarely and in their middles.
-A bed of springs gives the pressures that rank them; nothing is solved. What is wider than the opening, runs into the
-fingers or slips comes with that state.
+From points of the surface the gripper is turned and shifted until both pads meet the object squarely and in their
+middles. A bed of springs gives the pressures that rank them; nothing is solved. What is wider than the opening, runs
+into the fingers or slips comes with that state.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Jaws:
 def height_fields(points, triangles, x, y):
     """Lowest and highest z of a surface over the grid ``x (m,)`` times ``y (n,)``: two ``(m, n)`` arrays.
 
-    Infinite (positive in the lowest, negative in the highest) where a line along z misses every triangle. ``points (k, 3)``
-    are in the frame of the grid, whose steps are even.
+    Infinite (positive in the lowest, negative in the highest) where a line along z misses every triangle. ``points
+    (k, 3)`` are in the frame of the grid, whose steps are even.
     """
     m, n = len(x), len(y)
     low, high = np.full((m, n), np.inf), np.full((m, n), -np.inf)
@@ -109,7 +109,7 @@ def height_fields(points, triangles, x, y):
 
 
 def axes_of(approach: FloatArray, along: FloatArray) -> FloatArray:
-    """Rotation whose columns are the long side (the part of ``along`` across the approach), the short side, the approach."""
+    """Rotation with the long side (the part of ``along`` across the approach), short side and approach as columns."""
     across = along - (along @ approach) * approach
     if np.linalg.norm(across) < 1e-6:
         across = np.eye(3)[np.argmin(np.abs(approach))] - approach[np.argmin(np.abs(approach))] * approach
@@ -201,7 +201,7 @@ class Grip:
 
     @property
     def misalignment(self) -> tuple[float, float]:
-        """Angle between one contact normal and the other reversed, and of the line of the contacts to a normal [rad]."""
+        """Angle between one contact normal and the other reversed, and of their line to a normal [rad]."""
         one, two = self.sides[0].normal, self.sides[1].normal * [1.0, -1.0, -1.0]
         (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
         line = np.array([u - x, -v - y, self.opening])
