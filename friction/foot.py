@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softjaw.friction.orientation import slivers
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, slivers
 
 TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both faces
 SAME = 1e-6  # of a usual face's size: corners no farther apart are one
@@ -38,16 +37,20 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
     along = offset @ N
     away = np.linalg.norm(offset - along[:, None] * N, axis=1)
     slope = faces.normal @ N
+    # a line along a face has no foot on its plane: the place beside the centre stands for it
     steep = np.abs(slope) < STEEP
     s = np.where(steep, along, (offset * faces.normal).sum(axis=1) / np.where(steep, 1.0, slope))
-    met = np.array([], dtype=int) if faces.corners is None else _pierced(faces, start, N, away, steep)
-    if len(met):
-        q = faces.corners[met]
+    corners = faces.corners
+    met = np.array([], dtype=int) if corners is None else _pierced(faces, corners, start, N, away, steep)
+    if corners is not None and len(met):
+        q = corners[met]
+        # corners of a warped face lie off its plane, and so does the foot: places closer than that are equally near
         warp = np.abs(((q - faces.centroid[met, None]) * faces.normal[met, None]).sum(axis=-1)).max(axis=1)
         margin = TOLERANCE * np.ptp(q, axis=1).max(axis=1) + warp
         nearest = met[_nearest(s[met], margin)]
         met = met[np.abs(s[met] - s[nearest]) <= margin]
         return Foot(start + s[nearest] * N, met, False)
+    # all centres that are equally near count, or which one does would hang on rounding
     met = np.flatnonzero(away <= away.min() + TOLERANCE * np.sqrt(faces.area.max()))
     return Foot(start + s[met].mean() * N, met, True)
 
@@ -58,14 +61,17 @@ def _nearest(s: FloatArray, margin: FloatArray) -> int:
     return int(tied[np.argmax(s[tied])])
 
 
-def _pierced(faces: ContactPatch, start: FloatArray, N: FloatArray, away: FloatArray, steep: np.ndarray) -> np.ndarray:
+def _pierced(
+    faces: ContactPatch, corners: FloatArray, start: FloatArray, N: FloatArray, away: FloatArray, steep: np.ndarray
+) -> np.ndarray:
     """Faces, edges included, that the line through ``start`` along ``N`` runs through."""
-    offset = faces.corners - faces.centroid[:, None]
+    offset = corners - faces.centroid[:, None]
     reach = np.sqrt(np.einsum("ikj,ikj->ik", offset, offset).max(axis=1))
+    # few faces come near the line: the exact test is for these alone
     near = np.flatnonzero((away <= (1 + 1e-6) * reach) & ~steep)
     if not len(near):
         return near
-    q = (faces.corners[near] - start) @ _across(N).T
+    q = (corners[near] - start) @ _across(N).T
     d = np.roll(q, -1, axis=1) - q
     side = d[..., 1] * q[..., 0] - d[..., 0] * q[..., 1]
     slack = TOLERANCE * reach[near, None] * np.linalg.norm(d, axis=-1)
@@ -102,6 +108,7 @@ class ContactFace:
         if q is None or q.shape[1] != 4:
             found = "none" if q is None else f"{q.shape[1]}"
             raise ValueError(f"corners: found {found} around each face, expected 4; a contact face has quadrilaterals")
+        # the diagonals give the area vector of a warped face too, whichever way it is split
         own = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
         length = np.linalg.norm(own, axis=1)
         own = own * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
@@ -138,6 +145,7 @@ class ContactFace:
         uv = _reference(q)
         weights = _bilinear(*uv.T)
         left = np.linalg.norm(np.einsum("nk,nkc->nc", weights, q), axis=1)
+        # Newton may end at the rim of the region it is kept in: only points that are on the line count
         hit = (np.abs(uv) <= 1 + TOLERANCE).all(axis=1) & (left <= TOLERANCE * self._reach[near])
         near, weights = near[hit], weights[hit]
         missed = not len(near)
@@ -152,6 +160,7 @@ class ContactFace:
 def _numbered(points: FloatArray, apart: float) -> np.ndarray:
     """Numbers ``(n,)`` that are the same for points ``(n, 3)`` no more than ``apart`` from each other."""
     number = np.arange(len(points))
+    # a balanced tree takes long to build where many coordinates are equal, as in a grid
     pairs = cKDTree(points, balanced_tree=False).query_pairs(apart, output_type="ndarray")
     np.minimum.at(number, pairs.max(axis=1), pairs.min(axis=1))
     return number
@@ -171,6 +180,7 @@ def _reference(q: FloatArray) -> FloatArray:
         du = ((q[:, 1] - q[:, 0]) * (1 - v)[:, None] + (q[:, 2] - q[:, 3]) * (1 + v)[:, None]) / 4
         dv = ((q[:, 3] - q[:, 0]) * (1 - u)[:, None] + (q[:, 2] - q[:, 1]) * (1 + u)[:, None]) / 4
         det = du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0]
+        # steps are cut at 3 half-widths: a face that the line misses need not converge, only stay outside
         flat = np.abs(det) <= STEEP * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
         step = np.stack([r[:, 1] * dv[:, 0] - r[:, 0] * dv[:, 1], r[:, 0] * du[:, 1] - r[:, 1] * du[:, 0]], axis=1)
         uv = np.clip(uv + np.where(flat[:, None], 3.0, step / np.where(flat, 1.0, det)[:, None]), -3.0, 3.0)

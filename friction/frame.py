@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from enum import IntFlag
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from softjaw.friction.foot import ContactFace, foot
-from softjaw.friction.orientation import behind, firm, opposing, wound
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError, area_vectors, slivers
 
 MAX_ITERATIONS = 100
 STILL = 1e-12  # change of the unit normal at which the iteration ends
@@ -88,6 +88,7 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike, whole_face: bool = Fal
     S = load.sum()
     cop = (load[:, None] * faces.centroid).sum(axis=0) / S
     N = _direction((load[:, None] * faces.normal).sum(axis=0), S)
+    # a sliver carries load, so it counts above; it has no plane, so nothing below can stand on it
     faces = faces.only(firm(faces))
     if whole_face:
         origin, N, iterations, flag = _on_the_whole(ContactFace.of(patch), cop, N)
@@ -97,6 +98,7 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike, whole_face: bool = Fal
     if turned.any():
         flag |= FrameFlag.OVERHANG
     side = wound(faces)
+    # flipped normals make the winding differ too: the graver flag says it alone
     if opposing(faces, turned):
         flag |= FrameFlag.ORIENTATION
     elif side.min() < 0 < side.max():
@@ -121,6 +123,7 @@ def contact_length(patch: ContactPatch) -> float:
     if faces.corners is not None:
         points = faces.corners[..., :2].reshape(-1, 2)
         return float(np.ptp(points, axis=0).max())
+    # the area alone does not say which way a face is longer
     half = 0.5 * np.sqrt(faces.area)[:, None]
     xy = faces.centroid[:, :2]
     return float(((xy + half).max(axis=0) - (xy - half).min(axis=0)).max())
@@ -146,8 +149,10 @@ def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[Floa
         step, N = np.linalg.norm(new - N), new
         if step < STILL:
             break
+        # the normal is a function of the faces that are met: one set twice is a cycle, without a tolerance
         key = tuple(met.tolist())
         if key in visited or iterations == MAX_ITERATIONS:
+            # without a cycle in sight after all passes, every face that was met counts
             start = visited.index(key) if key in visited else 0
             union = sorted(set().union(*visited[start:]))
             N = _direction(faces.normal[union].mean(axis=0))
@@ -170,7 +175,7 @@ def _on_the_whole(face: ContactFace, cop: FloatArray, N: FloatArray) -> tuple[Fl
             break
         seen.append(new)
         N = _direction(N + 0.5 ** (iterations // HALVED) * step)
-    if np.linalg.norm(step) > NEARLY:
+    if np.linalg.norm(step) > NEARLY:  # still to and fro: the mean of the last normals
         N = _direction(np.mean(seen[-HALVED:], axis=0))
         origin, _, missed = face.foot(cop, N)
         flag |= FrameFlag.CYCLE
@@ -186,3 +191,51 @@ def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
         )
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(N, x), N])
+
+
+ANGLE = 1e-6  # of a cosine: files in single precision know their directions to some 1e-7
+OPPOSED = -0.5  # cosine between the normals of neighbours: a real overhang turns by less from face to face
+NEIGHBOURS = 4
+TIED = 1e-6  # of a distance: faces as far away as the last neighbour are neighbours too
+
+
+def behind(normal: FloatArray, N: FloatArray) -> NDArray[np.bool_]:
+    """Which of the normals ``(n, 3)`` are more than 90 degrees from ``N``; undecided ones, at 90 degrees, are not."""
+    return normal @ N < -ANGLE
+
+
+def wound(faces: ContactPatch) -> NDArray[np.int8]:
+    """Sense of the corners about the normal of each face ``(n,)``: 1, -1 against it, or 0 if it is undecided.
+
+    Undecided are slivers, whose corners have no sense, faces that stand at 90 degrees to their normals, and faces
+    without corners.
+    """
+    if faces.corners is None:
+        return np.zeros(len(faces.area), dtype=np.int8)
+    twice_area, error = area_vectors(faces.corners)
+    along = np.einsum("ij,ij->i", twice_area, faces.normal)
+    margin = np.maximum(error, ANGLE * np.linalg.norm(twice_area, axis=1))
+    return (np.sign(along) * (np.abs(along) > margin)).astype(np.int8)
+
+
+def firm(faces: ContactPatch) -> NDArray[np.bool_]:
+    """Which faces are no slivers ``(n,)``: all without corners, and all where every one is a sliver."""
+    if faces.corners is None:
+        return np.ones(len(faces.area), dtype=bool)
+    found = ~slivers(faces.corners)
+    return found | ~found.any()
+
+
+def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
+    """Whether any of the ``turned`` faces opposes a face next to it by more than 120 degrees; undecided is no.
+
+    A real overhang turns gradually from face to face; a flipped face opposes all its neighbours.
+    """
+    if not turned.any() or len(turned) == 1:
+        return False
+    tree, count = cKDTree(faces.centroid), min(NEIGHBOURS + 1, len(turned))
+    # all faces as far away as the last neighbour count, or which one does would hang on rounding
+    reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + TIED)
+    near = tree.query_ball_point(faces.centroid[turned], reach)
+    pairs = zip(faces.normal[turned], near, strict=True)
+    return any((faces.normal[some] @ n).min() < OPPOSED - ANGLE for n, some in pairs)

@@ -54,36 +54,9 @@ def cor_grid(n: int, rho: float) -> FloatArray:
 
 def fibonacci_twists(K: int, rho: float) -> FloatArray:
     """``K`` twists with ``(v_x, v_y, rho omega)`` spread evenly over the unit hemisphere ``omega > 0``, ``(K, 3)``."""
+    # opposite motions give opposite wrenches: one half of the sphere is enough
     i = np.arange(K)
     z = (i + 0.5) / K
     phi = i * np.pi * (3 - np.sqrt(5))
     r = np.sqrt(1 - z**2)
     return np.column_stack([r * np.cos(phi), r * np.sin(phi), z / rho])
-
-
-def screw_twist(axis: ArrayLike, point: ArrayLike, pitch: ArrayLike) -> FloatArray:
-    """Unit screws as 6-D twists: ``omega = e``, ``v = h e + e x (O - q)``; an infinite pitch is the translation ``e``.
-
-    Parameters
-    ----------
-    axis : (m, 3) or (3,) array
-        Directions ``e`` of any length but zero [-].
-    point : (m, 3) or (3,) array
-        Points ``q`` on the axes [m].
-    pitch : (m,) array or float
-        Advance per angle ``h`` [m/rad]; ``inf`` for a translation.
-
-    Returns
-    -------
-    (m, 6) array
-        ``[v, omega]`` of the origin [m/s, rad/s].
-    """
-    e = np.atleast_2d(np.asarray(axis, float))
-    length = np.linalg.norm(e, axis=1, keepdims=True)
-    if (length == 0).any():
-        raise ValueError(f"axis[{int(np.argmin(length))}] is zero: a screw needs a direction")
-    e = e / length
-    q, h = np.broadcast_to(np.asarray(point, float), e.shape), np.broadcast_to(np.asarray(pitch, float), len(e))
-    straight = np.isinf(h)[:, None]
-    v = np.where(straight, e, np.where(straight, 0.0, h[:, None]) * e - np.cross(e, q))
-    return np.hstack([v, np.where(straight, 0.0, e)])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+SLIVER = 1e-9  # area of a face over the square of its size, below which it has no side
+ROUNDING = 64 * np.finfo(float).eps  # of coordinates, which makes an area in proportion to a face's size
 CANCEL = 1e-6  # of what a sum of directions could reach: below it they cancel, and rounding could turn it by 1e-9
 
 
@@ -65,8 +67,10 @@ class ContactPatch:
             "pressure": _not_negative("pressure", self.pressure, n),
         }
         if self.corners is not None:
+            # faces may have any number of corners, but all the same: those with fewer repeat their last
             k = np.shape(self.corners)[1] if np.ndim(self.corners) == 3 else 4
             checked["corners"] = _finite("corners", self.corners, (n, max(k, 3), 3))
+        # read-only, because patches are shared between friction models, meshes and files
         for name, array in checked.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -91,25 +95,6 @@ class ContactPatch:
             return self
         corners = None if self.corners is None else self.corners[keep]
         return ContactPatch(self.centroid[keep], self.area[keep], self.normal[keep], self.pressure[keep], corners)
-
-
-def moved(patch: ContactPatch, rotation: ArrayLike, translation: ArrayLike) -> ContactPatch:
-    """Patch after the rigid motion ``x -> rotation @ x + translation``.
-
-    Parameters
-    ----------
-    patch : ContactPatch
-        ``n`` faces in any frame.
-    rotation : (3, 3) array
-        Right-handed rotation [-].
-    translation : (3,) array
-        Displacement after the rotation [m].
-    """
-    R, t = np.asarray(rotation, float), np.asarray(translation, float)
-    if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-9) or np.linalg.det(R) < 0:
-        raise ValueError(f"rotation must be an orthonormal, right-handed (3, 3) matrix, found {R.tolist()}")
-    corners = None if patch.corners is None else patch.corners @ R.T + t
-    return replace(patch, centroid=patch.centroid @ R.T + t, normal=patch.normal @ R.T, corners=corners)
 
 
 def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
@@ -147,3 +132,17 @@ def _unit(normal: FloatArray) -> FloatArray:
     with np.errstate(over="ignore"):
         unit = np.abs(largest * length - 1) <= 4 * np.finfo(float).eps
     return np.where(unit, normal, scaled / length)
+
+
+def slivers(corners: FloatArray) -> NDArray[np.bool_]:
+    """Which faces ``(n, k, 3)`` have no area, or none that could be told from rounding."""
+    twice_area, error = area_vectors(corners)
+    return np.linalg.norm(twice_area, axis=1) <= error
+
+
+def area_vectors(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Twice the area of each face along its normal, by the order of its corners, and what of it is no area."""
+    last = min(3, q.shape[1] - 1)
+    size = 2 * np.linalg.norm(q - q.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    error = (SLIVER * size + ROUNDING * np.linalg.norm(q, axis=2).max(axis=1)) * size
+    return np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1]), error

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softjaw.friction.kernel import friction_sums
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
-from softjaw.friction.wrench import Model, checked_mu, model_faces
+from softjaw.friction.wrench import Model, checked_mu, friction_sums, model_faces
 
 MAX_CUTS = 2000
 
@@ -40,6 +39,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: Model = "ccm", tolerance:
     size = 2.0 ** np.frexp(np.abs(arm).max())[1]  # lengths are divided by a power of two, which rounds nothing
     arm, radius = arm / size, _radius(patch) / size
     twist, sums = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]), np.empty((1, 7))
+    # the first ellipse is a circle that must hold the minimiser
     v, P, best, limit = np.zeros(2), np.eye(2) * radius**2, np.inf, 0.0
     for cut in range(MAX_CUTS):
         twist[0, :2] = v
@@ -47,6 +47,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: Model = "ccm", tolerance:
         T, g = sums[0, 6], sums[0, :2]
         best, limit = min(best, T), limit if cut else tolerance * T
         width = np.sqrt(max(g @ P @ g, 0.0))
+        # the function is convex: nowhere in the ellipse is it below the tangent plane's lowest point
         if T - width >= best - limit:
             return float(mu * size * best)
         v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
@@ -56,6 +57,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: Model = "ccm", tolerance:
 def _radius(patch: ContactPatch) -> float:
     """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
     r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
+    # farther out every face costs at least its upright share of the distance, more than at the origin
     weight = patch.load @ upright
     if weight <= CANCEL * patch.load.sum():
         raise NoContactError("all faces stand parallel to the contact normal: bring the patch into its contact frame")

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
-from softjaw.friction.kernel import friction_sums
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
@@ -124,6 +124,7 @@ def friction_limits(
     patch: ContactPatch, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
 ) -> FrictionLimits:
     """Largest forces along x and y and largest torque about z, from three motions; see `friction_wrench`."""
+    # for mu = 1, so that e_n, a length of the patch, does not change in its last bits with mu
     f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model, unrolled).tolist()
     faces = patch.loaded
     S, F_N = float(faces.load.sum()), float((faces.load * faces.normal[:, 2]).sum())
@@ -140,11 +141,12 @@ def model_faces(
     """
     if model not in MODELS:
         raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
+    # exactly: a face without load is what the data say, not what a calculation left
     keep = patch.load > 0
     arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
     if model == "ccm":
         return arm, normal, load
-    if model == "pcm_projected":
+    if model == "pcm_projected":  # abs: a face of an overhang presses, whichever way it looks
         load = load * np.abs(normal[2])
     if model == "unrolled":
         arc = np.asarray(unrolled, float)
@@ -194,3 +196,53 @@ def _six(twist: ArrayLike) -> FloatArray:
     six = np.zeros((len(t), 6))
     six[:, [0, 1, 5]] = t
     return six
+
+
+# Reordering of sums lets the loop fill the vector registers. Not among the flags: nnan and ninf, which would allow the
+# compiler to drop the test for a face at rest.
+_FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
+# Speed below which a face is at rest, for motions and arms that move no face faster than some 1: what rounding of both
+# leaves of a speed of 0. Its force would have its full size and a direction of chance.
+REST = 32 * 2.0**-52
+_REST_SQUARED = REST**2
+
+
+@njit(cache=True, fastmath=set(_FAST))
+def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
+    """Wrench and dissipation of unit friction for each motion.
+
+    A face slides with ``c = n x v`` turned by a right angle in its plane, so ``|P v| = |c|`` and ``P v = c x n``:
+    both are free of cancellation. The velocity is formed as a difference from the arm, which keeps its digits when
+    the centre of rotation lies next to the face.
+
+    Parameters
+    ----------
+    arm, normal : (3, n) array
+        Positions relative to the origin and unit normals, component by component.
+    load : (n,) array
+        Normal force of each face.
+    twist : (m, 6) array
+        ``[v, omega]``, scaled so that the largest of ``v`` and of ``omega`` times ``arm`` is some 1.
+    out : (m, 7) array
+        Receives force, torque and ``H = sum load |P v|``.
+    """
+    for k in range(twist.shape[0]):
+        v0, v1, v2 = twist[k, 0], twist[k, 1], twist[k, 2]
+        o0, o1, o2 = twist[k, 3], twist[k, 4], twist[k, 5]
+        f0 = f1 = f2 = t0 = t1 = t2 = H = 0.0
+        for i in range(load.size):
+            x, y, z = arm[0, i], arm[1, i], arm[2, i]
+            nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
+            vx, vy, vz = v0 - o2 * y + o1 * z, v1 + o2 * x - o0 * z, v2 + o0 * y - o1 * x
+            cx, cy, cz = ny * vz - nz * vy, nz * vx - nx * vz, nx * vy - ny * vx
+            q = cx * cx + cy * cy + cz * cz
+            s = load[i] / math.sqrt(q) if q > _REST_SQUARED else 0.0
+            fx, fy, fz = s * (cy * nz - cz * ny), s * (cz * nx - cx * nz), s * (cx * ny - cy * nx)
+            f0 += fx
+            f1 += fy
+            f2 += fz
+            t0 += y * fz - z * fy
+            t1 += z * fx - x * fz
+            t2 += x * fy - y * fx
+            H += s * q
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4], out[k, 5], out[k, 6] = f0, f1, f2, t0, t1, t2, H

@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from softjaw.lsfit.flag import FitFlag
-from softjaw.lsfit.geometry import directions, shadow_area
+from softjaw.lsfit.geometry import directions
 from softjaw.lsfit.samples import NOTHING, checked_wrenches, sample_rank
-from softjaw.lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
-
-__all__ = ["ExactSurface", "body_volume", "hull_volume", "shadow_area"]
+from softjaw.lsfit.surface import OUT_OF_SPAN, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
 
@@ -26,6 +23,7 @@ def hull_volume(W: ArrayLike) -> float:
     _, values, V = np.linalg.svd(points, full_matrices=False)
     if len(points) < 3 or values[2] <= NOTHING * values[0]:
         return 0.0
+    # the volume scales with the lengths, so it loses nothing by making them equal
     even = points @ V.T / values  # a hull of very unequal lengths loses facets
     return float(ConvexHull(np.vstack([even, -even])).volume * values.prod())
 
@@ -46,9 +44,9 @@ def tangent_volume(T: ArrayLike, W: ArrayLike) -> float:
     polytope. With the touching points, the two ends of every edge make tetrahedra that fill it.
     """
     size = np.abs(W).max(axis=0)
-    T, W = np.asarray(T) * size, np.asarray(W) / size
-    dual = T / np.einsum("md,md->m", T, W)[:, None]
-    hull, touching = ConvexHull(np.vstack([dual, -dual])), np.vstack([W, -W])
+    normals, points = np.asarray(T, float) * size, np.asarray(W, float) / size
+    dual = normals / np.einsum("md,md->m", normals, points)[:, None]
+    hull, touching = ConvexHull(np.vstack([dual, -dual])), np.vstack([points, -points])
     corners = -hull.equations[:, :3] / hull.equations[:, 3:]
     edges = hull.simplices[:, [[1, 2], [0, 2], [0, 1]]].reshape(-1, 2)
     across = np.cross(np.repeat(corners, 3, axis=0), corners[hull.neighbors.ravel()])
@@ -77,7 +75,7 @@ def _extrapolated(coarse: float, fine: float, gain: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ExactSurface(LevelSet):
+class ExactSurface(LimitSurface):
     """Limit surface of a contact as friction gives it: every wrench is the one for its motion.
 
     The support of the body in the direction of a motion is the power ``w(t) . t`` of the wrench, exact to rounding.
@@ -146,16 +144,10 @@ class ExactSurface(LevelSet):
         """
         area = last = np.inf
         for n in (64, 128, 256, 512, 1024, 2048, 4096):
-            phi = 2 * np.pi * np.arange(n) / n
-            last, area = area, shadow_area(self.support(np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])))
+            last, area = area, supported_shadow(self.support, 3, n)
             if abs(area - last) <= 1e-12 * area:
                 break
         return area
-
-    @property
-    def semi_axes(self) -> FloatArray:
-        """Largest reach ``(3,)`` along each component."""
-        return self.support(np.eye(3))
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``; exact."""
@@ -203,6 +195,7 @@ class ExactSurface(LevelSet):
     def _largest(self, w: ArrayLike) -> tuple[FloatArray, NDArray[np.int64]]:
         W = rows(w, 3)
         P, at = np.empty(len(W)), np.empty(len(W), dtype=np.int64)
+        # a product with all facets at once would take gigabytes for thousands of wrenches
         for part in range(0, len(W), 200):
             product = W[part : part + 200] @ self._facets.T
             product = np.abs(product) if self.rank == 1 else product

@@ -1,22 +1,22 @@
-"""Axis-aligned ellipsoids as limit surfaces, and the fits of ellipsoids."""
+"""Ellipsoids as limit surfaces, along the components or in any position, and their fits."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from softjaw.lsfit.flag import FitFlag
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.samples import FLAT, NOTHING, checked_wrenches, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import OUT_OF_SPAN, LevelSet, checked_factors, rows
-from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.surface import OUT_OF_SPAN, FitFlag, LimitSurface, checked_factors, mapped_value, rows
 
 FloatArray = NDArray[np.float64]
+
+
 FAR = 10.0  # largest reach of a fitted ellipsoid, as a multiple of the samples' largest
 AT_BOUND = 1e-9  # of a coefficient that should be positive: up to here its ellipsoid counts as bounded by `FAR`
 HELD = 1e-12  # share of the largest eigenvalue of normal equations below which data say nothing
@@ -24,7 +24,7 @@ WEAK = 1e-10  # share below which they say so little that the fit is flagged, wh
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipsoid(LevelSet):
+class Ellipsoid(LimitSurface):
     """Axis-aligned ellipsoid ``P(w) = sum (w_i / e_i)^2 <= 1``.
 
     A contact that cannot carry a load along an axis has the semi-axis 0 there: the body is a disc, a segment or a
@@ -44,7 +44,7 @@ class Ellipsoid(LevelSet):
     (2, 0.0, array([ True]), array([False]))
     """
 
-    semi_axes: FloatArray  # type: ignore[assignment]
+    semi_axes: FloatArray = field()
     flag: FitFlag = FitFlag.CLEAN
     degree = 2
     dimension = 3
@@ -56,11 +56,6 @@ class Ellipsoid(LevelSet):
             raise ValueError(f"semi_axes is {axes.tolist()}: expected three finite numbers that are not negative")
         axes.flags.writeable = False
         object.__setattr__(self, "semi_axes", axes)
-
-    @property
-    def rank(self) -> int:
-        """Number of semi-axes that are not zero; 3 for a body with a volume."""
-        return int((self.semi_axes > 0).sum())
 
     @property
     def span(self) -> FloatArray:
@@ -143,6 +138,7 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     W = checked_wrenches(W, 3)
     B, _, flag = principal_frame(W)
     reach = np.abs(W).max(axis=0)
+    # each component by its own reach: the squares of unequal ones would lose the small ones' digits
     used = reach > FLAT * reach.max()
     X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
     right = 1 - floor * X.sum(axis=1)
@@ -192,6 +188,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)
     floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
+    # the linear equations give the best form of all; only one that is open or too long needs the programme
     lowest = np.linalg.eigvalsh(A)[0]
     if lowest >= floor:
         return A, flag if lowest > floor + AT_BOUND else flag | FitFlag.BOUNDED
@@ -205,9 +202,126 @@ def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[F
     Directions below `HELD` are rounding and stay at the start. Between that and `WEAK` they are followed, but a part in
     ``1e-16 / WEAK`` of the solution is rounding there, which the flag says too.
     """
+    # unit diagonal: the share of an eigenvalue then says what the data determine, not how long an axis is
     size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
     values, V = np.linalg.eigh(N * np.outer(size, size))
     held = values > HELD * values[-1]
     V = size[:, None] * V[:, held]
     x = start + V @ ((V.T @ (b - N @ start)) / values[held])
     return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED
+
+
+DEFINITE = 1e-12
+"""Smallest eigenvalue of a positive definite matrix once its diagonal is 1; rounding makes up to some 1e-15 of 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class TiltedEllipsoid(LimitSurface):
+    """Ellipsoid ``P(w) = w' A w <= 1`` in any number of dimensions.
+
+    Parameters
+    ----------
+    A : (d, d) array
+        Symmetric and positive definite, to a margin of `DEFINITE`; for a flat ellipsoid the pseudo-inverse of ``F F'``.
+    F : (d, r) array, optional
+        Image of the unit ball: the body is ``{F y : |y| <= 1}``. Needed only for a flat ellipsoid, ``r < d``.
+    flag : FitFlag
+        What the reader should know.
+
+    Examples
+    --------
+    >>> TiltedEllipsoid([[1.0, 0.0], [0.0, 4.0]]).semi_axes
+    array([1. , 0.5])
+    """
+
+    A: FloatArray
+    F: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    flag: FitFlag = FitFlag.CLEAN
+    inverse: FloatArray = field(init=False, repr=False)
+    degree = 2
+
+    def __post_init__(self) -> None:
+        """Refuse what is no ellipsoid."""
+        A = np.array(self.A, float)
+        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
+            raise ValueError(f"A has shape {A.shape}: expected finite numbers in a square matrix")
+        # rounding leaves 1e-16; more than this is another matrix than the caller meant
+        if abs(A - A.T).max() > 1e-9 * abs(A).max():
+            raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
+        F = np.array(self.F, float) if np.size(self.F) else _ball_map(A)
+        inverse = _inverse(F)
+        for name, array in (("A", (A + A.T) / 2), ("F", F), ("inverse", inverse)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def of_ball(cls, F: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> TiltedEllipsoid:
+        """Image ``{F y : |y| <= 1}`` of the unit ball, ``F (d, r)`` with independent columns; flat if ``r < d``."""
+        inverse = _inverse(np.asarray(F, float))
+        return cls(inverse.T @ inverse, np.asarray(F, float), flag)
+
+    @property
+    def dimension(self) -> int:
+        """Number of components of a wrench."""
+        return len(self.A)
+
+    @property
+    def span(self) -> FloatArray:
+        """Orthonormal directions ``(d, rank)`` in which the body extends."""
+        return np.linalg.qr(self.F)[0]
+
+    @property
+    def volume(self) -> float:
+        """Volume of the body; 0 if it is flat."""
+        if self.F.shape[1] < self.dimension:
+            return 0.0
+        ball = math.pi ** (self.dimension / 2) / math.gamma(self.dimension / 2 + 1)
+        return ball * abs(float(np.linalg.det(self.F)))
+
+    @property
+    def shadow_area(self) -> float:
+        """Area of the shadow on the plane of the first two components."""
+        s = np.linalg.svd(self.F[:2], compute_uv=False)
+        return math.pi * float(s[0] * s[1]) if len(s) > 1 else 0.0
+
+    def value(self, w: ArrayLike) -> FloatArray:
+        """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
+        W = rows(w, self.dimension)
+        Y = W @ self.inverse.T
+        return mapped_value((Y**2).sum(axis=1), Y, self.F, W)
+
+    def gradient(self, w: ArrayLike) -> FloatArray:
+        """Gradient ``2 A w``, the direction of motion, ``(m, d) -> (m, d)``."""
+        return 2 * rows(w, self.dimension) @ self.inverse.T @ self.inverse
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
+        return np.linalg.norm(rows(t, self.dimension) @ self.F, axis=1)
+
+    def scaled(self, factors: ArrayLike) -> TiltedEllipsoid:
+        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
+        return TiltedEllipsoid.of_ball(checked_factors(factors, self.dimension)[:, None] * self.F, self.flag)
+
+
+def _inverse(F: FloatArray) -> FloatArray:
+    return np.linalg.inv(F) if F.shape[0] == F.shape[1] else np.linalg.pinv(F)
+
+
+def _ball_map(A: FloatArray) -> FloatArray:
+    # Axes of very different length keep their digits if they are made equal first.
+    diagonal = A.diagonal()
+    if (diagonal <= 0).any():
+        raise ValueError(f"A has the diagonal {diagonal.tolist()}: an ellipsoid needs a positive definite matrix")
+    size = 1 / np.sqrt(diagonal)
+    even = A * np.outer(size, size)
+    lowest = float(np.linalg.eigvalsh(even)[0])
+    if lowest < -DEFINITE:
+        raise ValueError(
+            f"A has the eigenvalues {np.linalg.eigvalsh(A).tolist()}: an ellipsoid needs them all positive"
+        )
+    if lowest < DEFINITE:
+        raise ValueError(
+            f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, less than rounding can tell from zero: whether "
+            "the ellipsoid is closed is undecided; give its semi-axes (TiltedEllipsoid.of_ball)"
+        )
+    return size[:, None] * np.linalg.inv(np.linalg.cholesky(even)).T

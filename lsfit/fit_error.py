@@ -6,15 +6,17 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.samples import checked_motions
-from softjaw.lsfit.sums import ENDLESS, mean_errors
 from softjaw.lsfit.surface import LimitSurface
 
-__all__ = ["FitErrors", "LimitSurface", "fit_error"]
-
 FloatArray = NDArray[np.float64]
+
+
+ENDLESS = 1e-12  # value of a polynomial at a sample from which it counts as zero there: nowhere near its surface
+
 ACROSS = 1e-9  # part of a unit motion from which its angle to a flat body's normals is not a right one
 
 
@@ -47,6 +49,7 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     W, motions = checked_motions(W, T)
     assert motions is not None
     P, G = model.value(W), model.gradient(W)
+    # the usual case is one compiled loop; a flat model has no angle of its own to most motions
     if model.rank == model.dimension:
         E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
         return FitErrors(E1, Erad, math.degrees(angle))
@@ -72,3 +75,28 @@ def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     # gradient is a right angle away from all that is normal to the span.
     angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
     return np.where(size[:, 0] > ACROSS, angle, np.pi / 2)
+
+
+@njit(cache=True)
+def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
+    """Means of ``|P - 1|``, ``|P^(-1/degree) - 1|`` and the angle [rad] between the rows of ``G`` and ``T (m, d)``."""
+    m, d = G.shape
+    value = radius = angle = 0.0
+    for n in range(m):
+        value += abs(P[n] - 1.0)
+        if P[n] > ENDLESS:
+            radius += abs((1.0 / math.sqrt(math.sqrt(P[n])) if degree == 4 else P[n] ** (-1.0 / degree)) - 1.0)
+        else:
+            radius += np.inf
+        length = 0.0
+        for i in range(d):
+            length += G[n, i] ** 2
+        length = math.sqrt(length) if length > 0.0 else 1.0
+        less = more = 0.0
+        for i in range(d):
+            u = G[n, i] / length
+            less += (u - T[n, i]) ** 2
+            more += (u + T[n, i]) ** 2
+        # The half-angle form keeps its digits where the arc cosine of a number near one loses them.
+        angle += 2.0 * math.atan2(math.sqrt(less), math.sqrt(more))
+    return value / m, radius / m, angle / m

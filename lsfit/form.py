@@ -7,9 +7,8 @@ from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
-
-from softjaw.lsfit.sums import fill_monomials
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -31,28 +30,17 @@ def exponents(dimension: int, degree: int) -> IntArray:
     return E
 
 
+def places(dimension: int, degree: int) -> dict[tuple[int, ...], int]:
+    """Position of every row of `exponents`."""
+    return {tuple(row): n for n, row in enumerate(exponents(dimension, degree).tolist())}
+
+
 def monomials(w: ArrayLike, E: IntArray) -> FloatArray:
     """Monomials ``w^E``, ``(m, d), (k, d) -> (m, k)``."""
     W = np.ascontiguousarray(np.atleast_2d(np.asarray(w, float)))
     out = np.empty((len(E), len(W)))
     fill_monomials(W, E, out)
     return out.T
-
-
-def monomial_gradients(w: ArrayLike, E: IntArray) -> FloatArray:
-    """Gradients of the monomials, ``(m, d), (k, d) -> (m, k, d)``."""
-    return np.stack([E[:, i] * monomials(w, _lower(E, i)) for i in range(E.shape[1])], axis=-1)
-
-
-def monomial_hessians(w: ArrayLike, E: IntArray) -> FloatArray:
-    """Second derivatives of the monomials, ``(m, d), (k, d) -> (m, k, d, d)``."""
-    k, d = E.shape
-    H = np.empty((len(np.atleast_2d(w)), k, d, d))
-    for i in range(d):
-        for j in range(i + 1):
-            low = _lower(E, i)
-            H[:, :, i, j] = H[:, :, j, i] = E[:, i] * low[:, j] * monomials(w, _lower(low, j))
-    return H
 
 
 @lru_cache
@@ -63,13 +51,19 @@ def derivative(dimension: int, degree: int) -> FloatArray:
     ``monomials(w, E') @ (derivative[i] @ c)``.
     """
     E = exponents(dimension, degree)
-    place = {tuple(row): n for n, row in enumerate(exponents(dimension, degree - 1).tolist())}
+    place = places(dimension, degree - 1)
     D = np.zeros((dimension, len(place), len(E)))
     for n, row in enumerate(E):
         for i in np.flatnonzero(row):
             D[i, place[tuple(row - np.eye(dimension, dtype=int)[i])], n] = row[i]
     D.flags.writeable = False
     return D
+
+
+def monomial_gradients(w: ArrayLike, dimension: int, degree: int) -> FloatArray:
+    """Gradients of the monomials, ``(m, d) -> (m, k, d)``."""
+    low = monomials(w, exponents(dimension, degree - 1))
+    return np.stack([low @ part for part in derivative(dimension, degree)], axis=-1)
 
 
 def substitute(coefficients: ArrayLike, E: IntArray, L: ArrayLike) -> FloatArray:
@@ -83,12 +77,13 @@ def substitute(coefficients: ArrayLike, E: IntArray, L: ArrayLike) -> FloatArray
 
 
 @lru_cache
-def _tensor_places(dimension: int) -> tuple[IntArray, FloatArray]:
-    place = {tuple(row): n for n, row in enumerate(exponents(dimension, 4).tolist())}
+def tensor_places(dimension: int) -> tuple[IntArray, FloatArray]:
+    """For each entry of `hessian_tensor`, row by row, the monomial it comes from and its factor, both ``(d^4,)``."""
+    place = places(dimension, 4)
     index = np.array(list(np.ndindex((dimension,) * 4)))
-    count = (index[:, :, None] == np.arange(dimension)).sum(axis=1)
-    orders = [24 / math.prod(map(math.factorial, row)) for row in count.tolist()]
-    return np.array([place[tuple(row)] for row in count.tolist()]), 12 / np.array(orders)
+    count = (index[:, :, None] == np.arange(dimension)).sum(axis=1).tolist()
+    factor = [math.prod(map(math.factorial, row)) / 2 for row in count]
+    return np.array([place[tuple(row)] for row in count]), np.array(factor)
 
 
 def hessian_tensor(coefficients: ArrayLike, dimension: int) -> FloatArray:
@@ -96,7 +91,7 @@ def hessian_tensor(coefficients: ArrayLike, dimension: int) -> FloatArray:
 
     Coefficients in the order of ``exponents(dimension, 4)``.
     """
-    place, factor = _tensor_places(dimension)
+    place, factor = tensor_places(dimension)
     return (np.asarray(coefficients, float)[place] * factor).reshape((dimension,) * 4)
 
 
@@ -108,7 +103,24 @@ def _interpolation(dimension: int, degree: int) -> tuple[FloatArray, FloatArray]
     return points, np.linalg.pinv(monomials(points, E))
 
 
-def _lower(E: IntArray, i: int) -> IntArray:
-    low = E.copy()
-    low[:, i] = np.maximum(low[:, i] - 1, 0)
-    return low
+@njit(cache=True)
+def fill_monomials(w, E, out):  # pragma: no cover - compiled
+    """Write the monomials ``w^E``, ``(m, d), (k, d) -> out (k, m)``."""
+    power = powers(w, E)
+    for j in range(len(E)):
+        out[j] = power[0, E[j, 0]]
+        for i in range(1, w.shape[1]):
+            out[j] *= power[i, E[j, i]]
+
+
+@njit(cache=True)
+def powers(w, E):  # pragma: no cover - compiled
+    """Powers of the components ``(d, degree + 1, m)``."""
+    m, d = w.shape
+    power = np.empty((d, 1 + (E.max() if E.size else 0), m))
+    for i in range(d):
+        power[i, 0] = 1.0
+        for e in range(1, power.shape[1]):
+            for n in range(m):
+                power[i, e, n] = power[i, e - 1, n] * w[n, i]
+    return power

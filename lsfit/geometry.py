@@ -7,14 +7,14 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import roots_gegenbauer
 
-from softjaw.lsfit.flag import FitError
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.sums import fill_floors
+from softjaw.lsfit.surface import FitError
 
 FloatArray = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ def directions(dimension: int, count: int) -> FloatArray:
         phi = i * np.pi * (3 - math.sqrt(5))
         u = np.column_stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
     else:
+        # no spiral fills spheres of more dimensions; the seed makes every run the same
         u = np.random.default_rng(dimension).normal(size=(count, dimension))
     u = u / np.linalg.norm(u, axis=1, keepdims=True)
     u.flags.writeable = False
@@ -78,7 +79,9 @@ def quartic_volume(coefficients: FloatArray, dimension: int) -> float:
     FitError
         If they never agree to 1e-8 (1e-3).
     """
-    orders, aim, limit = ((10, 14, 20, 28, 40, 56, 80, 112, 160), 1e-12, 1e-8)
+    # beyond three dimensions a rule of order n has some n^(d - 1) points, so fewer digits must do
+    orders: tuple[int, ...] = (10, 14, 20, 28, 40, 56, 80, 112, 160)
+    aim, limit = 1e-12, 1e-8
     if dimension > 3:
         orders, aim, limit = ((4, 6, 8, 10, 12), 1e-6, 1e-3)
     last, change = math.nan, math.nan
@@ -100,6 +103,7 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
     """Map ``L (d, d)`` from a body that is nearly round onto a closed one, ``P <= 1``, by its surface's moments."""
     u = directions(dimension, 40 * dimension**2)
     L = np.eye(dimension)
+    # one pass does for bodies that are nearly round, long ones take several; 0.3 is round enough for the rules
     for _ in range(40):
         r = value(u @ L.T) ** (-1 / degree)
         Y = u * r[:, None]
@@ -134,6 +138,7 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
         floors = _floors(c, _plane_monomials(n))
         area = np.pi / n * float((1.0 / np.sqrt(floors[:, 2])).sum())
+        # equal steps converge exponentially for a smooth outline, so two that agree are both right
         if abs(area - last) <= 1e-13 * area:
             break
         last = area
@@ -180,25 +185,31 @@ def _plane_monomials(n: int) -> FloatArray:
     return monomials(np.column_stack([np.cos(phi), np.sin(phi), np.ones(n)]), exponents(3, 4)).copy()
 
 
-def shadow_area(support: FloatArray) -> float:
-    """Area of a plane convex body from its support function, ``1/2 int (h^2 - h'^2) dphi``.
+@njit(cache=True)
+def fill_floors(c, E, M, out):  # pragma: no cover - compiled
+    """Write ``min over tau of P(x, y, tau)`` for monomials ``M (n, 15)`` at tau 1, ``-> out (n, 3)``.
 
-    Parameters
-    ----------
-    support : (k,) array
-        ``h`` at ``k`` equal steps of the full turn. For the shadow on the plane of the forces these are the supports of
-        the translations ``(cos phi, sin phi, 0)``.
+    The derivative along tau is a cubic, ``s^3 + p s + q = 0`` for ``tau = s - a_3 / (4 a_4)``. The least value is at
+    its root farthest on the side of ``-q``; ``p`` and ``q`` come first in ``out``. For a convex polynomial ``p`` is not
+    negative; where it is, ``q = 0`` means two valleys of equal depth.
     """
-    h = np.asarray(support, float)
-    c = np.fft.rfft(h) / len(h)
-    order = np.arange(len(c))
-    twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
-    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
-
-
-def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int, n: int = 1024) -> float:
-    """`shadow_area` on the first two components of a body in ``d`` dimensions with this support function."""
-    t = np.zeros((n, dimension))
-    phi = 2 * np.pi * np.arange(n) / n
-    t[:, 0], t[:, 1] = np.cos(phi), np.sin(phi)
-    return shadow_area(support(t))
+    a = np.empty(5)
+    for n in range(len(M)):
+        a[:] = 0.0
+        for j in range(len(c)):
+            a[E[j, 2]] += c[j] * M[n, j]
+        shift = a[3] / (4.0 * a[4])
+        p = a[2] / (2.0 * a[4]) - 3.0 * shift**2
+        q = 2.0 * shift**3 - a[2] * shift / (2.0 * a[4]) + a[1] / (4.0 * a[4])
+        inner = q**2 / 4.0 + p**3 / 27.0
+        s = 0.0
+        if inner >= 0.0:
+            u = (abs(q) / 2.0 + math.sqrt(inner)) ** (1.0 / 3.0)
+            if u > 0.0:
+                s = u - p / (3.0 * u)
+        else:
+            reach = math.sqrt(-p / 3.0)
+            s = 2.0 * reach * math.cos(math.acos(min(abs(q) / (2.0 * reach**3), 1.0)) / 3.0)
+        tau = -shift - (s if q > 0.0 else -s)
+        out[n, 0], out[n, 1] = p, q
+        out[n, 2] = (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]

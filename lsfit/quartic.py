@@ -1,4 +1,4 @@
-"""Fits of quartic limit surfaces: least squares, and the best convex quartic with the proof that it is convex."""
+"""Quartics as limit surfaces, and the search for their points with given normals."""
 
 from __future__ import annotations
 
@@ -6,125 +6,315 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.lsfit.certificate import Certificate, certify
-from softjaw.lsfit.ellipsoid import FAR, nearest_solution
-from softjaw.lsfit.flag import FitError, FitFlag
-from softjaw.lsfit.lowest import lies_above
-from softjaw.lsfit.quartic_surface import Quartic
-from softjaw.lsfit.round import Residuals, ball_coefficients, placed, round_samples
-from softjaw.lsfit.sos import MARGIN, convex_least_squares
-from softjaw.lsfit.surface import Image
-
-__all__ = ["Quartic", "QuarticFit", "convex_quartic", "least_squares_quartic"]
+from softjaw.lsfit.ellipsoid import TiltedEllipsoid
+from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials, places, substitute
+from softjaw.lsfit.geometry import directions, half_sphere_monomials, quartic_shadow, quartic_volume, round_frame
+from softjaw.lsfit.lowest import lowest_eigenvalues, neighbours, refuse_open
+from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
 
 
+IntArray = NDArray[np.int64]
+
+
 @dataclass(frozen=True, eq=False)
-class QuarticFit:
-    """A convex quartic limit surface, and what is known about it.
+class Quartic(LimitSurface):
+    """Level set ``P(w) = sum_k c_k w^E_k = 1`` of a homogeneous polynomial of degree 4.
 
     Parameters
     ----------
-    surface : Quartic or Image
-        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
-    certificate : Certificate
-        Proof that the quartic is convex.
+    coefficients : (k,) array
+        ``c``, one for each monomial.
+    exponents : (k, d) array
+        ``E``, each row with the sum 4.
     flag : FitFlag
         What the reader should know.
-    residuals : Residuals
-        What was minimised.
-    found, least : (k,) array
-        Coefficients of the quartic, and of the best one, convex or not, in the coordinates of the residuals.
+    ball_map : (d, d) array, optional
+        Map from a ball onto an ellipsoid near the body, where one is known.
+    units : (d,) array, optional
+        Sizes of the components in which all coefficients are equally exact, 1 if not given. Measures of the body ask
+        whether it is closed, and what is rounding is judged in these units (or in those of ``ball_map``).
     """
 
-    surface: Quartic | Image
-    certificate: Certificate
-    flag: FitFlag
-    residuals: Residuals = field(repr=False)
-    found: FloatArray = field(repr=False)
-    least: FloatArray = field(repr=False)
+    coefficients: FloatArray
+    exponents: NDArray[np.int64]
+    flag: FitFlag = FitFlag.CLEAN
+    ball_map: FloatArray | None = field(default=None, repr=False)
+    units: FloatArray | None = field(default=None, repr=False)
+    degree = 4
 
-    @cached_property
-    def objective(self) -> float:
-        """``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)`` over the samples."""
-        return self.residuals.objective(self.found)
-
-    @cached_property
-    def least_objective(self) -> float:
-        """The same for the best quartic, convex or not; equal if that one is convex."""
-        return self.residuals.objective(self.least)
+    def __post_init__(self) -> None:
+        """Bring the monomials into the order of `lsfit.form.exponents`, and refuse what is no quartic."""
+        c, E = np.array(self.coefficients, float), np.asarray(self.exponents, dtype=np.int64)
+        if E.ndim != 2 or len(E) == 0 or (E < 0).any() or (E.sum(axis=1) != 4).any():
+            raise ValueError("exponents: expected rows of whole numbers (k, d), none negative, each with the sum 4")
+        if c.shape != (len(E),) or not np.isfinite(c).all():
+            raise ValueError(
+                f"coefficients has shape {c.shape}: expected {len(E)} finite numbers, one for each monomial"
+            )
+        order = exponents(E.shape[1], 4)
+        if E is not order:
+            place = places(E.shape[1], 4)
+            sorted_c = np.zeros(len(order))
+            np.add.at(sorted_c, [place[tuple(row)] for row in E.tolist()], c)
+            c = sorted_c
+        c.flags.writeable = False
+        object.__setattr__(self, "coefficients", c)
+        object.__setattr__(self, "exponents", order)
 
     @property
-    def rank(self) -> int:
-        """Dimension of the body."""
-        return self.surface.rank
+    def dimension(self) -> int:
+        """Number of components of a wrench."""
+        return self.exponents.shape[1]
+
+    def value(self, w: ArrayLike) -> FloatArray:
+        """``P(w)``, ``(m, d) -> (m,)``."""
+        return monomials(rows(w, self.dimension), self.exponents) @ self.coefficients
+
+    def gradient(self, w: ArrayLike) -> FloatArray:
+        """Gradient of ``P``, ``(m, d) -> (m, d)``."""
+        cubic = monomials(rows(w, self.dimension), exponents(self.dimension, 3))
+        return cubic @ (derivative(self.dimension, 4) @ self.coefficients).T
+
+    def hessian(self, w: ArrayLike) -> FloatArray:
+        """Second derivatives of ``P``, ``(m, d) -> (m, d, d)``."""
+        W, d = rows(w, self.dimension), self.dimension
+        return ((W[:, :, None] * W[:, None, :]).reshape(-1, d * d) @ self.tensor.reshape(d * d, d * d)).reshape(
+            -1, d, d
+        )
+
+    @cached_property
+    def tensor(self) -> FloatArray:
+        """Symmetric ``Q (d, d, d, d)`` with the second derivatives ``H_ij(w) = Q_ijkl w_k w_l``."""
+        return hessian_tensor(self.coefficients, self.dimension)
+
+    @cached_property
+    def frame(self) -> FloatArray:
+        """Map ``L (d, d)`` from a body that is nearly round onto this one.
+
+        Raises
+        ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
+        """
+        # a fit knows the frame in which its coefficients are exact; it judges better than the components do
+        if self.ball_map is not None:
+            refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
+            return self.ball_map
+        units = np.ones(self.dimension) if self.units is None else self.units
+        own = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.exponents)
+        refuse_open(own.coefficients, self.dimension, np.diag(units))
+        return units[:, None] * round_frame(own.value, self.dimension, 4)
+
+    @property
+    def ellipsoid(self) -> TiltedEllipsoid:
+        """An ellipsoid near the body."""
+        return TiltedEllipsoid.of_ball(self.frame, self.flag)
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-3 or better beyond."""
+        V = quartic_volume(self._round.coefficients, self.dimension)
+        return abs(float(np.linalg.det(self.frame))) * V
+
+    @cached_property
+    def shadow_area(self) -> float:
+        """Area of the shadow on the plane of the first two components; that of the hull in more than three dimensions.
+
+        Raises
+        ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
+        """
+        if self.dimension == 3:
+            return quartic_shadow(self.coefficients, np.linalg.norm(self.frame, axis=1))
+        if self.dimension == 2:
+            return self.volume
+        return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself.
+
+        Of a body that is not convex, the highest of the hills that sampled points of its surface lead to.
+
+        Raises
+        ------
+        OpenBodyError, UndecidedError
+            If the level set is not closed, or not known to be.
+        FitError
+            If a search stops short.
+        """
+        T = rows(t, self.dimension)
+        return (T * self.support_points(T)).sum(axis=1)
+
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        T = rows(t, self.dimension) @ self.frame
+        length = np.linalg.norm(T, axis=1)
+        moving = length > 0
+        T = T[moving] / length[moving, None]
+        # of a body with dents the valley next to a start need not hold the farthest point: several are searched
+        owner, start = self._starts(T)
+        found = np.empty_like(start)
+        failed = support_points(self._round.tensor, T[owner], start, found)
+        if failed:
+            raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
+        if len(owner) > len(T):
+            order = np.lexsort(((found * T[owner]).sum(axis=1), owner))
+            found = found[order[np.append(np.diff(owner) > 0, True)]]
+        out = np.zeros((len(moving), self.dimension))
+        out[moving] = found @ self.frame.T
+        return out
+
+    def _starts(self, T: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Points of the surface from which to search, and which row of ``T`` each is for, in order.
+
+        The highest sample of a body that is convex; of others all nearly as high, or higher than their neighbours.
+        """
+        d, Y = self.dimension, self._surface_points
+        owner, place, sign = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+        # bounds the memory of the product with all samples
+        for part in range(0, len(T), 10_000):
+            along = T[part : part + 10_000] @ Y.T
+            height = np.abs(along)
+            if self._is_indented:
+                tops = height >= height[:, neighbours(d, len(Y))].max(axis=2)
+                row, column = np.nonzero(tops | (height > 0.9 * height.max(axis=1, keepdims=True)))
+            else:
+                row, column = np.arange(len(along)), height.argmax(axis=1)
+            owner.append(part + row)
+            place.append(column)
+            sign.append(np.sign(along[row, column]))
+        return np.concatenate(owner), Y[np.concatenate(place)] * np.concatenate(sign)[:, None]
+
+    def scaled(self, factors: ArrayLike) -> Quartic:
+        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
+        f = checked_factors(factors, self.dimension)
+        ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
+        units = np.abs(f) if self.units is None else np.abs(f) * self.units
+        return Quartic(
+            self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag, ball_map, units
+        )
+
+    @cached_property
+    def _round(self) -> Quartic:
+        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
+
+    @cached_property
+    def _is_indented(self) -> bool:
+        """Whether a sampled direction has a negative curvature; several starts do no harm to a convex body."""
+        return bool(lowest_eigenvalues(self._round.hessian(directions(self.dimension, 200))).min() < 0)
+
+    @cached_property
+    def _surface_points(self) -> FloatArray:
+        n = 30 * self.dimension**2
+        P = half_sphere_monomials(self.dimension, n) @ self._round.coefficients
+        return directions(self.dimension, n) * (P**-0.25)[:, None]
 
 
-def least_squares_quartic(
-    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01
-) -> Quartic | Image:
-    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, which may fail to be convex.
+@njit(cache=True)
+def support_points(tensor, T, start, out):  # pragma: no cover - compiled
+    """Points ``out (m, d)`` of a closed quartic surface farthest along ``T (m, d)``, by Newton's method.
+
+    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted, whether ``P`` is convex or
+    not. Steps are halved until the function falls; where the second derivative is not positive it is shifted.
 
     Parameters
     ----------
-    W : (m, d) array
-        Normalised wrenches [-].
+    tensor : (d, d, d, d) array
+        ``Q``, symmetric: the second derivative is ``H_ij = Q_ijkl w_k w_l``, the gradient ``H w / 3``.
     T : (m, d) array
-        Unit motions; needed unless ``gamma`` is 0 [-].
-    beta, gamma : float
-        Weights of wrenches and of motions. A little weight on the motions bends the surface the right way between
-        samples; with 1 and 1 the directions are bought with radii that are off by some per cent.
+        Unit normals.
+    start : (m, d) array
+        Points near the ones wanted, of any length; the lowest valley near them is found.
 
-    Raises
-    ------
-    ValueError
-        If a sample is not finite, or all wrenches are zero.
+    Returns
+    -------
+    int
+        How many of the searches did not converge.
     """
-    samples = round_samples(W, T)
-    v, flag = nearest_solution(*Residuals(samples, beta, gamma).normal(), ball_coefficients(samples.B.shape[1]))
-    return placed(v, samples, samples.flag | flag)
+    m, d = T.shape
+    H, g, s, y, A = np.empty((d, d)), np.empty(d), np.empty(d), np.empty(d), np.empty((d, d))
+    failed = 0
+    for n in range(m):
+        t = T[n]
+        w = start[n].copy()
+        P = _second(tensor, w, H, g)
+        along = max(np.dot(t, w), 1e-3 * np.sqrt(np.dot(w, w)))
+        w *= (along / (4 * P)) ** (1 / 3)
+        P = _second(tensor, w, H, g)
+        converged = False
+        for _ in range(200):
+            size, shift = 0.0, 1e-13
+            for i in range(d):
+                size += abs(H[i, i])
+            while True:
+                for i in range(d):
+                    s[i] = t[i] - g[i]
+                    for j in range(d):
+                        A[i, j] = H[i, j]
+                    A[i, i] += shift * size
+                if _solve(A, s):
+                    break
+                shift = max(10.0 * shift, 1e-3)
+            fall = 0.0
+            for i in range(d):
+                fall += s[i] * (t[i] - g[i])
+            phi = P - np.dot(t, w)
+            if converged:
+                break
+            converged = fall <= 1e-12 * abs(phi)  # one more step squares what is left
+            length, new = 1.0, phi
+            for _ in range(60):
+                y[:] = w + length * s
+                P = _second(tensor, y, H, g)
+                new = P - np.dot(t, y)
+                if new <= phi - 1e-4 * length * fall or converged:
+                    break
+                length *= 0.5
+            w[:] = y
+        if not converged:
+            failed += 1
+        out[n] = w / P**0.25
+    return failed
 
 
-def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
-    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
+@njit(cache=True)
+def _second(tensor, w, H, g):  # pragma: no cover - compiled
+    """Second derivative and gradient at ``w``, written to ``H`` and ``g``; the value is returned."""
+    d = len(w)
+    P = 0.0
+    for i in range(d):
+        g[i] = 0.0
+        for j in range(d):
+            h = 0.0
+            for k in range(d):
+                for m in range(d):
+                    h += tensor[i, j, k, m] * w[k] * w[m]
+            H[i, j] = h
+            g[i] += h * w[j] / 3
+        P += g[i] * w[i] / 4
+    return P
 
-    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
-    the semidefinite programme is solved, which asks for eigenvalues of at least `lsfit.sos.MARGIN`, so that rounding
-    cannot undo the proof. A body that would reach more than `lsfit.ellipsoid.FAR` times as far as the ellipsoid of the
-    samples is bounded there by a larger margin, and flagged.
 
-    Parameters
-    ----------
-    W, T, beta, gamma
-        As for `least_squares_quartic`.
-
-    Raises
-    ------
-    ValueError
-        If a sample is not finite, or all wrenches are zero.
-    FitError
-        If the programme is not solved, or its result fails the certificate.
-    """
-    samples = round_samples(W, T)
-    r = samples.B.shape[1]
-    problem = Residuals(samples, beta, gamma)
-    N, b = problem.normal()
-    ball = ball_coefficients(r)
-    least, flag = nearest_solution(N, b, ball)
-    v, loose = least, bool(flag)
-    by, gram = "least squares", certify(v, r)
-    if gram is None:
-        by = "semidefinite programme"
-        v, gram = convex_least_squares(N, b, ball, r, loose)
-    if not lies_above(v, r, FAR**-4):
-        by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
-        v, gram = convex_least_squares(N, b, ball, r, loose, 12 * FAR**-4)
-    surface = placed(v, samples, samples.flag | flag)
-    low = float(np.linalg.eigvalsh(gram)[0])
-    if low < MARGIN / 4:
-        raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    certificate = Certificate(low, gram, samples.B, by, surface)
-    return QuarticFit(surface, certificate, surface.flag, problem, v, least)
+@njit(cache=True)
+def _solve(A, b):  # pragma: no cover - compiled
+    """Solve ``A x = b`` in place by Gauss elimination; False where the symmetric matrix is not positive definite."""
+    d = len(b)
+    for k in range(d):
+        if not A[k, k] > 0.0:
+            return False
+        for i in range(k + 1, d):
+            f = A[i, k] / A[k, k]
+            for j in range(k, d):
+                A[i, j] -= f * A[k, j]
+            b[i] -= f * b[k]
+    for k in range(d - 1, -1, -1):
+        for j in range(k + 1, d):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]
+    return True

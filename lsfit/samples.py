@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
-from softjaw.lsfit.flag import FitFlag
+from softjaw.lsfit.surface import FitFlag
 
 FloatArray = NDArray[np.float64]
 UNIT = 1e-5  # how far the length of a unit motion may be from 1
@@ -35,15 +36,65 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
     W, T : (m, 3) array
         Wrenches and unit motions [-].
     """
+    w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
+    return _normalised(w[:, [0, 1, 5]] if w.shape[1] == 6 else w, t, force, rho)
+
+
+def six_samples(
+    wrench: ArrayLike, twist: ArrayLike, force: float, rho: float, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[FloatArray, FloatArray]:
+    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|`` of a reference point.
+
+    Parameters
+    ----------
+    wrench, twist : (m, 6) array
+        ``[f, tau]`` about, and ``[v, omega]`` of, the origin [N, N m; m/s, rad/s].
+    force : float
+        ``mu S`` [N].
+    rho : float
+        Length of the contact [m].
+    point : (3,) array
+        Reference point in the contact frame, such as the centre of pressure [m]; the power of no sample changes.
+
+    Returns
+    -------
+    W, T : (m, 6) array
+        Wrenches and unit motions [-].
+    """
+    w, t = np.atleast_2d(np.array(wrench, float)), np.atleast_2d(np.array(twist, float))
+    if w.shape != t.shape or w.shape[1] != 6:
+        raise ValueError(f"wrench has shape {w.shape} and twist {t.shape}: expected (m, 6) for both")
+    p = np.asarray(point, float)
+    w[:, 3:] -= np.cross(p, w[:, :3])
+    t[:, :3] += np.cross(t[:, 3:], p)
+    return _normalised(w, t, force, rho)
+
+
+def _normalised(w: FloatArray, t: FloatArray, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
+    """Samples free of units, of three components, the last a torque, or of six, the last three torques."""
     if not (force > 0 and rho > 0):
         raise ValueError(f"force is {force} and rho is {rho}: samples are normalised by a positive force and length")
-    w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
-    W = (w[:, [0, 1, 5]] if w.shape[1] == 6 else w) / force / [1.0, 1.0, rho]
-    T = t * [1.0, 1.0, rho]
+    size = np.array([1.0, 1.0, rho] if t.shape[1] == 3 else [1.0, 1.0, 1.0, rho, rho, rho])
+    T = t * size
     length = np.sqrt(np.einsum("md,md->m", T, T))
     if not length.all():
         raise ValueError(f"twist[{int(np.argmin(length))}] is zero: a sample needs a direction of motion")
-    return W, T / length[:, None]
+    return w / force / size, T / length[:, None]
+
+
+def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
+    """Unit motions spread evenly over the sphere, ``(count, dimension)``, the same in every run.
+
+    The additive recurrence by powers of the generalised golden ratio fills the unit cube evenly; the normal quantile
+    of each number makes it evenly spread over directions.
+    """
+    # fixed-point iteration for the root of x^(d + 1) = x + 1
+    root = 2.0
+    for _ in range(60):
+        root = (1 + root) ** (1 / (dimension + 1))
+    u = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, dimension + 1))) % 1
+    x = ndtri(u)
+    return x / np.linalg.norm(x, axis=1, keepdims=True)
 
 
 def sample_rank(W: ArrayLike, tolerance: float = FLAT) -> int:
@@ -96,6 +147,7 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
 
 def _pressed(W: FloatArray) -> NDArray[np.bool_]:
     """Which wrenches are not zero, ``(m,)``."""
+    # squares of lengths, hence the square of the share
     size = np.einsum("md,md->m", W, W)
     return size > NOTHING**2 * size.max()
 

@@ -1,48 +1,104 @@
-"""Semidefinite programmes of the fits: a convex quadratic under one linear matrix inequality, solved by Clarabel.
+"""Quartics that are convex, as matrices: Gram matrices of sos-convex quartics, and programmes over them.
 
-A quartic form in three variables that is convex is sos-convex (Ahmadi, Blekherman, Parrilo, "Convex ternary quartics
-are SOS-convex", 2024): its Gram matrix, written with 15 coefficients and 9 free numbers, is the whole constraint.
+A quartic form ``P`` is sos-convex when ``z' Hess P(w) z = (z x w)' Q (z x w)`` for some positive semidefinite ``Q`` of
+size ``d^2`` with ``z x w`` the products ``z_i w_j``. The matrices ``Q`` of one ``P`` form an affine family: the fully
+symmetric one, ``Q_(ij)(kl) = d^4 P / dw_i dw_j dw_k dw_l / 2``, plus one free number for every pair ``i < k`` and
+``j < l``, because ``z_i w_j z_k w_l = z_i w_l z_k w_j``. Writing ``Q`` with these ``k + f`` unknowns satisfies all
+``(d (d + 1) / 2)^2`` equalities by construction: 24 unknowns in three dimensions, 351 in six. In three variables every
+convex quartic is sos-convex, so there the Gram matrix is the whole constraint.
+
+Programmes of up to some hundred unknowns go to Clarabel. In six dimensions an interior-point method of our own takes
+half to two thirds of its time, because it factorises one dense system of the unknowns alone; and as all its iterates
+lie strictly inside the cone, it also finishes what Clarabel leaves short of its tolerance.
+
+References: Ahmadi, Parrilo, "A convex polynomial that is not sos-convex", Mathematical Programming 135 (2012); Ahmadi,
+Blekherman, Parrilo, "Convex ternary quartics are SOS-convex" (2024).
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.special import factorial
 
-from softjaw.lsfit.flag import FitError
-from softjaw.lsfit.form import exponents
-from softjaw.lsfit.gram import ball_gram, gram_map, quadratic_map, upper_triangle
-from softjaw.lsfit.interior import least_quadratic
+from softjaw.lsfit.form import exponents, tensor_places
+from softjaw.lsfit.surface import FitError
 
 FloatArray = NDArray[np.float64]
-
-
 MARGIN = 1e-7
 """Smallest eigenvalue asked of a Gram matrix, in coordinates where that of a ball has eigenvalues of 4 and more."""
+SMALL = 3  # dimensions up to which Clarabel is the faster of the two methods
 
 
 @lru_cache
-def _maps(dimension: int) -> tuple[FloatArray, csr_array, FloatArray]:
+def gram_map(dimension: int) -> csr_array:
+    """Matrix ``A (d^4, k + f)`` with ``vec(Q) = A [v, free]`` for the coefficients ``v`` of a quartic form."""
+    d, k = dimension, len(exponents(dimension, 4))
+    column, value = tensor_places(d)
+    i, j, a, b = np.indices((d, d, d, d)).reshape(4, -1)
+    pairs = d * (d - 1) // 2
+    pair = np.zeros((d, d), dtype=int)
+    upper = np.triu_indices(d, 1)
+    pair[upper] = pair.T[upper] = np.arange(pairs)
+    row, free = np.arange(d**4), (i != a) & (j != b)
+    freedom = (k + pair[i, a] * pairs + pair[j, b])[free]
+    entries = np.concatenate([value, (np.sign(a - i) * np.sign(b - j))[free]])
+    return csr_array((entries, (np.r_[row, row[free]], np.r_[column, freedom])), shape=(d**4, k + pairs**2))
+
+
+@lru_cache
+def ball_gram(dimension: int) -> FloatArray:
+    """Unknowns ``[v, free]`` of ``P = |w|^4`` with the most definite of its Gram matrices, ``(k + f,)``."""
     E = exponents(dimension, 4)
-    A = gram_map(E)
-    # Half of a ball's swapped pairs moved to the diagonal blocks: the choice with the largest smallest eigenvalue.
-    return A.toarray(), upper_triangle(A), ball_gram(E)[len(E) :]
+    v = np.where((E % 2 == 0).all(axis=1), 2 / factorial(E // 2).prod(axis=1), 0.0)
+    # Half of what the symmetric choice puts on swapped pairs moves to the diagonal blocks, which makes it definite.
+    return np.concatenate([v, 2 * np.eye(dimension * (dimension - 1) // 2).ravel()])
+
+
+@lru_cache
+def quadratic_map(dimension: int) -> csr_array:
+    """Matrix ``A (d^2, k)`` with ``vec(M) = A v`` for the symmetric matrix ``M`` of a quadratic form."""
+    d, upper = dimension, np.triu_indices(dimension)
+    number = np.zeros((d, d), dtype=int)
+    number[upper] = number.T[upper] = np.arange(len(upper[0]))  # the order of `exponents`
+    value = np.where(np.eye(d, dtype=bool), 1.0, 0.5).ravel()
+    return csr_array((value, (np.arange(d * d), number.ravel())), shape=(d * d, len(upper[0])))
+
+
+def upper_triangle(A: csr_array) -> csr_array:
+    """Rows of the upper triangle, column by column, the rest of it times ``sqrt 2``: the cone's order in Clarabel."""
+    n = round(np.sqrt(A.shape[0]))
+    column, row = np.tril_indices(n)
+    return csr_array(diags_array(np.where(row == column, 1.0, np.sqrt(2))) @ A[row * n + column])
+
+
+@lru_cache
+def _maps(dimension: int) -> tuple[FloatArray, csr_array]:
+    A = gram_map(dimension)
+    return A.toarray(), upper_triangle(A)
 
 
 @lru_cache
 def quadratic_parts(dimension: int) -> tuple[FloatArray, csr_array]:
     """Map from coefficients of a quadratic form to its matrix ``(d * d, k)``, and the upper triangle of that."""
-    A = quadratic_map(exponents(dimension, 2))
+    A = quadratic_map(dimension)
     return A.toarray(), upper_triangle(A)
+
+
+def ball_coefficients(dimension: int) -> FloatArray:
+    """Coefficients ``(k,)`` of ``|y|^4``."""
+    return ball_gram(dimension)[: len(exponents(dimension, 4))]
 
 
 def ball_freedom(dimension: int) -> FloatArray:
     """Free numbers ``(f,)`` of the Gram matrix of ``|y|^4`` that make it most definite."""
-    return _maps(dimension)[2]
+    return ball_gram(dimension)[len(exponents(dimension, 4)) :]
 
 
 def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
@@ -51,46 +107,61 @@ def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
 
 
 def convex_least_squares(
-    N: FloatArray, b: FloatArray, ball: FloatArray, dimension: int, loose: bool, floor: float = MARGIN
+    N: FloatArray, b: FloatArray, dimension: int, loose: bool, floor: float = MARGIN
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients ``v (k,)`` that minimise ``v' N v / 2 - b . v`` among sos-convex quartics, and their Gram matrix.
+    """Coefficients ``v (k,)`` that minimise ``v' N v / 2 - b . v`` among sos-convex quartics; free numbers ``(f,)``.
 
-    The solver's last digits may leave an eigenvalue just below ``floor``. Then the result moves towards ``ball`` by as
+    The solver's last digits may leave an eigenvalue just below ``floor``. Then the result moves towards a ball by as
     little as brings it back to half of it: some ``1e-8`` of its length.
 
     Parameters
     ----------
     N, b
         Normal equations in coordinates in which the body is nearly the unit ball.
-    ball : (k,) array
-        Coefficients of ``|y|^4``.
     loose : bool
         Whether ``N`` leaves directions undetermined; of all solutions the one nearest to the ball is taken then.
     floor : float
         Smallest eigenvalue of the Gram matrix, below 4. The body reaches at most ``(12 / floor)^(1/4)`` far.
+
+    Raises
+    ------
+    FitError
+        If neither method solves the programme.
     """
-    k = len(b)
+    k, ball = len(b), ball_gram(dimension)
     size = np.trace(N) / k
     N, b = N / size, b / size
     if loose:
-        N, b = N + 1e-8 * np.eye(k), b + 1e-8 * ball
-    matrix, triangle, free = _maps(dimension)
-    whole = np.concatenate([ball, free])
-    H, g = np.zeros((len(whole),) * 2), np.zeros(len(whole))
+        # as little as decides what the samples do not, and far more than the solver's tolerance
+        N, b = N + 1e-8 * np.eye(k), b + 1e-8 * ball[:k]
+    H, g = np.zeros((len(ball),) * 2), np.zeros(len(ball))
     H[:k, :k], g[:k] = N, b
-    try:
-        x = least_in_cone(H, g, triangle, floor)
-    except FitError:
-        # Few samples leave Clarabel short of its tolerance. The other method stays within the cone all the way; a ball
-        # of this size has no eigenvalue below the floor.
-        low = floor / 4 * whole
-        x = low + least_quadratic(H, g - H @ low, csr_array(matrix), whole).x
-    lack = floor / 2 - float(np.linalg.eigvalsh(gram_matrix(x[:k], x[k:], dimension))[0])
+    x = _within(H, g, floor, dimension)
+    lack = floor / 2 - smallest(gram_matrix(x[:k], x[k:], dimension))
+    # a mixture of two sos-convex forms is one, and that of the ball lifts every eigenvalue
     if lack > 0:
-        most = float(np.linalg.eigvalsh(gram_matrix(ball, free, dimension))[0])
+        most = smallest(gram_matrix(ball[:k], ball[k:], dimension))
         share = lack / (most - floor / 2 + lack)
-        x = (1 - share) * x + share * whole
-    return x[:k], gram_matrix(x[:k], x[k:], dimension)
+        x = (1 - share) * x + share * ball
+    return x[:k], x[k:]
+
+
+def _within(H: FloatArray, g: FloatArray, floor: float, dimension: int) -> FloatArray:
+    """Minimiser of the programme for all unknowns, by the method that suits their number."""
+    matrix, triangle = _maps(dimension)
+    if dimension <= SMALL:
+        try:
+            return least_in_cone(H, g, triangle, floor)
+        except FitError:
+            pass  # few samples leave Clarabel short of its tolerance
+    ball = ball_gram(dimension)
+    low = floor / 4 * ball  # a ball of this size has no eigenvalue below the floor
+    return low + least_quadratic(H, g - H @ low, csr_array(matrix), ball).x
+
+
+def smallest(matrix: FloatArray) -> float:
+    """Smallest eigenvalue of a symmetric matrix."""
+    return float(np.linalg.eigvalsh(matrix)[0])
 
 
 def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: float) -> FloatArray:
@@ -103,7 +174,7 @@ def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: floa
     b : (n,) array
         Slope at zero with opposite sign.
     triangle : (s (s + 1) / 2, n) sparse array
-        Upper triangle of the matrix as `lsfit.gram.upper_triangle` orders it.
+        Upper triangle of the matrix as `upper_triangle` orders it.
     floor : float
         Smallest eigenvalue allowed.
 
@@ -112,21 +183,155 @@ def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: floa
     FitError
         If the programme is not solved.
     """
-    size = round((np.sqrt(8 * triangle.shape[0] + 1) - 1) / 2)
+    size = side(triangle)
     column, row = np.tril_indices(size)
     right = np.where(row == column, -floor, 0.0)
-    x, found = _solve(csc_array(np.triu(N)), -b, csc_array(-triangle), right, size)
-    if found.status != clarabel.SolverStatus.Solved:
-        raise FitError(
-            f"Clarabel stopped with {found.status} after {found.iterations} iterations on {len(b)} unknowns: look at "
-            "the samples for outliers and components of very different size"
-        )
-    return x
+    return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)])[0]
 
 
-def _solve(P, q, A, right, size):
+def side(triangle: csr_array) -> int:
+    """Number of rows of the matrix whose upper triangle this is."""
+    return round((np.sqrt(8 * triangle.shape[0] + 1) - 1) / 2)
+
+
+def conic_solution(
+    P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list, enough: float = 0.0
+) -> tuple[FloatArray, float]:
+    """Minimiser of ``x' P x / 2 + q . x`` with ``b - A x`` in the cones, and its value, by Clarabel.
+
+    Raises
+    ------
+    FitError
+        If Clarabel's own tolerance is not reached, nor a gap and residuals of ``enough``.
+    """
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.max_threads = 1
-    found = clarabel.DefaultSolver(P, q, A, right, [clarabel.PSDTriangleConeT(size)], settings).solve()
-    return np.array(found.x), found
+    settings.max_threads = 1  # the ranks of a run share the cores
+    answer = clarabel.DefaultSolver(P, q, csc_array(A), b, cones, settings).solve()
+    short = max(answer.r_prim, answer.r_dual, abs(answer.obj_val - answer.obj_val_dual) / (1 + abs(answer.obj_val)))
+    almost = answer.status == clarabel.SolverStatus.AlmostSolved and short < enough
+    if not (answer.status == clarabel.SolverStatus.Solved or almost):
+        raise FitError(
+            f"Clarabel stopped with {answer.status} and errors of {short:.1e} after {answer.iterations} iterations on "
+            f"{len(q)} unknowns: look at the samples for outliers and components of very different size"
+        )
+    return np.array(answer.x), float(answer.obj_val)
+
+
+class Optimum(NamedTuple):
+    """Minimiser with what proves it.
+
+    ``X`` is positive definite and equals the matrix of ``x`` up to rounding; ``gap = X . Z`` bounds how far the
+    objective is from the smallest, up to the ``residual`` of the dual equation relative to its terms.
+    """
+
+    x: FloatArray
+    X: FloatArray
+    objective: float
+    gap: float
+    residual: float
+    iterations: int
+
+
+def least_quadratic(
+    H: FloatArray,
+    g: FloatArray,
+    A: csr_array,
+    x: FloatArray,
+    tolerance: float = 1e-9,
+    enough: float = 1e-5,
+    most: int = 60,
+) -> Optimum:
+    """Minimiser of ``x' H x / 2 - g' x`` among the ``x`` whose matrix ``X = mat(A x)`` is positive semidefinite.
+
+    Primal-dual steps with Mehrotra's predictor and corrector in the direction of Helmberg, Rendl, Vanderbei and
+    Wolkowicz (HKM). Every iterate satisfies the inequality strictly.
+
+    Parameters
+    ----------
+    H : (n, n) array
+        Positive semidefinite.
+    g : (n,) array
+        Slope at zero with opposite sign.
+    A : (s * s, n) sparse array
+        Columns are symmetric matrices.
+    x : (n,) array
+        Start with a positive definite matrix.
+    tolerance : float
+        Gap and dual residual to reach, as shares of ``1 + |objective|`` and ``1 + max |g|``.
+    enough : float
+        The same, accepted where rounding ends the steps before that; the optimum states what was reached.
+    most : int
+        Largest number of steps.
+
+    Raises
+    ------
+    FitError
+        If the steps end before that.
+    """
+    X = _matrix(A, x)
+    Z = np.eye(len(X)) * max(1.0, float(np.abs(g).max())) / len(X)
+    AT = A.T.tocsr()
+    for step in range(most):
+        slope = H @ x - g - AT @ Z.ravel()
+        objective, gap = float(x @ (H @ x) / 2 - g @ x), float((X * Z).sum())
+        residual = float(np.abs(slope).max() / (1 + np.abs(g).max()))
+        worst = max(gap / (1 + abs(objective)), residual)
+        best = Optimum(x, X, objective, gap, residual, step)
+        if worst <= tolerance:
+            return best
+        try:
+            dx, dX, dZ = _direction(H, A, AT, X, Z, slope)
+            # steps stop short of the boundary, where the inverse in the next direction would lose its digits
+            # One length for both: the quadratic couples the residual of the dual equation to the step of x.
+            length = min(1.0, 0.95 * min(_reach(X, dX), _reach(Z, dZ)))
+        except np.linalg.LinAlgError:
+            break
+        x, Z = x + length * dx, Z + length * dZ
+        X = _matrix(A, x)
+    if worst <= enough:
+        return best
+    raise FitError(
+        f"the search ended after {step + 1} steps with gap {gap:.1e} and dual residual {residual:.1e}: scale the data "
+        f"to about one, whiten them, or add a ridge"
+    )
+
+
+def _direction(
+    H: FloatArray, A: csr_array, AT: csr_array, X: FloatArray, Z: FloatArray, slope: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Step ``(dx, dX, dZ)`` with the centring that the plain Newton step suggests."""
+    n = len(X)
+    inverse = cho_solve(cho_factor(X), np.eye(n))
+    M = AT @ (AT @ np.kron(inverse, Z)).T
+    factor = cho_factor(H + (M + M.T) / 2)
+    mu = (X * Z).sum() / n
+
+    def newton(R: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        dx = cho_solve(factor, AT @ R.ravel() - slope)
+        dX = _matrix(A, dx)
+        return dx, dX, R - _symmetric(inverse @ dX @ Z)
+
+    _, dX, dZ = newton(-Z)
+    length = min(1.0, _reach(X, dX), _reach(Z, dZ))
+    ahead = ((X + length * dX) * (Z + length * dZ)).sum() / n
+    # Mehrotra: the better the plain step, the less the iterate has to be centred
+    centring = max(1e-6, (ahead / mu) ** 3) * mu
+    return newton(centring * inverse - Z - _symmetric(inverse @ dX @ dZ))
+
+
+def _matrix(A: csr_array, x: FloatArray) -> FloatArray:
+    n = round(np.sqrt(A.shape[0]))
+    return (A @ x).reshape(n, n)
+
+
+def _symmetric(M: FloatArray) -> FloatArray:
+    return (M + M.T) / 2
+
+
+def _reach(X: FloatArray, dX: FloatArray) -> float:
+    """Largest length of a step along ``dX`` that keeps ``X`` positive semidefinite."""
+    L = np.linalg.cholesky(X)
+    M = solve_triangular(L, solve_triangular(L, dX, lower=True).T, lower=True)
+    smallest = float(np.linalg.eigvalsh(_symmetric(M))[0])
+    return np.inf if smallest >= 0 else -1 / smallest

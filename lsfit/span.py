@@ -1,4 +1,10 @@
-"""Coordinates in which limit surfaces are fitted: within the span of the samples, with all axes of a like length."""
+"""Fits within the span of the samples, with axes of a like length: limit surfaces of all six wrench components.
+
+The friction of a patch moves all six components of the wrench ``[f, tau]`` when its motions are all six of ``[v,
+omega]``; the moments are taken about the origin of the contact frame, by ``l = r - O``. Everything here works in any
+number of dimensions: a plane patch has rank 3 among the six components, a cylinder or a cap 6. In six dimensions the
+quartic of least squares is not convex for usual patches; the convex one takes a fifth of a second.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +13,18 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
 
-from softjaw.lsfit.flag import FitError, FitFlag
+from softjaw.lsfit.ellipsoid import FAR, TiltedEllipsoid, full_ellipsoid
+from softjaw.lsfit.fit_error import FitErrors, fit_error
 from softjaw.lsfit.lowest import lies_above, smallest_value
-from softjaw.lsfit.quartic_surface import Quartic
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.quartic_fit import Certificate, convex_quartic
 from softjaw.lsfit.samples import FLAT, THIN
-from softjaw.lsfit.surface import Image, LimitSurface
-from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.surface import FitError, FitFlag, Image
 
 FloatArray = NDArray[np.float64]
 Scaling = Literal["maxima", "whitened", "none"]
-
-FAR = 10.0
-"""Reach of a surface beyond its farthest sample from which it counts as endless."""
+Fitted = TiltedEllipsoid | Quartic | Image
 
 
 class CollapsedFitError(FitError):
@@ -68,18 +72,21 @@ def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolera
     ValueError
         If shapes differ, a value is not finite, all wrenches are zero, or the scaling has an unknown name.
     """
-    W, T = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
+    wrenches, motions = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
     if scaling not in get_args(Scaling):
         raise ValueError(f"scaling is {scaling!r}: choose one of {', '.join(get_args(Scaling))}")
-    if W.shape != T.shape or not (np.isfinite(W).all() and np.isfinite(T).all()):
-        raise ValueError(f"wrenches {W.shape} and motions {T.shape} must be finite and of one shape (m, d)")
-    largest = np.abs(W).max(axis=0, initial=0.0)
+    if wrenches.shape != motions.shape or not (np.isfinite(wrenches).all() and np.isfinite(motions).all()):
+        raise ValueError(
+            f"wrenches {wrenches.shape} and motions {motions.shape} must be finite and of one shape (m, d)"
+        )
+    largest = np.abs(wrenches).max(axis=0, initial=0.0)
     if not largest.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    B, flag = _map(W, largest, scaling, tolerance)
+    B, flag = _map(wrenches, largest, scaling, tolerance)
+    # a motion that meets no friction has a wrench of rounding, whose direction means nothing
     used = largest > tolerance * largest.max()
-    moving = (np.abs(W[:, used]) > tolerance * largest[used]).any(axis=1)
-    Y, slip = W[moving] @ np.linalg.pinv(B).T, T[moving] @ B
+    moving = (np.abs(wrenches[:, used]) > tolerance * largest[used]).any(axis=1)
+    Y, slip = wrenches[moving] @ np.linalg.pinv(B).T, motions[moving] @ B
     return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B, flag)
 
 
@@ -93,6 +100,7 @@ def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float)
     flag = FitFlag.RANK_DEFICIENT if r < W.shape[1] else FitFlag.CLEAN
     flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
     B = np.zeros((W.shape[1], r))
+    # a diagonal map keeps the surface a quartic of the components, which files and look-ups can hold
     if r == len(used) and scaling != "whitened":
         B[used] = np.diag(scale if scaling == "maxima" else np.ones(r))
         return B, flag
@@ -104,12 +112,63 @@ def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float)
     return B * (values[:r] / np.sqrt(len(W))), flag
 
 
-def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
+class SpanFit(NamedTuple):
+    """A fitted surface in the coordinates of the wrenches, and its errors in the scaled ones.
+
+    ``rank`` is the dimension of the samples' span. Below that of the wrenches the surface is flat and flagged, its
+    support along the missing directions is 0. ``errors`` compare directions in the coordinates of the fit, where the
+    axes have a like length; in the others a soft axis decides every angle. ``certificate`` is for convex quartics.
+    """
+
+    surface: Fitted
+    errors: FitErrors
+    rank: int
+    certificate: Certificate | None = None
+
+
+def span_ellipsoid(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima") -> SpanFit:
+    """Ellipsoid of least squares ``min sum (w' A w - 1)^2``, 21 coefficients in six dimensions.
+
+    The scaling has a part in the errors only; where samples leave the ellipsoid open, see `full_ellipsoid`.
+    """
+    samples = span_samples(W, T, scaling)
+    surface = full_ellipsoid(samples.Y)
+    return SpanFit(placed(surface, samples), fit_error(surface, samples.Y, samples.T), samples.rank)
+
+
+def convex_span_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01, scaling: Scaling = "maxima") -> SpanFit:
+    """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)`` in the scaled coordinates.
+
+    Parameters
+    ----------
+    W, T : (m, d) array
+        Normalised wrenches and unit motions [-]; at least 1000 for six dimensions, as 126 coefficients follow the
+        noise of few.
+    gamma : float
+        Weight of the motions. Gradients grow with the surface's smallness, so a weight of 1 shifts it outwards by some
+        percent in six dimensions; 0.01 gives the same directions without that.
+    scaling : str
+        Coordinates of the fit, see `span_samples`.
+
+    Raises
+    ------
+    FitError
+        If the solver does not converge, or the Gram matrix proves nothing.
+    """
+    samples = span_samples(W, T, scaling)
+    surface, certificate, _ = convex_quartic(samples.Y, samples.T, gamma=gamma)
+    errors = fit_error(surface, samples.Y, samples.T)
+    return SpanFit(placed(surface, samples), errors, samples.rank, certificate)
+
+
+def placed(surface: Fitted, samples: SpanSamples) -> Fitted:
     """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
     d, r = samples.B.shape
     flag = surface.flag | samples.flag
     if isinstance(surface, TiltedEllipsoid):
         return TiltedEllipsoid.of_ball(samples.B @ surface.F, flag)
+    if isinstance(surface, Image):
+        return Image(surface.inner, samples.B @ surface.B, flag)
     if r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
         return replace(surface.scaled(np.diag(samples.B)), flag=flag)
     return Image(surface, samples.B, flag)
@@ -124,31 +183,23 @@ def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
             f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
             f"{len(Y)} samples; lower lam, raise beta, or give more samples"
         )
-    least = (FAR * np.linalg.norm(Y, axis=1).max()) ** -surface.degree
-    if isinstance(surface, Quartic):
-        if lies_above(surface.coefficients, surface.dimension, least):
-            return
-        P, u = smallest_value(surface.coefficients, surface.dimension)
-    else:
-        values, V = np.linalg.eigh(surface.A)
-        P, u = float(values[0]), V[:, 0]
+    if isinstance(surface, TiltedEllipsoid):
+        return  # `refuse_endless` was asked before its matrix made an ellipsoid
+    if not lies_above(surface.coefficients, surface.dimension, _least(Y, 4)):
+        refuse_endless(*smallest_value(surface.coefficients, surface.dimension), Y, 4)
+
+
+def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
+    """Raise `CollapsedFitError` if a surface reaches too far beyond the samples, by its least value ``P`` at ``u``."""
+    least = _least(Y, degree)
     if P < least:
-        reach = FAR * (least / max(P, 1e-300)) ** (1 / surface.degree)
+        reach = FAR * (least / max(P, 1e-300)) ** (1 / degree)
         raise CollapsedFitError(
             f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "
-            "coordinates), where no sample holds it: sample more motions, or spread them over all directions"
+            "coordinates), where no sample holds it: sample more motions, lower lam, or raise beta"
         )
 
 
-def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
-    """Unit motions spread evenly over the sphere, ``(count, dimension)``, the same in every run.
-
-    The additive recurrence by powers of the generalised golden ratio fills the unit cube evenly; the normal quantile
-    of each number makes it evenly spread over directions.
-    """
-    root = 2.0
-    for _ in range(60):
-        root = (1 + root) ** (1 / (dimension + 1))
-    u = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, dimension + 1))) % 1
-    x = ndtri(u)
-    return x / np.linalg.norm(x, axis=1, keepdims=True)
+def _least(Y: FloatArray, degree: int) -> float:
+    """Value on the unit sphere of a surface that reaches `FAR` times as far as the samples."""
+    return float((FAR * np.linalg.norm(Y, axis=1).max()) ** -degree)

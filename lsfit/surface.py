@@ -1,75 +1,115 @@
-"""What every limit surface offers, and surfaces placed by a linear map: flat ones among them."""
+"""What every limit surface offers, surfaces placed by a linear map, and what can be wrong with a fit."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from enum import IntFlag
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.lsfit.flag import FitError, FitFlag
-from softjaw.lsfit.geometry import supported_shadow
-
-__all__ = ["FitError", "FitFlag", "Image", "LevelSet", "LimitSurface"]
-
 FloatArray = NDArray[np.float64]
+
+
+class FitError(ArithmeticError):
+    """A fit, or a measure of a fitted body, that could not be completed."""
+
+
+class OpenBodyError(FitError):
+    """A level set that is not closed: it has no volume, and no support in some direction."""
+
+
+class UndecidedError(FitError):
+    """A question that rounding would answer: the value that decides is too small to be told from zero."""
+
+
+class FitFlag(IntFlag):
+    """What the reader of a fitted limit surface should know; flags add up."""
+
+    CLEAN = 0
+    RANK_DEFICIENT = 1  # the samples lie in a subspace: the body is flat and carries no load out of it
+    UNDERDETERMINED = 2  # fewer independent data than coefficients: of equally good fits the nearest to an ellipsoid
+    BOUNDED = 4  # the data alone would give an endless body: its reach was limited to a multiple of the data's
+    THIN = 8  # the samples are a thousand times shorter along one direction: rho does not suit the contact
+
+
 ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface itself
 OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the body does not carry it
 
 
-class LimitSurface(Protocol):
+class LimitSurface:
     """Level set ``P(w) = 1`` of a positive homogeneous function, symmetric about the origin, in ``d`` dimensions."""
 
-    @property
-    def flag(self) -> FitFlag:
-        """What the reader of a fit should know."""
+    flag: FitFlag
 
     @property
     def degree(self) -> int:
         """Degree of ``P``."""
+        raise NotImplementedError
 
     @property
     def dimension(self) -> int:
         """Number of components ``d`` of a wrench."""
+        raise NotImplementedError
+
+    @property
+    def span(self) -> FloatArray:
+        """Orthonormal directions ``(d, rank)`` in which the body extends; all of them unless it is flat."""
+        return np.eye(self.dimension)
 
     @property
     def rank(self) -> int:
         """Dimension of the body; less than `dimension` if it is flat."""
-
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends."""
+        return self.span.shape[1]
 
     @property
     def volume(self) -> float:
         """Volume of the body; 0 if it is flat."""
+        raise NotImplementedError
 
     @property
     def shadow_area(self) -> float:
         """Area of the body's shadow on the plane of the first two components."""
+        raise NotImplementedError
 
-    @property
+    @cached_property
     def semi_axes(self) -> FloatArray:
         """Largest reach ``(d,)`` along each component."""
+        return self.support(np.eye(self.dimension))
 
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
+        raise NotImplementedError
 
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P``, the direction of motion, ``(m, d) -> (m, d)``; within the span of a flat body."""
+        raise NotImplementedError
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
+        raise NotImplementedError
+
+    def scaled(self, factors: ArrayLike) -> LimitSurface:
+        """Image of the body under ``w -> factors * w``, for other units, ``(d,)``, factors not zero."""
+        raise NotImplementedError
 
     def radius(self, u: ArrayLike) -> FloatArray:
         """Factor that brings ``u`` onto the surface, ``P(u)^(-1 / degree)``, ``(m, d) -> (m,)``."""
+        with np.errstate(divide="ignore"):
+            return self.value(u) ** (-1 / self.degree)
 
     def holds(self, w: ArrayLike) -> NDArray[np.bool_]:
         """Whether wrenches lie in the body, surface included, ``(m, d) -> (m,)``."""
+        return self.value(w) <= 1 + self.degree * ON_THE_SURFACE
 
-    def scaled(self, factors: ArrayLike) -> LimitSurface:
-        """Image of the body under ``w -> factors * w``, for other units, ``(d,)``."""
+
+def mapped_value(P: FloatArray, Y: FloatArray, B: FloatArray, W: FloatArray) -> FloatArray:
+    """Values ``P (m,)`` at ``y``, made infinite where ``w`` is not ``B y``: across a flat body."""
+    if B.shape[1] < B.shape[0]:
+        P[np.linalg.norm(W - Y @ B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
+    return P
 
 
 def rows(w: ArrayLike, dimension: int) -> FloatArray:
@@ -88,32 +128,32 @@ def checked_factors(factors: ArrayLike, dimension: int) -> FloatArray:
     return f
 
 
-class LevelSet:
-    """What follows from ``value``, ``support`` and ``degree`` alike for every surface."""
+def shadow_area(support: FloatArray) -> float:
+    """Area of a plane convex body from its support function, ``1/2 int (h^2 - h'^2) dphi``.
 
-    degree: int
-    dimension: int
+    Parameters
+    ----------
+    support : (k,) array
+        ``h`` at ``k`` equal steps of the full turn. For the shadow on the plane of the forces these are the supports of
+        the translations ``(cos phi, sin phi, 0)``.
+    """
+    h = np.asarray(support, float)
+    c = np.fft.rfft(h) / len(h)
+    order = np.arange(len(c))
+    twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
+    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
 
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``."""
-        raise NotImplementedError
 
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
-        raise NotImplementedError
-
-    def radius(self, u: ArrayLike) -> FloatArray:
-        """Factor that brings ``u`` onto the surface, ``P(u)^(-1 / degree)``, ``(m, d) -> (m,)``."""
-        with np.errstate(divide="ignore"):
-            return self.value(u) ** (-1 / self.degree)
-
-    def holds(self, w: ArrayLike) -> NDArray[np.bool_]:
-        """Whether wrenches lie in the body, surface included, ``(m, d) -> (m,)``."""
-        return self.value(w) <= 1 + self.degree * ON_THE_SURFACE
+def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int, n: int = 1024) -> float:
+    """`shadow_area` on the first two components of a body in ``d`` dimensions with this support function."""
+    t = np.zeros((n, dimension))
+    phi = 2 * np.pi * np.arange(n) / n
+    t[:, 0], t[:, 1] = np.cos(phi), np.sin(phi)
+    return shadow_area(support(t))
 
 
 @dataclass(frozen=True, eq=False)
-class Image(LevelSet):
+class Image(LimitSurface):
     """The surface ``{B y : P(y) = 1}`` of another one; flat if ``B`` has fewer columns than rows.
 
     Parameters
@@ -135,35 +175,26 @@ class Image(LevelSet):
         B = np.array(self.B, float)
         if B.ndim != 2 or B.shape[1] != self.inner.dimension or not np.isfinite(B).all():
             raise ValueError(f"B has shape {B.shape}: expected finite numbers (d, {self.inner.dimension})")
+        # columns of one size first: a thin body is thin, not flat
         if np.linalg.matrix_rank(B / np.abs(B).max(axis=0), 1e-13) < B.shape[1]:
             raise ValueError("the columns of B depend on each other: give a map onto the body's own span")
         B.flags.writeable = False
         object.__setattr__(self, "B", B)
 
     @property
-    def degree(self) -> int:  # type: ignore[override]
+    def degree(self) -> int:
         """Degree of ``P``."""
         return self.inner.degree
 
     @property
-    def dimension(self) -> int:  # type: ignore[override]
+    def dimension(self) -> int:
         """Number of components of a wrench."""
         return len(self.B)
-
-    @property
-    def rank(self) -> int:
-        """Dimension of the body."""
-        return self.B.shape[1]
 
     @property
     def span(self) -> FloatArray:
         """Orthonormal directions ``(d, rank)`` in which the body extends."""
         return np.linalg.qr(self.B)[0]
-
-    @property
-    def semi_axes(self) -> FloatArray:
-        """Largest reach ``(d,)`` along each component."""
-        return self.support(np.eye(self.dimension))
 
     @property
     def volume(self) -> float:
@@ -183,10 +214,7 @@ class Image(LevelSet):
         """``P(w)``, ``(m, d) -> (m,)``; infinite where the body does not extend."""
         W = rows(w, self.dimension)
         Y = self._inner(W)
-        P = self.inner.value(Y)
-        if self.rank < self.dimension:
-            P[np.linalg.norm(W - Y @ self.B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
-        return P
+        return mapped_value(self.inner.value(Y), Y, self.B, W)
 
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P`` within the span, ``(m, d) -> (m, d)``."""

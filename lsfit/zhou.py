@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 
-from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.ellipsoid import TiltedEllipsoid
 from softjaw.lsfit.form import exponents, monomial_gradients, monomials
-from softjaw.lsfit.gram import gram_map, quadratic_map, upper_triangle
-from softjaw.lsfit.quartic_surface import Quartic
-from softjaw.lsfit.span import FAR, CollapsedFitError, Scaling, SpanSamples, placed, refuse_runaway, span_samples
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
+from softjaw.lsfit.span import Scaling, SpanSamples, placed, refuse_endless, refuse_runaway, span_samples
 from softjaw.lsfit.surface import LimitSurface
-from softjaw.lsfit.tilted import TiltedEllipsoid
 
 FloatArray = NDArray[np.float64]
 
@@ -92,9 +91,9 @@ def zhou_quartic(
         If the solver fails.
     """
     samples = span_samples(W, T, scaling)
-    E = exponents(samples.rank, 4)
-    M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, E)
-    v, rates, objective = _solve(samples, M, G, gram_map(E), np.ones(len(E)), weights, s_min)
+    r, E = samples.rank, exponents(samples.rank, 4)
+    M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, r, 4)
+    v, rates, objective = _solve(samples, M, G, gram_map(r), np.ones(len(E)), weights, s_min)
     return _fit(Quartic(v, E), objective, rates, samples)
 
 
@@ -107,22 +106,18 @@ def zhou_ellipsoid(
 ) -> ZhouFit:
     """Ellipsoid of any orientation with the least objective; parameters and errors of `zhou_quartic`."""
     samples = span_samples(W, T, scaling)
-    E = exponents(samples.rank, 2)
-    M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, E) / 2
-    A = quadratic_map(E)
+    r = samples.rank
+    M, G = monomials(samples.Y, exponents(r, 2)), monomial_gradients(samples.Y, r, 2) / 2
+    A = quadratic_map(r)
     # The length of v is to be the Frobenius norm of A, which holds every mixed coefficient twice, halved.
     v, rates, objective = _solve(samples, M, G, A, np.sqrt((A.toarray() ** 2).sum(axis=0)), weights, s_min)
-    matrix = (A @ v).reshape(samples.rank, samples.rank)
-    smallest = float(np.linalg.eigvalsh(matrix)[0])
-    if smallest * (FAR * np.linalg.norm(samples.Y, axis=1).max()) ** 2 < 1:
-        raise CollapsedFitError(
-            f"the smallest eigenvalue of A is {smallest:.1e} (scaled coordinates): the ellipsoid reaches more than "
-            f"{FAR:.0f} times as far as the samples; sample more motions, lower lam, or raise beta"
-        )
+    matrix = (A @ v).reshape(r, r)
+    values, V = np.linalg.eigh(matrix)
+    refuse_endless(float(values[0]), V[:, 0], samples.Y, 2)
     return _fit(TiltedEllipsoid(matrix), objective, rates, samples)
 
 
-def _fit(surface: LimitSurface, objective: float, rates: FloatArray, samples: SpanSamples) -> ZhouFit:
+def _fit(surface: Quartic | TiltedEllipsoid, objective: float, rates: FloatArray, samples: SpanSamples) -> ZhouFit:
     refuse_runaway(surface, samples.Y)
     return ZhouFit(placed(surface, samples), objective, rates, samples.rank)
 
@@ -160,35 +155,23 @@ def _solve(
         ],
         format="csr",
     )
+    # rows come component by component; a cone of second order needs those of one sample side by side
     order = np.arange(rows.shape[0])
     cones_of_slip = slice(3 * m, (4 + d) * m)
     order[cones_of_slip] = order[cones_of_slip].reshape(d + 1, m).T.ravel()
     b = np.zeros(len(order))
     b[: 3 * m] = np.repeat([1.0, -1.0, -s_min], m)
     slope = np.repeat([0.0, weights.beta, weights.gamma, weights.lam], [k + f + m, m, m, 1])
-    x, objective = _clarabel(slope, csc_array(rows[order]), b, _cones(m, d, k, S.shape[0]))
+    # nearly collapsed fits stop a few times short of Clarabel's own tolerance, 1e-8; what they reached decides
+    none_squared = csc_array((len(slope),) * 2)
+    x, objective = conic_solution(none_squared, slope, rows[order], b, _cones(m, d, k, side(S)), ENOUGH)
     return x[:k], x[k + f : k + f + m], objective
 
 
-def _cones(m: int, d: int, k: int, triangle: int) -> list:
+def _cones(m: int, d: int, k: int, size: int) -> list:
     return [
         clarabel.NonnegativeConeT(3 * m),
         *[clarabel.SecondOrderConeT(d + 1)] * m,
         clarabel.SecondOrderConeT(k + 1),
-        clarabel.PSDTriangleConeT((round(np.sqrt(8 * triangle + 1)) - 1) // 2),
+        clarabel.PSDTriangleConeT(size),
     ]
-
-
-def _clarabel(q: FloatArray, A: csc_array, b: FloatArray, cones: list) -> tuple[FloatArray, float]:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    answer = clarabel.DefaultSolver(csc_array((len(q), len(q))), q, A, b, cones, settings).solve()
-    # Nearly collapsed fits stop a few times short of Clarabel's own tolerance, 1e-8; what they reached decides.
-    short = max(answer.r_prim, answer.r_dual, abs(answer.obj_val - answer.obj_val_dual) / (1 + abs(answer.obj_val)))
-    if answer.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved) or not short < ENOUGH:
-        raise FitError(
-            f"Clarabel ended with {answer.status} and errors of {short:.1e} after {answer.iterations} iterations: "
-            "scale the samples to about one, or use a fit of least squares"
-        )
-    return np.array(answer.x), float(answer.obj_val)

@@ -5,114 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.polytope import polytope_volume
+from softjaw.scoring.bodies import Body
 
 FloatArray = NDArray[np.float64]
-
-
-class Body(Protocol):
-    """Limit surface in ``(f_x, f_y, tau_z)`` per unit normal force, with 0 inside or on it.
-
-    A body that has ``vertices (k, 3)`` counts as their hull, one of ``degree`` 2 as an ellipsoid about 0.
-    """
-
-    @property
-    def volume(self) -> float:
-        """Volume."""
-
-    @property
-    def shadow_area(self) -> float:
-        """Area of the shadow on the first two coordinates."""
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
-
-
-@dataclass(frozen=True, eq=False)
-class EllipsoidBody:
-    """Axis-aligned ellipsoid; an axis along which nothing is carried has length 0.
-
-    Parameters
-    ----------
-    semi_axes : (3,) array
-        ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m].
-
-    Examples
-    --------
-    >>> EllipsoidBody([1.0, 2.0, 0.0]).support([[0, 1, 0], [0, 0, 1]]).tolist()
-    [2.0, 0.0]
-    """
-
-    semi_axes: FloatArray
-    degree = 2
-
-    def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        axes = _vector("semi_axes", self.semi_axes)
-        if (axes < 0).any():
-            raise ValueError(
-                f"semi_axes is {axes.tolist()}: no semi-axis can be negative; take 0 where none is carried"
-            )
-        object.__setattr__(self, "semi_axes", axes)
-
-    @property
-    def volume(self) -> float:
-        """Volume ``4/3 pi f_x f_y tau_z``."""
-        return 4 / 3 * math.pi * float(self.semi_axes.prod())
-
-    @property
-    def shadow_area(self) -> float:
-        """Area ``pi f_x f_y`` of the shadow on the plane of the forces."""
-        return math.pi * float(self.semi_axes[0] * self.semi_axes[1])
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
-        return np.linalg.norm(np.atleast_2d(np.asarray(t, float)) * self.semi_axes, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class PolytopeBody:
-    """Hull of wrenches, such as samples of a limit surface or the vertices of a linearised one.
-
-    Parameters
-    ----------
-    vertices : (k, 3) array
-        ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; 0 must not lie outside.
-    """
-
-    vertices: FloatArray
-
-    def __post_init__(self) -> None:
-        """Refuse what is no set of wrenches."""
-        points = np.array(self.vertices, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
-            raise ValueError(f"vertices has shape {points.shape}: expected finite wrenches, (k, 3)")
-        points.flags.writeable = False
-        object.__setattr__(self, "vertices", points)
-
-    @cached_property
-    def _sizes(self) -> tuple[float, float]:
-        return polytope_volume(self.vertices)
-
-    @property
-    def volume(self) -> float:
-        """Volume of the hull."""
-        return self._sizes[0]
-
-    @property
-    def shadow_area(self) -> float:
-        """Area of the hull's shadow on the plane of the forces."""
-        return self._sizes[1]
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
-        return (np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).max(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +38,7 @@ class SoftContact:
         axes = np.array(self.axes, dtype=float)
         if axes.shape != (3, 3) or not np.isfinite(axes).all():
             raise ValueError(f"axes has shape {axes.shape}: expected three rows x, y, N of finite numbers")
+        # a left-handed frame would turn the torque about the normal round
         if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0:
             raise ValueError(
                 f"axes is {axes.tolist()}: rows x, y, N must be perpendicular unit vectors with x cross y = N; "
@@ -176,11 +76,6 @@ class SoftContact:
             C[:3, column], C[3:, column] = force, np.cross(arm, force)
         C[3:, 3] = N / contact_length
         return C
-
-    def cone_support(self, C: FloatArray, u: ArrayLike) -> FloatArray:
-        """Largest ``u . w`` of the wrenches for normal forces in [0, 1], ``(m, 6) -> (m,)``; ``C`` is a wrench map."""
-        felt = np.atleast_2d(np.asarray(u, float)) @ C
-        return np.maximum(0.0, felt[:, 0] + self.body.support(felt[:, 1:]))
 
 
 def contact_axes(N: ArrayLike, hint: ArrayLike) -> FloatArray:

@@ -1,61 +1,323 @@
-"""Epsilon quality: the weakest wrench that breaks a grasp of two antipodal soft contacts, in closed form.
+"""Epsilon quality of any soft contacts in any pose: the weakest wrench that breaks the grasp, between two bounds.
 
-Both limit surfaces are ellipsoids with parallel axes and the centre of mass lies on the line of the contacts.
+Epsilon is the least support of the grasp wrench space over unit wrenches, a problem with many local minima. The upper
+bound is the support for the weakest wrench found: from the directions the proof points to, or from many if those leave
+a gap, the reach along ``u`` gives the facet it meets (`scoring.gauge`), whose own direction is weaker still, until
+nothing changes. The lower bound is a proof that a ball fits, by a semidefinite programme; for two contacts it has
+always met the upper bound so far. Where 0 is not an inner point epsilon is 0, exactly. That is decided by a convex
+programme: either some wrench ``u`` has ``c_i . u + |D_i u| < 0`` for all contacts, or the contacts do not span all
+wrenches.
 
-Derivation. Epsilon is the least support of the grasp wrench space over unit wrenches ``u``. Let ``n_i(u)`` be the
-support of contact ``i``'s limit surface for the part of ``u`` that is no force along the line, a unit vector of R^5.
-Minimising over the force along the line leaves
+The proof. The ball of radius ``r`` fits if ``sum_i s_i >= r |u|`` wherever ``s_i >= 0`` and ``l_i = (s_i - c_i . u,
+D_i u)`` lies in the Lorentz cone. With ``v = (u, s)`` this holds if
 
-    L-infinity:  F = (n_1 + n_2) / sqrt(1 + max(n_1, n_2)^2),     L1:  F = (n_1 + n_2) / sqrt(4 + (n_1 - n_2)^2),
+    (sum_i s_i)^2 - r^2 |u|^2 = p(v) + non-negative multiples of products that are non-negative there,
 
-or 1 if that is smaller. The squares ``(n_1^2, n_2^2)`` are two quadratic forms on a sphere, so they fill a convex set
-(Brickman's theorem). Where F <= 1 its upper level sets in that plane are convex too, because ``F >= c`` says that a
-concave function is not negative: F is least at an extreme point. The forms fall apart into the torque about the line,
-which gives the point ``(t_1^2, t_2^2)``, and two planes (force across, torque it makes). On the unit circle of a plane
-``n_i`` is a multiple of ``abs(cos(phi - phi_i))``, and between neighbouring zeros of ``n_1`` and ``n_2`` F is least at
-one of them: there ``F >= c`` is the sign of a concave function of ``phi`` for L-infinity, and for L1 that of a sinusoid
-with its trough outside. So only those zeros remain: a wrench that one contact cannot feel and the other bears alone.
+with a positive semidefinite form ``p``. The products are ``s_i s_j``, the Lorentz square of ``l_i``, ``s_i (a . l_j)``
+with ``a`` in the Lorentz cone, and ``l_i^T Z l_j`` with a matrix ``Z`` that is positive on pairs of Lorentz vectors.
+A Lorentz vector of four is a Hermitian 2 x 2 matrix without negative eigenvalues, and forms positive on pairs of those
+are sums of a positive 4 x 4 matrix and the partial transpose of another (E. Stoermer 1963, S. L. Woronowicz 1976), so
+these ``Z`` are known completely. The largest ``r^2`` is found by Newton's method along a logarithmic barrier; every
+point inside proves its own ``r``. The inverse of ``p`` tends to the moments of the weakest wrenches ``v``. Where the
+proof leaves a gap the wrenches are split by a plane ``g . v = 0`` between those the moments mix up; on its sides
+``g s_i``, ``g (a . l_i)`` and the products of several such forms are further products that are not negative.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softjaw.scoring.bodies import Body, ellipsoid_inside, is_ellipsoid, joined
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.gauge import cone_programme, contact_support, gauge
+from softjaw.scoring.reach import reach
+
+FloatArray = NDArray[np.float64]
 
 
-def epsilon_linf(contact1: Sequence[float], contact2: Sequence[float], arm1: float, arm2: float) -> float:
-    """Radius of the largest ball around 0 in the L-infinity grasp wrench space [-].
+_SMALLEST = 1e-9  # relative to the largest wrench of a contact: what counts as no wrench
+_ABSOLUTE = 1e-6
+_ROUNDS, _STARTS, _SPLITS = 12, 40, 16
+
+
+class EpsilonBound(NamedTuple):
+    """Epsilon lies between ``lower`` and ``upper``; ``wrench (6,)`` is the unit wrench that gives the upper bound."""
+
+    lower: float
+    upper: float
+    wrench: FloatArray
+
+
+def epsilon(
+    contacts: Sequence[SoftContact],
+    object_length: float,
+    contact_length: float,
+    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+    kind: str = "linf",
+    tolerance: float = 1e-4,
+) -> EpsilonBound:
+    """Radius of the largest ball around 0 in the grasp wrench space, for normal forces of at most one [-].
 
     Parameters
     ----------
-    contact1, contact2 : (3,) sequence
-        Semi-axes ``(f_x, f_y, tau_z)`` per unit normal force, the torque divided by its length.
-    arm1, arm2 : float
-        Positions of the contacts along their line, measured from the centre of mass and divided by the length for arms;
-        of opposite sign if the centre of mass lies between them.
+    contacts : sequence of SoftContact
+        One or more, in any pose.
+    object_length, contact_length : float
+        Lengths by which the torques of forces and those about the normals are divided [m]; epsilon depends on both.
+    centre_of_mass : (3,) array
+        Point about which torques are taken [m]; epsilon depends on it.
+    kind : str
+        "linf": every normal force is at most one; "l1": their sum is.
+    tolerance : float
+        Relative gap of the bounds to work for; an absolute one of 1e-6 is enough too.
+
+    Notes
+    -----
+    The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
+    bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
 
     Examples
     --------
-    >>> round(epsilon_linf((1, 1, 0.2), (1, 1, 0.2), -0.5, 0.5), 6) == round(0.4 / 1.04**0.5, 6)
+    >>> from softjaw.lsfit.ellipsoid import Ellipsoid
+    >>> from softjaw.scoring.contact import SoftContact, contact_axes
+    >>> body = Ellipsoid([1, 1, 0.2])
+    >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
+    >>> round(epsilon(pads, 1.0, 1.0).upper, 6) == round(0.4 / 1.04**0.5, 6)
     True
     """
-    t1, t2 = contact1[2], contact2[2]
-    about = (t1 + t2) / math.sqrt(1 + max(t1, t2) ** 2)
-    alone = [n / math.sqrt(1 + other**2 + n**2) for n, other in _borne_alone(contact1, contact2, arm1, arm2)]
-    return min(1.0, about, *alone)
+    if kind not in ("linf", "l1"):
+        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
+    C = np.array([contact.wrench_map(object_length, contact_length, centre_of_mass) for contact in contacts])
+    if not len(C):
+        raise ValueError("contacts is empty: a grasp needs at least one contact")
+    c, bodies = C[:, :, 0], [contact.body for contact in contacts]
+    D = np.array([ellipsoid_inside(body) @ Ci[:, 1:].T for body, Ci in zip(bodies, C, strict=True)])
+    exact = all(is_ellipsoid(body) for body in bodies)
+    if (apart := separating_wrench(c, D)) is None:
+        lower, upper, u = _between(c, D, kind, tolerance)
+    else:
+        lower, upper, u = 0.0, 0.0, apart
+    if not exact:
+        upper, u = _weakest_of_bodies(C, bodies, u, kind)
+    return EpsilonBound(min(lower, upper), upper, u)
 
 
-def epsilon_l1(contact1: Sequence[float], contact2: Sequence[float], arm1: float, arm2: float) -> float:
-    """Radius of the largest ball around 0 in the L1 grasp wrench space [-]; parameters as in `epsilon_linf`."""
-    t1, t2 = contact1[2], contact2[2]
-    about = (t1 + t2) / math.sqrt(4 + (t1 - t2) ** 2)
-    alone = [n / math.sqrt(4 * (1 + other**2) + n**2) for n, other in _borne_alone(contact1, contact2, arm1, arm2)]
-    return min(1.0, about, *alone)
+def separating_wrench(c: FloatArray, D: FloatArray) -> FloatArray | None:
+    """Unit wrench ``(6,)`` that no contact can resist at all, or None if 0 is an inner point of what they span."""
+    n, size = len(c), np.abs(c).max()
+    _, spread, V = np.linalg.svd(np.vstack([c, D.reshape(-1, 6)]))
+    if len(spread) < 6 or spread[-1] <= _SMALLEST * spread[0]:
+        return V[-1]
+    # least t with c_i u + |D_i u| <= t, force and torque of u of at most one
+    G = np.zeros((1, n + 2, 4, 7))
+    G[0, :n, 0, :6], G[0, :n, 1:, :6], G[0, :n, 0, 6] = c, -D, -1
+    G[0, n, 1:, :3] = G[0, n + 1, 1:, 3:6] = -np.eye(3)
+    h = np.zeros((1, n + 2, 4))
+    h[0, :n, 0], h[0, n:, 0] = size, 1
+    x, _ = cone_programme(np.eye(7)[6], G, h, np.array([1e-9 * size]))
+    u = x[:, :6] / max(float(np.linalg.norm(x[:, :6])), 1e-300)
+    return u[0] if contact_support(c, D, u).max() < -_SMALLEST * size else None
 
 
-def _borne_alone(
-    contact1: Sequence[float], contact2: Sequence[float], arm1: float, arm2: float
-) -> list[tuple[float, float]]:
-    """For each contact and direction: moment of its friction about the other contact, and the other's arm."""
-    D = abs(arm2 - arm1)
-    return [(contact1[k] * D, arm2) for k in (0, 1)] + [(contact2[k] * D, arm1) for k in (0, 1)]
+def _between(c: FloatArray, D: FloatArray, kind: str, tolerance: float) -> tuple[float, float, FloatArray]:
+    """Bounds of epsilon, closer than the tolerance unless that takes too many proofs."""
+    proofs = [certified_radius(c, D, kind)]
+    upper, u = _weakest(c, D, proofs[0].directions, kind, proofs[0].radius * (1 + tolerance / 10))
+    for _ in range(_SPLITS):
+        first = min(proofs, key=lambda proof: proof.radius)
+        if upper <= first.radius * (1 + tolerance) + _ABSOLUTE:
+            break
+        if len(proofs) == 1:
+            many = np.random.default_rng(0).normal(size=(_STARTS, 6))
+            upper, u = min((upper, u), _weakest(c, D, many, kind, first.radius), key=lambda pair: pair[0])
+        proofs.remove(first)
+        for side in (first.split, -first.split):
+            proofs.append(certified_radius(c, D, kind, np.vstack([first.planes, side])))
+            found = _weakest(c, D, proofs[-1].directions[:6], kind, first.radius)
+            upper, u = min((upper, u), found, key=lambda pair: pair[0])
+    return min(proof.radius for proof in proofs), upper, u
+
+
+def _weakest(c: FloatArray, D: FloatArray, u: FloatArray, kind: str, enough: float) -> tuple[float, FloatArray]:
+    """Least support found from the starts ``u``, and its unit wrench."""
+    best, at = np.inf, u[0]
+    for _ in range(_ROUNDS):
+        u = gauge(c, D, u, kind).u
+        u = u / np.linalg.norm(u, axis=1, keepdims=True)
+        h = joined(contact_support(c, D, u).T, kind)
+        before, k = best, h.argmin()
+        if h[k] < best:
+            best, at = float(h[k]), u[k]
+        if best <= enough or before - best <= 1e-9 * best:
+            break
+    return best, at
+
+
+def _weakest_of_bodies(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> tuple[float, FloatArray]:
+    """Least support of contacts with any bodies found from the start ``u (6,)``, and its unit wrench."""
+    best, at = np.inf, u
+    for _ in range(_ROUNDS):
+        found = reach(C, bodies, u, kind, tolerance=1e-5)
+        length = float(np.linalg.norm(found.u))
+        u = found.u / length
+        if not found.upper / length < best * (1 - 1e-6):
+            break
+        best, at = found.upper / length, u
+    return best, at
+
+
+_LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
+_SIGMA = np.array([[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+_PAIRS = np.einsum("apq,brs->abprqs", _SIGMA, _SIGMA).reshape(16, 4, 4)
+_TRANSPOSED = np.array([1.0, 1.0, -1.0, 1.0])  # transposing a Hermitian matrix turns its second Pauli coordinate
+_NEWTON_STEPS = 300
+
+
+class Proof(NamedTuple):
+    """A radius proved up to rounding for the wrenches on one side of some planes, and what it leaves open."""
+
+    radius: float
+    directions: FloatArray  # (k, 6), candidates for the weakest wrench, unit vectors of both signs
+    planes: FloatArray  # (p, 6 + k): the wrenches with planes @ v >= 0 were looked at
+    split: FloatArray  # (6 + k,), a plane that would tell the candidates apart
+
+
+def certified_radius(
+    c: FloatArray, D: FloatArray, kind: str = "linf", planes: FloatArray | None = None, tolerance: float = 2e-6
+) -> Proof:
+    """Radius of a ball around 0 inside the grasp wrench space.
+
+    Parameters
+    ----------
+    c, D : (n, 6), (n, 3, 6) array
+        Contacts as in `scoring.gauge`; 0 has to be an inner point of their grasp wrench space.
+    kind : str
+        "linf" or "l1".
+    planes : (p, 6 + k) array, optional
+        Sides of planes, to which the proof is limited.
+    tolerance : float
+        Gap of the programme, relative to the radius squared, at which it stops.
+    """
+    programme = _Programme(c, D, kind, planes)
+    x = programme.start()
+    mu = 1.0
+    for _ in range(_NEWTON_STEPS):
+        step, decrement = programme.newton_step(x, mu)
+        length = 1.0 if np.isfinite(decrement) else 0.0
+        while length > 1e-8 and not programme.inside(x + length * step):
+            length *= 0.7
+        if length <= 1e-8:
+            break
+        x = x + (length if length == 1 else 0.9 * length) * step
+        if decrement < 0.5:
+            if mu * programme.parameter <= tolerance * max(x[0], 1e-9):
+                break
+            mu *= 0.2
+    return Proof(float(np.sqrt(max(x[0], 0.0))), *programme.outlook(x))
+
+
+class _Programme:
+    """Maximise ``x_0 = r^2`` subject to ``A0 + sum_k x_k A_k`` and the multipliers staying in their cones."""
+
+    def __init__(self, c: FloatArray, D: FloatArray, kind: str, planes: FloatArray | None) -> None:
+        n = len(c)
+        k = 1 if kind == "l1" else n
+        d = 6 + k
+        s = np.eye(k, d, 6)
+        L = np.zeros((n, 4, d))
+        L[:, 0, :6], L[:, 1:, :6] = -c, D
+        L[:, 0] += s[np.arange(n) % k]
+        self.planes = np.zeros((0, d)) if planes is None else planes
+        lines = np.vstack([s, self.planes])
+        squares = np.einsum("a,iad,iae->ide", _LORENTZ, L, L)
+        pairs = [np.outer(g, s_) for i, g in enumerate(lines) for s_ in lines[:i]]
+        groups = [
+            np.diag([1.0] * 6 + [0.0] * k)[None],
+            squares,
+            np.reshape(pairs, (-1, d, d)),
+            np.einsum("id,jae->ijade", lines, L).reshape(-1, d, d),
+            *(
+                np.einsum("ad,be,b->abde", L[i], L[j], flip).reshape(16, d, d)
+                for i in range(n)
+                for j in range(i)
+                for flip in (np.ones(4), _TRANSPOSED)
+            ),
+        ]
+        A = -np.concatenate(groups)
+        self.A: FloatArray = (A + A.swapaxes(1, 2)) / 2
+        self.A0 = np.outer(s.sum(axis=0), s.sum(axis=0))
+        ends = np.cumsum([len(g) for g in groups])
+        self.single = np.arange(1, ends[2])
+        self.mixed = np.arange(ends[1], ends[1] + k * (k - 1) // 2)
+        self.lorentz = np.arange(ends[2], ends[3]).reshape(-1, 4)
+        self.matrices = np.arange(ends[3], ends[-1]).reshape(-1, 16)
+        self.parameter = d + len(self.single) + 2 * len(self.lorentz) + 4 * len(self.matrices)
+
+    def start(self) -> FloatArray:
+        """A point inside: small multipliers, and a negative square of the radius."""
+        x = np.zeros(len(self.A))
+        x[np.concatenate([self.single, self.lorentz[:, 0], self.matrices[:, 0]])] = 1e-2 / max(len(self.lorentz), 4)
+        x[self.mixed] = 2.0  # the form of the s_i becomes diagonal
+        x[0] = -1.0
+        while not self.inside(x):
+            x[0] *= 4
+        return x
+
+    def inside(self, x: FloatArray) -> bool:
+        """Whether the form and all multipliers are inside their cones."""
+        a = x[self.lorentz]
+        if (x[self.single] <= 0).any() or (a[:, 0] <= 0).any() or ((a * a) @ _LORENTZ <= 0).any():
+            return False
+        try:
+            np.linalg.cholesky(self._form(x))
+            np.linalg.cholesky(np.tensordot(x[self.matrices], _PAIRS, 1))
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def newton_step(self, x: FloatArray, mu: float) -> tuple[FloatArray, float]:
+        """Newton step of ``-x_0 / mu`` plus the logarithmic barrier, and its decrement."""
+        m = len(x)
+        T = np.linalg.inv(self._form(x)) @ self.A
+        g = -np.einsum("kii->k", T)
+        H = T.reshape(m, -1) @ T.swapaxes(1, 2).reshape(m, -1).T
+        g[0] -= 1 / mu
+        g[self.single] -= 1 / x[self.single]
+        H[self.single, self.single] += 1 / x[self.single] ** 2
+        a = x[self.lorentz]
+        q = ((a * a) @ _LORENTZ)[:, None]
+        slope = -2 * a * _LORENTZ / q
+        g[self.lorentz] += slope
+        _add(H, self.lorentz, slope[:, :, None] * slope[:, None, :] - 2 * np.diag(_LORENTZ) / q[:, None])
+        P = np.linalg.inv(np.tensordot(x[self.matrices], _PAIRS, 1))[:, None] @ _PAIRS
+        g[self.matrices] -= np.einsum("pkii->pk", P).real
+        flat = P.reshape(-1, 16, 16), P.swapaxes(2, 3).reshape(-1, 16, 16)
+        _add(H, self.matrices, (flat[0] @ flat[1].swapaxes(1, 2)).real)
+        size = 1 / np.sqrt(np.abs(np.diag(H)))
+        step = -size * np.linalg.solve(H * size[:, None] * size + 1e-14 * np.eye(m), size * g)
+        return step, float(-g @ step)
+
+    def outlook(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unit wrenches along the principal axes of the moments, the planes, and one that splits the moments."""
+        moments = np.linalg.inv(self._form(x))
+        axes = np.linalg.eigh(moments[:6, :6])[1][:, ::-1].T
+        total = np.sqrt(self.A0.diagonal())  # sum_i s_i, which is positive wherever u is not 0
+        mean = moments @ total / (total @ moments @ total)
+        spread = moments / (total @ moments @ total) - np.outer(mean, mean)
+        split: FloatArray = np.zeros(len(total))
+        split[:6] = np.linalg.eigh(spread[:6, :6])[1][:, -1]
+        split -= (split @ mean) * total
+        split /= np.abs(split).max()
+        both: FloatArray = np.vstack([axes, -axes])
+        return both, self.planes, split
+
+    def _form(self, x: FloatArray) -> FloatArray:
+        return self.A0 + np.tensordot(x, self.A, 1)
+
+
+def _add(H: FloatArray, index: NDArray[np.int64], blocks: FloatArray) -> None:
+    H[index[:, :, None], index[:, None, :]] += blocks

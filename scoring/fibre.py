@@ -18,17 +18,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
-from softjaw.scoring.boundary import THIN, ellipsoid_matrix, surface_mesh
-from softjaw.scoring.contact import Body
-from softjaw.scoring.plane import fan_area, polygon_area
+from softjaw.scoring.bodies import Body, ellipsoid_matrix, hull_volume, touching_points, vertices_of
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
 TINY = 1e-200  # instead of a singular value 0
 SHADOW = 512  # directions in which a body without closed form is asked for its shadow
 
@@ -149,6 +151,7 @@ class EllipsoidFibre:
         if crossing != 0:
             g = _cross(self.c, split) / crossing
             xi = g / math.sqrt(1 + (beta * g) ** 2)
+            # a piece across the line would count on one side of it as a whole
             if abs(xi) < 1:
                 psi = np.sort(np.append(psi, math.asin(xi)))
         xi, rest = np.sin(psi), np.cos(psi) ** 2
@@ -193,9 +196,9 @@ class MeshFibre:
         self.body, self.span = body, span
         self.exact = hasattr(body, "vertices")
         self.finest = 7 if self.exact else 5
-        self.meshes: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
+        self.meshes: dict[int, tuple[FloatArray, IntArray, FloatArray]] = {}
 
-    def _mesh(self, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _mesh(self, level: int) -> tuple[FloatArray, IntArray, FloatArray]:
         """Points, corners of the triangles and the sides they make."""
         level = 0 if self.exact else level + 1
         if level not in self.meshes:
@@ -212,7 +215,7 @@ class MeshFibre:
         volume = -self.span.det * normals[:, 0].sum() / 4
         M = self.span.M
         if self.exact:
-            return volume, polygon_area(points @ M[:, 1:].T + M[:, 0])
+            return volume, hull_volume(np.vstack([points @ M[:, 1:].T + M[:, 0], np.zeros((1, 2))]))
         return volume, self._shadow
 
     @cached_property
@@ -220,6 +223,7 @@ class MeshFibre:
         """Area of the hull of the body's shadow and 0, measured where the shadow is about as wide as long."""
         M, phi = self.span.M, 2 * math.pi * np.arange(SHADOW) / SHADOW
         W, s, _ = np.linalg.svd(M[:, 1:] * self.body.support(np.eye(3)))
+        # a shadow that is thin or far from 0 is stretched: equal steps of angle must see its round parts
         s = np.maximum(s, [TINY, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], TINY)])
         u = np.column_stack([np.cos(phi), np.sin(phi)]) @ (W / s).T @ M
         return float(s.prod()) * fan_area(u[:, 0] + self.body.support(u[:, 1:]))
@@ -248,3 +252,98 @@ class MeshFibre:
 
 def _cross(a: FloatArray, b: FloatArray) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
+
+
+THIN = 1e-9  # of the longest extent; what is thinner counts as flat
+
+
+def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
+    """Triangles inscribed in the body's surface, seen anticlockwise from outside.
+
+    Parameters
+    ----------
+    body : Body
+        A polytope, whose faces are returned whatever the level, or a smooth body.
+    level : int
+        Each level has four times as many triangles as the one before, 20 at level 0.
+
+    Returns
+    -------
+    points : (k, 3) array
+    triangles : (m, 3) array of int
+    """
+    vertices = vertices_of(body)
+    if vertices is not None:
+        return _hull_mesh(vertices)
+    points, triangles = sphere_mesh(level)
+    reach = body.support(np.eye(3))
+    if hasattr(body, "radius") and (reach > 0).all():
+        u = points * reach
+        return u * np.asarray(body.radius(u))[:, None], triangles
+    return touching_points(body, points / np.where(reach > 0, reach, 1.0)), triangles
+
+
+def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Faces of the hull; a flat one is given a thickness of 1e-9, so that its rim has normals."""
+    centre = vertices.mean(axis=0)
+    _, extent, axes = np.linalg.svd(vertices - centre)
+    extent = np.append(extent, np.zeros(3 - len(extent)))
+    if extent[0] == 0:
+        return vertices, np.zeros((0, 3), dtype=np.intp)
+    flat = extent <= THIN * extent[0]
+    axes = axes * np.where(flat, THIN * extent[0], extent)[:, None]
+    points = np.vstack([vertices, centre + axes[flat], centre - axes[flat]])
+    # Hulls turn with linear maps: made as thick as wide, the points cost Qhull no digits.
+    round_points = np.linalg.solve(axes.T, (points - centre).T).T
+    try:
+        hull = ConvexHull(round_points)
+    except QhullError:
+        hull = ConvexHull(round_points, qhull_options="QJ")
+    triangles = hull.simplices.astype(np.intp)
+    a, b, c = (round_points[triangles[:, i]] for i in range(3))
+    outward = hull.equations[:, :3] * np.sign(np.linalg.det(axes))
+    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), outward) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return points, triangles
+
+
+@lru_cache(maxsize=8)
+def sphere_mesh(level: int) -> tuple[FloatArray, IntArray]:
+    """Icosahedron with every triangle split in four ``level`` times, corners on the unit sphere."""
+    g = (1 + 5**0.5) / 2
+    points = np.array([(s, t * g, 0.0) for s in (-1, 1) for t in (-1, 1)])
+    points = np.vstack([np.roll(points, i, axis=1) for i in range(3)]) / np.hypot(1, g)
+    triangles = _hull_mesh(points)[1]
+    for _ in range(level):
+        edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        edges, place = np.unique(edges, axis=0, return_inverse=True)
+        middle = points[edges].sum(axis=1)
+        ab, bc, ca = place.reshape(3, -1) + len(points)
+        points = np.vstack([points, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
+        a, b, c = triangles.T
+        triangles = np.vstack([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return points, triangles
+
+
+def fan_area(support: FloatArray) -> float:
+    """Area of the hull of a convex figure and 0.
+
+    Parameters
+    ----------
+    support : (k,) array
+        Support function of the figure at ``k`` equal steps of the full turn; negative where 0 lies outside.
+
+    Notes
+    -----
+    The hull consists of the triangles between 0 and the sides that look away from it: ``1/2 int h (h + h'')`` over the
+    directions with ``h > 0``. Trigonometric interpolation to 64 points per step leaves only the error of ``h`` itself.
+    """
+    k, fine = len(support), 64
+    c = np.fft.rfft(support)
+    order = np.arange(len(c))
+    if k % 2 == 0:
+        c[-1] *= 0.5
+    h, bent = (np.fft.irfft(factor * c, fine * k) * fine for factor in (np.ones(len(c)), 1.0 - order**2))
+    if (h >= 0).all():
+        return 0.5 * float((h * bent).mean()) * 2 * np.pi
+    return 0.5 * float((np.maximum(h, 0) * bent).mean()) * 2 * np.pi

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from softjaw.scoring.contact import PolytopeBody, SoftContact
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices
+from softjaw.scoring.bodies import PolytopeBody, ellipsoid_inside, fibonacci_vertices, is_ellipsoid, vertices_of
+from softjaw.scoring.contact import SoftContact
 
 FloatArray = NDArray[np.float64]
+
 
 MOST_POINTS = 2500  # the hull of more in six dimensions takes longer than some seconds
 
@@ -46,15 +45,6 @@ class LinearisedScore:
     epsilon: float
     facets: int
     joggled: bool
-
-
-@dataclass(frozen=True)
-class LinearisationBias:
-    """Qualities with linearised contacts by those with smooth ones; 0 / 0 is given as nan."""
-
-    linearised: LinearisedScore
-    volume: float
-    epsilon: float
 
 
 def linearised_contacts(contacts: Sequence[SoftContact], m: int | None = None, unit: float = 1.0) -> list[SoftContact]:
@@ -99,16 +89,18 @@ def graspit_score(
     Raises
     ------
     ValueError
-        If the sums are more than `MOST_POINTS`; for antipodal contacts `scoring.volume` gives the volume of any.
+        If the sums are more than `MOST_POINTS`; for antipodal contacts `scoring.closed_form` gives the volume of any.
     """
     contacts = list(contacts)
-    smooth = [k for k, c in enumerate(contacts) if not hasattr(c.body, "vertices")]
+    smooth = [k for k, c in enumerate(contacts) if vertices_of(c.body) is None]
     for k, new in zip(smooth, linearised_contacts([contacts[k] for k in smooth], m, unit), strict=True):
         contacts[k] = new
     cones = []
     for contact in contacts:
         C = contact.wrench_map(object_length, contact_length, centre_of_mass)
-        loads = np.hstack([np.ones((len(contact.body.vertices), 1)), contact.body.vertices])
+        vertices = vertices_of(contact.body)
+        assert vertices is not None  # the smooth ones were replaced above
+        loads = np.hstack([np.ones((len(vertices), 1)), vertices])
         cones.append(np.vstack([np.zeros(6), loads @ C.T]))
     count = int(np.prod([len(cone) for cone in cones]))
     if count > MOST_POINTS:
@@ -122,28 +114,25 @@ def graspit_score(
     except QhullError:
         hull, joggled = ConvexHull(points, qhull_options="QJ"), True
     nearest = -float(hull.equations[:, -1].max())
+    # on a facet through 0 rounding gives either sign
     inner = nearest > 1e-9 * size[0] / np.sqrt(len(points))
     return LinearisedScore(float(hull.volume), nearest if inner else 0.0, len(hull.simplices), joggled)
-
-
-def linearisation_bias(
-    contacts: Sequence[SoftContact],
-    volume: float,
-    object_length: float,
-    contact_length: float,
-    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
-    m: int | None = None,
-    unit: float = 1.0,
-) -> LinearisationBias:
-    """What linearising does to a grasp's qualities; ``volume`` is that of its smooth L-infinity grasp wrench space."""
-    found = graspit_score(contacts, object_length, contact_length, centre_of_mass, m, unit)
-    exact = epsilon(contacts, object_length, contact_length, centre_of_mass).upper
-    return LinearisationBias(
-        found, found.volume / volume if volume else np.nan, found.epsilon / exact if exact else np.nan
-    )
 
 
 def _graspit_vertices(axes: FloatArray, unit: float) -> FloatArray:
     """GraspIt!'s vertices; an axis without length is that of a thin ellipsoid, pressed flat."""
     units = np.array([1.0, 1.0, unit])
     return graspit_vertices(np.maximum(axes / units, 1e-12)) * (axes > 0) * units
+
+
+def graspit_vertices(semi_axes: ArrayLike) -> FloatArray:
+    """The 20 vertices of GraspIt!'s soft contact, ``(20, 3)``.
+
+    Directions at the latitudes 90, 45, 0, -45, -90 degrees with 1, 5, 8, 5, 1 points, pushed out radially to the
+    ellipsoid.
+    """
+    rings = [(90, 1), (45, 5), (0, 8), (-45, 5), (-90, 1)]
+    latitude = np.radians(np.concatenate([np.full(k, angle) for angle, k in rings]))
+    longitude = np.concatenate([2 * np.pi * np.arange(k) / k for _, k in rings])
+    u = np.column_stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
+    return u / np.linalg.norm(u / np.asarray(semi_axes, float), axis=1, keepdims=True)

@@ -29,21 +29,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.contact import Body, PolytopeBody, SoftContact
+from softjaw.scoring.bodies import Body, PolytopeBody, vertices_of
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.fibre import Fibre, Span, fibre_of
-from softjaw.scoring.plane import joint_pairs, mixed_area
 
 FloatArray = NDArray[np.float64]
+
+
 ROUNDING = 1e-13
 TURN = 1e-9  # keeps a direction off sides that are parallel to it, where the share of least force is not unique
 
 
-class _Ellipsoid(NamedTuple):
+class _Ellipsoid:
     """Image of an ellipsoid under ``w -> factors * w``."""
 
-    body: Body
-    factors: FloatArray
-    degree: int = 2
+    degree = 2
+
+    def __init__(self, body: Body, factors: FloatArray) -> None:
+        self.body, self.factors = body, factors
+
+    @property
+    def volume(self) -> float:
+        return self.body.volume * float(self.factors.prod())
+
+    @property
+    def shadow_area(self) -> float:
+        return self.body.shadow_area * float(self.factors[:2].prod())
 
     def support(self, t: ArrayLike) -> FloatArray:
         return self.body.support(np.asarray(t) * self.factors)
@@ -108,13 +119,14 @@ def cone_volume(
     fibres = fibre_of(body1, spans[0]), fibre_of(body2, spans[1])
     J = abs(float(np.linalg.det(np.hstack([spans[0].T, spans[0].U, spans[1].U]))))
     a1, a2 = (np.linalg.lstsq(span.C, span.T, rcond=None)[0][0] for span in spans)
+    # the direction along which a contact's share of the normal force changes
     delta = a1 - a2
     if math.hypot(*delta) <= 1e-9 * (math.hypot(*a1) + math.hypot(*a2)):
         delta = np.array([1.0, 0.0])
     delta = delta + TURN * np.array([-delta[1], delta[0]])
     coarse = _volumes(fibres, delta, 0, with_l1)
     if all(fibre.exact for fibre in fibres):
-        return PoseVolume(*(J * coarse).tolist(), TURN)
+        return PoseVolume(float(J * coarse[0]), float(J * coarse[1]), TURN)
     before = coarse
     for level in range(1, min(fibre.finest for fibre in fibres) + 1):
         fine = _volumes(fibres, delta, level, with_l1)
@@ -124,7 +136,8 @@ def cone_volume(
         if error <= relative_error:
             break
         coarse, before = fine, better
-    return PoseVolume(*(J * np.maximum(better, 0)).tolist(), max(error, ROUNDING))
+    linf, l1 = J * np.maximum(better, 0)
+    return PoseVolume(float(linf), float(l1), max(error, ROUNDING))
 
 
 def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int, with_l1: bool) -> FloatArray:
@@ -145,13 +158,13 @@ def _evened(C: FloatArray, body: Body) -> tuple[FloatArray, Body]:
 
     What is thin enough to count as flat must not depend on the unit of length.
     """
-    polytope = hasattr(body, "vertices")
-    if not polytope and getattr(body, "degree", None) != 2:
+    vertices = vertices_of(body)
+    if vertices is None and getattr(body, "degree", None) != 2:
         return C, body  # no other body is thickened
     reach = body.support(np.eye(3))
     scale = np.where(reach > 0, reach, 1 / np.linalg.norm(C[:, 1:], axis=0))
-    even = PolytopeBody(np.asarray(body.vertices) / scale) if polytope else _Ellipsoid(body, 1 / scale)
-    return C * np.append(1.0, scale), even
+    even = C * np.append(1.0, scale)
+    return even, _Ellipsoid(body, 1 / scale) if vertices is None else PolytopeBody(vertices / scale)
 
 
 def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Span, Span] | None:
@@ -165,9 +178,54 @@ def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Sp
     carried = np.linalg.svd(np.hstack(loads), compute_uv=False)
     if len(carried) < 6 or carried[5] <= 1e-13 * carried[0]:
         return None
+    # null vectors of [C_1, -C_2] are the wrenches that both spans hold; columns of one size make the rank fair
     values, vectors = np.linalg.svd(np.hstack([scaled[0], -scaled[1]]))[1:]
     if values[5] <= 1e-13 * values[0]:
         return None
     T = np.linalg.qr(scaled[0] @ vectors[6:, :4].T)[0]
     U1, U2 = (np.linalg.qr(np.hstack([T, np.linalg.svd(D - T @ (T.T @ D))[0][:, :2]]))[0][:, 2:] for D in scaled)
     return Span(C1, T, U1), Span(C2, T, U2)
+
+
+def mixed_area(sides1: FloatArray, sides2: FloatArray) -> float:
+    """Mixed area of two convex polygons, ``1/2 sum h_1(n) |n|`` over the sides n of the second.
+
+    Parameters
+    ----------
+    sides1, sides2 : (m, 2) array
+        Outward normals in any order, as long as their sides; each set sums to 0.
+    """
+    first, second = np.arctan2(sides1[:, 1], sides1[:, 0]), np.arctan2(sides2[:, 1], sides2[:, 0])
+    order = np.argsort(first)
+    n = sides1[order]
+    corners = np.cumsum(np.column_stack([-n[:, 1], n[:, 0]]), axis=0)
+    # The corner after the last side before the angle is the farthest point in that direction.
+    corner = corners[np.searchsorted(first[order], second) - 1]
+    return 0.5 * float((corner * sides2).sum())
+
+
+def joint_pairs(normals1: FloatArray, normals2: FloatArray, direction: FloatArray) -> float:
+    """Sum of ``|n_1 x n_2|`` over the pairs with the direction between ``-n_1`` and ``n_2``.
+
+    Parameters
+    ----------
+    normals1, normals2 : (m, 2) array
+        Vectors in any order.
+    direction : (2,) array
+        Not zero.
+    """
+    x, y = direction / np.linalg.norm(direction)
+    turn = np.array([[x, -y], [y, x]])
+    a, b = -normals1 @ turn, normals2 @ turn
+    mirror = np.array([1.0, -1.0])
+    return _pairs(a, b) + _pairs(a * mirror, b * mirror)
+
+
+def _pairs(a: FloatArray, b: FloatArray) -> float:
+    """Sum of ``a x b`` over pairs with a below the first axis, b above it, and less than a half turn between them."""
+    a, b = a[a[:, 1] < 0], b[b[:, 1] > 0]
+    angle = np.arctan2(b[:, 1], b[:, 0])
+    order = np.argsort(angle)
+    total = np.vstack([np.zeros(2), np.cumsum(b[order], axis=0)])
+    reached = total[np.searchsorted(angle[order], np.arctan2(a[:, 1], a[:, 0]) + np.pi)]
+    return float((a[:, 0] * reached[:, 1] - a[:, 1] * reached[:, 0]).sum())

@@ -5,7 +5,7 @@ The hull of some hundred wrenches on the surface is a polytope inside the space;
 on beyond it by a factor s, and the space is ``mean(s^6)`` times as large. The rays are no random sample (Kronecker
 sequence of the generalised golden ratio), but the error is stated as if they were. The reach r along ``w`` is the least
 ``h(u) - p . u`` over ``u . w = 1``, h the support function of the space: for ellipsoids a small programme over Lorentz
-cones, solved for all rays at once (`scoring.conic`).
+cones, solved for all rays at once (`scoring.gauge`).
 
 A body that is no ellipsoid is replaced by the nearest one to find each ray's u, and r is then taken from the body's own
 support for this u: too large by what is quadratic in the body's distance from the ellipsoid.
@@ -22,11 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 from scipy.special import ndtri
 
-from softjaw.scoring.boundary import ellipsoid_matrix, sphere_mesh, touching_points
-from softjaw.scoring.conic import cone_programme
-from softjaw.scoring.contact import Body, SoftContact
+from softjaw.scoring.bodies import Body, ellipsoid_matrix, ellipsoid_near, joint_support, touching_points
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.gauge import facing
 
 FloatArray = NDArray[np.float64]
+
+
 GOLDEN = 1.1347241384015194  # root of x^7 = x + 1
 FLAT = 1e-12  # share of the largest component or direction up to which there are no wrenches along one
 GAP = 1e-6  # of the reach at which the programmes stop
@@ -84,11 +86,11 @@ def ray_volume(
     p, V, facets = _polytope(C, bodies, kind, corners)
     ends = _filling(facets, rays)
     ellipsoids = [ellipsoid_matrix(body) for body in bodies]
-    near = [_nearest(body) if A is None else A for A, body in zip(ellipsoids, bodies, strict=True)]
+    near = [ellipsoid_near(body) if A is None else A for A, body in zip(ellipsoids, bodies, strict=True)]
     D = np.array([A @ Ci[:, 1:].T for A, Ci in zip(near, C, strict=True)])
     length = np.linalg.norm(ends, axis=1)
-    u = _facing(C[:, :, 0], D, p, ends / length[:, None], kind)
-    gain = (np.maximum((_support(C, bodies, u, kind) - u @ p) / length, 1)) ** 6
+    u = facing(C[:, :, 0], D, ends / length[:, None], kind, GAP, p)[0]
+    gain = (np.maximum((joint_support(C, bodies, u, kind) - u @ p) / length, 1)) ** 6
     mean = float(gain.mean())
     error = float(gain.std()) / mean / math.sqrt(rays)
     return RayVolume(V * mean * det, error, V * det, any(A is None for A in ellipsoids))
@@ -107,7 +109,8 @@ def _polytope(C: FloatArray, bodies: Sequence[Body], kind: str, corners: int) ->
             return p, float(V.sum()), facets
         normals = hull.equations[:, :-1]
         reach = -hull.equations[:, -1] - normals @ p
-        beyond = V * ((_support(C, bodies, normals, kind) - normals @ p) / reach - 1)
+        # new corners go where the space extends farthest beyond the facets: there the estimate varies most
+        beyond = V * ((joint_support(C, bodies, normals, kind) - normals @ p) / reach - 1)
         best = np.argsort(-beyond)[: min(len(points) // 3, corners - len(points))]
         points = np.vstack([points, _extreme(C, bodies, normals[best], kind)])
 
@@ -129,12 +132,6 @@ def _directions(m: int) -> FloatArray:
     """Unit vectors ``(m, 6)``, evenly spread."""
     x = ndtri(_even(m))
     return x / np.linalg.norm(x, axis=1, keepdims=True)
-
-
-def _support(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> FloatArray:
-    h = np.array([(f := u @ Ci)[:, 0] + body.support(f[:, 1:]) for Ci, body in zip(C, bodies, strict=True)])
-    h = np.maximum(h, 0)
-    return h.max(axis=0) if kind == "l1" else h.sum(axis=0)
 
 
 def _extreme(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> FloatArray:
@@ -159,51 +156,9 @@ def _rounded(C: FloatArray, bodies: Sequence[Body], kind: str) -> tuple[FloatArr
     if len(s) < 6 or s[5] <= FLAT * s[0]:
         return C, 0.0
     det = 1.0
+    # twice by the covariance of extreme wrenches: the first frame is round for the loads, not for the space
     for L in (size[:, None] * axes * s, None, None):
         if L is None:
             L = np.linalg.cholesky(np.cov(_extreme(C, bodies, _directions(512), kind).T))
         C, det = np.linalg.solve(L, C), det * abs(float(np.linalg.det(L)))
     return C, det
-
-
-def _nearest(body: Body) -> FloatArray:
-    """Root ``(3, 3)`` of the quadratic form that fits the squared support best on evenly spread directions."""
-    reach = body.support(np.eye(3))
-    scale = 1 / np.where(reach > 0, reach, 1.0)
-    t = sphere_mesh(2)[0]
-    i, j = np.triu_indices(3)
-    h = (body.support(t * scale) + body.support(-t * scale)) / 2
-    fit = np.linalg.lstsq(t[:, i] * t[:, j] / h.max() ** 2, (h / h.max()) ** 2, rcond=None)[0]
-    B = np.zeros((3, 3))
-    B[i, j] += fit / 2
-    B[j, i] += fit / 2
-    values, vectors = np.linalg.eigh(B / np.outer(scale, scale))
-    return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
-
-
-def _facing(c: FloatArray, D: FloatArray, p: FloatArray, w: FloatArray, kind: str) -> FloatArray:
-    """Normals ``u``, ``u . w = 1``, of the space of ellipsoids where the rays from p leave it, ``(m, 6)``."""
-    n, k = len(c), 1 if kind == "l1" else len(c)
-    # Unknowns (u, s, q): s_i >= c_i u + |D_i u|, s_i >= 0, q >= -p u; the least sum of s and q is the reach.
-    L = np.zeros((n + k + 1, 4, 7 + k))
-    L[:n, 0, :6], L[:n, 1:, :6] = -c, D
-    L[np.arange(n), 0, 6 + np.arange(n) % k] = 1
-    L[n + np.arange(k), 0, 6 + np.arange(k)] = 1
-    L[-1, 0, :6], L[-1, 0, -1] = p, 1
-    h = w @ c.T + np.linalg.norm(np.einsum("iad,md->mia", D, w), axis=2)
-    size = np.abs(h).max(axis=1, keepdims=True) + np.abs(w @ p)[:, None]
-    s = np.maximum(h, 0)
-    v0 = np.hstack([w, (s.max(axis=1, keepdims=True) if k == 1 else s) + size, size - (w @ p)[:, None]])
-    B = np.zeros((len(w), 7 + k, 6 + k))
-    B[:, :6, :5], B[:, 6:, 5:] = _across(w), np.eye(k + 1)
-    cost = np.concatenate([np.zeros(5), np.ones(k + 1)])
-    G, h0 = -np.einsum("iad,mde->miae", L, B), np.einsum("iad,md->mia", L, v0)
-    x = cone_programme(cost, G, h0, GAP * size[:, 0])[0]
-    return w + np.einsum("mde,me->md", B, x)[:, :6]
-
-
-def _across(w: FloatArray) -> FloatArray:
-    """Orthonormal columns across each unit vector, ``(m, 6, 5)``: the reflection that turns it to the first axis."""
-    a = w.copy()
-    a[:, 0] += np.copysign(1, a[:, 0])
-    return (np.eye(6) - 2 * a[:, :, None] * a[:, None, :] / (a * a).sum(axis=1)[:, None, None])[:, :, 1:]

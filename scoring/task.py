@@ -127,11 +127,12 @@ def hold_task(
         raise ValueError("wrench is zero: any grasp holds that; give the load to hold")
     # Torques about the middle of the contacts, by their own length, keep the numbers of one size.
     middle = np.mean([contact.position for contact in contacts], axis=0)
-    spread = max(np.linalg.norm(contact.position - middle) for contact in contacts)
+    spread = max(float(np.linalg.norm(contact.position - middle)) for contact in contacts)
     grip = max(float(np.max(contact.body.support(np.diag([0.0, 0.0, 1.0])))) for contact in contacts)
     length = max(spread, grip) or 1.0
-    C = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
-    w = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
+    C: FloatArray = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
+    w: FloatArray = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
+    # both are exact up to the gap of a programme: a bisection over factors would leave more
     lowest, found = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
     factor = found.lower if found.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
@@ -190,13 +191,14 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     small_w = np.linalg.norm(off_w) <= _NOTHING * np.linalg.norm(w)
     if small_w and np.linalg.norm(off_b) <= nothing:
         C, w = U.T @ C, U.T @ w
+        # with fixed normal forces the held multiples are an interval that need not begin at 0
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
         return lowest, forth._replace(u=U @ forth.u)
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
     s = 0.0 if small_w else float(off_b @ off_w / (off_w @ off_w))
     rest = s * w - b
-    balanced = np.linalg.norm(s * off_w - off_b) <= nothing
+    balanced = bool(np.linalg.norm(s * off_w - off_b) <= nothing)
     if balanced and s >= 0 and np.linalg.norm(rest) > nothing:
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
         balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT

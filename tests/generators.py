@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import ellipeinc
 
 from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import REST
 
 
 def _mid(lower, upper, n):
@@ -193,3 +194,33 @@ def grid_mesh(n, m, halfx, halfy, height=lambda x, y: 0 * x):
 
 def bump(x, y):
     return -0.25 * (x**2 + y**2) + 0.08 * np.sin(3 * x + 0.5) * np.cos(2 * y)
+
+
+def moved(patch, rotation, translation):
+    """Patch after the rigid motion ``x -> rotation @ x + translation``."""
+    R, t = np.asarray(rotation, float), np.asarray(translation, float)
+    corners = None if patch.corners is None else patch.corners @ R.T + t
+    return replace(patch, centroid=patch.centroid @ R.T + t, normal=patch.normal @ R.T, corners=corners)
+
+
+def screw_twist(axis, point, pitch):
+    """Unit screws as 6-D twists: ``omega = e``, ``v = h e + e x (O - q)``; an infinite pitch: translation ``e``."""
+    e = np.atleast_2d(np.asarray(axis, float))
+    e = e / np.linalg.norm(e, axis=1, keepdims=True)
+    q, h = np.broadcast_to(np.asarray(point, float), e.shape), np.broadcast_to(np.asarray(pitch, float), len(e))
+    straight = np.isinf(h)[:, None]
+    v = np.where(straight, e, np.where(straight, 0.0, h[:, None]) * e - np.cross(e, q))
+    return np.hstack([v, np.where(straight, 0.0, e)])
+
+
+def friction_sums_reference(arm, normal, load, twist):
+    """What the compiled kernel sums, written as the textbook formula: force, torque, dissipation, ``(m, 7)``."""
+    r, n = arm.T, normal.T
+    rows = []
+    for t in twist:
+        v = t[:3] + np.cross(t[3:], r)
+        slip = v - (v * n).sum(axis=1, keepdims=True) * n
+        speed = np.linalg.norm(slip, axis=1)
+        f = np.divide(load, speed, out=np.zeros_like(load), where=speed > REST)[:, None] * slip
+        rows.append([*f.sum(axis=0), *np.cross(r, f).sum(axis=0), (load * speed).sum()])
+    return np.array(rows)

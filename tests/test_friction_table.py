@@ -13,25 +13,27 @@ import numpy as np
 import pytest
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists, screw_twist
+from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
-from softjaw.lsfit.body import body_volume, shadow_area
-from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.body import body_volume
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
-from softjaw.lsfit.samples import normalised_samples, sample_rank
-from softjaw.lsfit.six import six_samples, span_ellipsoid, span_quartic
-from softjaw.lsfit.surface import FitFlag
+from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples
+from softjaw.lsfit.span import span_ellipsoid
+from softjaw.lsfit.surface import FitFlag, shadow_area
 from softjaw.lsfit.zhou import ZhouWeights, zhou_ellipsoid, zhou_quartic
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
+from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon
+from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import score
-from softjaw.scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.quality import score
 from tests.generators import (
     arc_lengths,
     build,
@@ -42,6 +44,7 @@ from tests.generators import (
     lcg_patch,
     lcg_sphere,
     mesh_patch,
+    screw_twist,
 )
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]
@@ -171,10 +174,12 @@ def fits_in_six_dimensions(inputs, _):
     twist[:, :3] -= np.cross(twist[:, 3:], point)  # motions are those of the reference point
     W, T = six_samples(friction_wrench(patch, twist, mu), twist, mu * friction_limits(patch, mu).S, rho, point)
     full = span_ellipsoid(W, T, scaling="none")
-    quartic = span_quartic(W, T, gamma=0.0, ridge=1e-6, scaling="none")
+    E = exponents(6, 4)
+    M = monomials(W, E)
+    quartic = Quartic(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), E)
     return {
         "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.surface.A,
-        **errors_of("ell_full", full.surface, W, T), **errors_of("quartic_ls_reg1e-6", quartic.surface, W, T),
+        **errors_of("ell_full", full.surface, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),
     }  # fmt: skip
 
 
@@ -182,7 +187,7 @@ def fits_in_six_dimensions(inputs, _):
 
 
 def bodies(inputs):
-    return [EllipsoidBody(inputs[f"semi_axes{i}"]) for i in (1, 2)]
+    return [Ellipsoid(inputs[f"semi_axes{i}"]) for i in (1, 2)]
 
 
 def measures(bodies):

@@ -14,27 +14,24 @@ from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_twists, fibonacci_twists
-from softjaw.friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
+from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag
-from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
-from softjaw.scoring.polytope import fibonacci_vertices, polytope_volume
-from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import ScoreFlag, score
-from softjaw.scoring.volume import volume_linf
+from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
+from softjaw.scoring.quality import ScoreFlag, score
 from tests.generators import (
     cap_polar,
     cyl_mesh,
     disc_polar,
     grid_mesh,
-    heightfield,
     lcg_patch,
     mesh_patch,
+    moved,
     points_patch,
     rect_grid,
 )
@@ -181,16 +178,6 @@ def samples_in_a_plane():
         assert surface.volume == 0
 
 
-def fit_of_a_single_element():
-    """No torque in any sample: the semi-axis is 0 and the body flat, not endless."""
-    W, T = samples(ONE_FACE, 1.0)
-    for surface in all_fits(W, T):
-        assert surface.rank == 2
-        assert surface.flag & FitFlag.RANK_DEFICIENT
-        np.testing.assert_allclose(surface.semi_axes, [1, 1, 0], atol=2e-2)
-        assert not surface.holds([[0, 0, 1e-3]]).any()
-
-
 def duplicated_elements():
     patch = lcg_patch(4, 70)
     half = replace(patch, area=patch.area / 2)
@@ -236,16 +223,6 @@ def millimetres_or_metres():
         np.testing.assert_allclose(b.value(W), a.value(W), rtol=1e-9)
 
 
-def saddle():
-    patch, twist = heightfield(1, 1, 1, -1, 20, 20), fibonacci_twists(200, 2.0)
-    projected, curved, flat = (friction_support(patch, twist, 0.8, m) for m in ("pcm_projected", "ccm", "pcm"))
-    assert (projected < curved).all()
-    assert (curved < flat).all()
-    frame = contact_frame(patch, X)
-    assert frame.flag == FrameFlag.NO_CORNERS
-    np.testing.assert_allclose(frame.axes, np.eye(3), atol=0.1)
-
-
 def overhanging_normals():
     """A cap with the half angle 120 degrees: a third of its area looks back, and lessens F_N but no friction."""
     patch = cap_polar(1, np.radians(120), 60, 40)
@@ -282,18 +259,6 @@ def pressure_around_a_hole():
     np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
 
 
-def normal_and_origin_in_a_cycle():
-    """A roof between raised shelves, pressed above its ridge: each side's normal leads to the other side."""
-
-    def strip(x0, z0, x1, z1):
-        return [[x0, -1, z0], [x1, -1, z1], [x1, 1, z1], [x0, 1, z0]]
-
-    roof, shelves = [strip(-1, -0.5, 0, 0), strip(0, 0, 1, -0.5)], [strip(-3, 1, -2, 1), strip(2, 1, 3, 1)]
-    frame = contact_frame(replace(mesh_patch(roof + shelves), pressure=np.array([1.0, 1.01, 1.0, 1.0])), X)
-    assert frame.flag == FrameFlag.CYCLE
-    np.testing.assert_allclose(frame.axes[2], [0, 0, 1], atol=1e-15)
-
-
 def digits_next_to_an_element():
     """The speed is formed as a difference, so no digit is lost however near the axis runs; |f| = mu p a."""
     for distance in 10.0 ** np.arange(-12, 0):
@@ -303,29 +268,6 @@ def digits_next_to_an_element():
         W = friction_wrench(points_patch(place, [2.0]), cor_twists(place + offset), 0.5)[0]
         direction = np.array([exact_offset[0, 1], -exact_offset[0, 0]]) / np.linalg.norm(exact_offset)
         np.testing.assert_allclose(W[:2], direction, atol=1e-14)
-
-
-def contact_without_torque():
-    found = score((1, 1, 0), (1, 1, 0), 0.06, 0.06, 0.05)
-    assert (found.quality, found.quality_l1, found.epsilon, found.epsilon_l1) == (0, 0, 0, 0)
-    assert found.flag == ScoreFlag.NO_TORQUE
-    flat = fibonacci_vertices((1, 1, 0), 20)
-    assert polytope_volume(flat)[0] == 0
-
-
-def tilted_contacts():
-    """The antipodal formula is off by .1 % at 2 degrees and by a quarter at 30."""
-    body = EllipsoidBody([0.8, 0.6, 0.15])
-    antipodal = volume_linf(body.volume, body.shadow_area, body.volume, body.shadow_area, 1.0)
-    errors = []
-    for degrees in (0, 2, 5, 10, 30):
-        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-        one, two = (SoftContact([-side / 2, 0, 0], contact_axes([side * c, s, 0], [0, 0, 1]), body) for side in (1, -1))
-        errors.append(abs(antipodal / pose_volume(one, two, 1.0, 1.0).linf - 1))
-    assert errors[0] < 1e-5
-    assert np.all(np.diff(errors) > 0)
-    assert 0.001 < errors[1] < 0.004
-    assert 0.2 < errors[4] < 0.4
 
 
 def failure_of_qhull():
@@ -338,7 +280,7 @@ def failure_of_qhull():
             raise QhullError("QH6271 topology error")
         return ConvexHull(points, qhull_options=qhull_options, **options)
 
-    with mock.patch("softjaw.scoring.polytope.ConvexHull", moody):
+    with mock.patch("softjaw.scoring.bodies.ConvexHull", moody):
         np.testing.assert_allclose(polytope_volume(vertices), exact, rtol=1e-4)
 
 
@@ -354,19 +296,14 @@ ROWS = {
     "normal parallel to the velocity": normal_along_the_velocity,
     "COR at infinity": centre_of_rotation_at_infinity,
     "colinear CORs, data in a plane": samples_in_a_plane,
-    "fit of a single element": fit_of_a_single_element,
     "duplicated elements and wrenches": duplicated_elements,
     "e_n near zero beside rho": tiny_patch_in_a_large_unit,
     "pressures over 12 decades": pressures_over_twelve_decades,
     "mm or m": millimetres_or_metres,
-    "saddle": saddle,
     "normals beyond 90 degrees": overhanging_normals,
     "inconsistent orientation of normals": inconsistent_orientation,
     "centre of pressure in a hole": pressure_around_a_hole,
-    "cycle of origin and normal": normal_and_origin_in_a_cycle,
     "kernel next to an element centre": digits_next_to_an_element,
-    "contact without torque in a grasp": contact_without_torque,
-    "tilted contacts": tilted_contacts,
     "failure of Qhull": failure_of_qhull,
 }
 

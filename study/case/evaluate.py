@@ -18,13 +18,13 @@ from softjaw.friction.motion import cor_grid
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
-from softjaw.scoring.contact import PolytopeBody
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.polytope import graspit_vertices, polytope_volume
+from softjaw.scoring.bodies import PolytopeBody, polytope_volume
+from softjaw.scoring.closed_form import volume_linf
+from softjaw.scoring.epsilon import epsilon
+from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import Score, score
+from softjaw.scoring.quality import Score, score
 from softjaw.scoring.task import hold_task, weight_wrench
-from softjaw.scoring.volume import volume_linf
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.flags import raised

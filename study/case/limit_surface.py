@@ -16,15 +16,19 @@ from numpy.typing import NDArray
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.ellipsoid import (
+    Ellipsoid,
+    TiltedEllipsoid,
+    axis_aligned_ellipsoid,
+    full_ellipsoid,
+    three_motion_ellipsoid,
+)
 from softjaw.lsfit.fit_error import FitErrors, fit_error
-from softjaw.lsfit.flag import FitError
-from softjaw.lsfit.quartic import Quartic, convex_quartic
-from softjaw.lsfit.samples import normalised_samples
-from softjaw.lsfit.six import six_samples, span_ellipsoid
-from softjaw.lsfit.span import CollapsedFitError, sphere_motions
-from softjaw.lsfit.surface import LimitSurface
-from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.quartic_fit import convex_quartic
+from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
+from softjaw.lsfit.span import CollapsedFitError, span_ellipsoid
+from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag

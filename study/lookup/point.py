@@ -115,10 +115,9 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
-        from softjaw.lsfit.ellipsoid import Ellipsoid
+        from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
         from softjaw.lsfit.form import exponents
         from softjaw.lsfit.quartic import Quartic
-        from softjaw.lsfit.tilted import TiltedEllipsoid
 
         if finger not in (1, 2):
             raise ValueError(f"finger is {finger!r}: expected 1 or 2")

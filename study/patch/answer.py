@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.friction.frame import FrameFlag
-from softjaw.friction.orientation import behind, wound
+from softjaw.friction.frame import FrameFlag, behind, wound
 from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.body import ExactSurface
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.grasp import grasp_score
+from softjaw.scoring.epsilon import epsilon
+from softjaw.scoring.quality import grasp_score
 from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
 from softjaw.study.flags import Flag

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.orientation import slivers
-from softjaw.friction.patch import ContactPatch, FloatArray
+from softjaw.friction.patch import ContactPatch, FloatArray, slivers
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.scene.problems import Problem, closest
 

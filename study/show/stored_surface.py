@@ -9,11 +9,10 @@ import numpy as np
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
 from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
-from softjaw.lsfit.tilted import TiltedEllipsoid
 from softjaw.study.quantities import MODELS
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.data import Data

@@ -11,31 +11,28 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import contact_frame
-from softjaw.friction.kernel import friction_sums_reference
 from softjaw.friction.motion import cor_grid, fibonacci_twists
-from softjaw.friction.quadrature import gauss_patch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.quartic import convex_quartic, least_squares_quartic
-from softjaw.lsfit.samples import normalised_samples
-from softjaw.lsfit.six import convex_span_quartic, six_samples
+from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.samples import normalised_samples, six_samples
+from softjaw.lsfit.span import convex_span_quartic
 from softjaw.lsfit.zhou import ZhouWeights, zhou_quartic
-from softjaw.scoring.contact import EllipsoidBody, SoftContact, contact_axes
-from softjaw.scoring.epsilon import epsilon_linf
-from softjaw.scoring.epsilon_search import epsilon
-from softjaw.scoring.polytope import fibonacci_vertices, polytope_volume
+from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
+from softjaw.scoring.closed_form import epsilon_linf, volume_linf
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import score
-from softjaw.scoring.volume import volume_linf
+from softjaw.scoring.quality import score
 from tests.benchmark.table import fastest, line, span, title
 from tests.generators import (
     build,
     cyl_mesh,
     cylinder_grid,
     disc_polar,
-    grid_mesh,
+    friction_sums_reference,
     lcg_noise,
     lcg_patch,
     lcg_sphere,
@@ -73,23 +70,6 @@ def friction() -> None:
     skew = build({"gen": "rect_grid", "args": {"a": 2.0, "b": 1.0, "nx": 60, "ny": 40}, "pressure": field})
     error = pure_torque(skew, 1.0) / pure_torque(skew, 1.0, tolerance=1e-14) - 1
     line("torque without net force", span(fastest(lambda: pure_torque(skew, 0.8), 0.3)), "at most 5 ms", f"{error:.0e}")
-    integration()
-
-
-def integration() -> None:
-    """Torque of a rectangle by one and by four points per element."""
-    q = grid_mesh(48, 50, 1, 0.5)
-    exact = 2 * _mean_distance(2.0, 1.0)
-    one, four = partial(mesh_patch, q), partial(gauss_patch, q, np.ones(len(q)))
-    for name, make in (("one point per element", one), ("2 x 2 points per element", four)):
-        error = abs(friction_limits(make(), 1.0).tau_z / exact - 1)
-        cost = span(fastest(lambda make=make: friction_limits(make(), 1.0), 0.3))
-        line(f"patch and maxima of a rectangle, {name}", cost, "", f"torque to {error:.1e}")
-
-
-def _mean_distance(a: float, b: float) -> float:
-    A, B = a / 2, b / 2
-    return math.hypot(A, B) / 3 + A**2 / (6 * B) * math.asinh(B / A) + B**2 / (6 * A) * math.asinh(A / B)
 
 
 def limit_surfaces() -> None:
@@ -152,7 +132,7 @@ def six_dimensions() -> None:
     )
 
 
-def _tilted(degrees: float, body: EllipsoidBody) -> list[SoftContact]:
+def _tilted(degrees: float, body: Ellipsoid) -> list[SoftContact]:
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return [SoftContact([-side / 2, 0, 0], contact_axes([side * c, s, 0], [0, 0, 1]), body) for side in (1.0, -1.0)]
 
@@ -165,7 +145,7 @@ def scores() -> None:
     error = score(AXES[0], AXES[0], DISTANCE, RHO, RHO).quality / exact - 1
     cost = fastest(lambda: score(one, two, 0.06, 0.2, 0.05), 0.2)
     line("antipodal: volumes and epsilons, closed forms", span(cost), "at most 50 us", f"{error:.0e}")
-    body = EllipsoidBody(AXES[0])
+    body = Ellipsoid(AXES[0])
     for degrees, value, source in ((0, None, "the closed form"), (10, 0.5156805591676639, "reference, itself to 1e-4")):
         contacts = _tilted(degrees, body)
         V, A = body.volume, body.shadow_area
@@ -177,7 +157,7 @@ def scores() -> None:
 
 def weakest() -> None:
     """Search for the weakest wrench."""
-    bodies = [EllipsoidBody(axes) for axes in AXES]
+    bodies = [Ellipsoid(axes) for axes in AXES]
     contacts = [
         SoftContact([-side * DISTANCE / 2, 0, 0], contact_axes([side, 0, 0], [0, 0, 1]), body)
         for side, body in zip((1.0, -1.0), bodies, strict=True)
@@ -195,7 +175,7 @@ def weakest() -> None:
 def linearised(points: tuple[int, ...]) -> None:
     """Volume by a hull of sums in six dimensions, as linearised contacts need it, beside the exact volume."""
     title("Volume of the reference grasp: points per contact, hull in six dimensions, and the exact values")
-    V = [EllipsoidBody(axes) for axes in AXES]
+    V = [Ellipsoid(axes) for axes in AXES]
     sizes = [x for body in V for x in (body.volume, body.shadow_area)]
     exact = volume_linf(*sizes, DISTANCE, RHO)
     cost = span(fastest(lambda: volume_linf(*sizes, DISTANCE, RHO), 0.1))

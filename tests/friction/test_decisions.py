@@ -13,9 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
+from softjaw.friction.frame import FrameFlag, contact_frame, in_frame, wound
 from softjaw.friction.motion import SLIDE_X, TURN_Z
-from softjaw.friction.orientation import wound
 from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softjaw.friction.patch import ContactPatch, NoContactError, moved
-from tests.generators import grid_mesh, lcg_patch, mesh_patch
+from softjaw.friction.patch import ContactPatch, NoContactError
+from tests.generators import lcg_patch
 
 
 @pytest.mark.parametrize(
@@ -59,17 +59,6 @@ def test_a_patch_cannot_be_changed():
     source = np.ones(3)
     ContactPatch(np.eye(3), source, np.eye(3), source)
     source[0] = 2.0
-
-
-def test_a_rigid_motion_moves_corners_with_centres():
-    """The corners' mean stays the centre, and the winding stays the normal's."""
-    patch = mesh_patch(grid_mesh(3, 2, 1, 1, lambda x, y: x * y))
-    c, s = np.cos(0.7), np.sin(0.7)
-    there = moved(patch, [[c, -s, 0], [s, c, 0], [0, 0, 1]], [1, 2, 3])
-    np.testing.assert_allclose(there.corners.mean(axis=1), there.centroid, atol=1e-15)
-    np.testing.assert_allclose(mesh_patch(there.corners).normal, there.normal, atol=1e-15)
-    with pytest.raises(ValueError, match="right-handed"):
-        moved(patch, np.diag([1, 1, -1]), [0, 0, 0])
 
 
 def test_unit_normals_keep_their_bits():

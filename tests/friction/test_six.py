@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from softjaw.friction.motion import SLIDE_Y, cor_twists, screw_twist
-from softjaw.friction.patch import moved
+from softjaw.friction.motion import SLIDE_Y, cor_twists
 from softjaw.friction.wrench import friction_support, friction_wrench
-from tests.generators import cap_polar, cylinder_grid, disc_polar, lcg_patch, rect_grid, wedge
+from tests.generators import cap_polar, cylinder_grid, disc_polar, lcg_patch, moved, rect_grid, screw_twist, wedge
 
 CYLINDER = cylinder_grid(1.0, math.pi / 3, 2.0, 48, 48)
 

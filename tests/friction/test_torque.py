@@ -8,10 +8,10 @@ import pytest
 from scipy.optimize import minimize
 
 from softjaw.friction.motion import TURN_Z
-from softjaw.friction.patch import ContactPatch, NoContactError, moved
+from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
-from tests.generators import build, cylinder_grid, lcg_patch, points_patch, rect_grid
+from tests.generators import build, cylinder_grid, lcg_patch, moved, points_patch, rect_grid
 
 TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]
 

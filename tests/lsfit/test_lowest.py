@@ -6,8 +6,8 @@ from scipy.optimize import minimize
 
 from softjaw.lsfit.form import exponents, hessian_tensor, monomials, substitute
 from softjaw.lsfit.lowest import lies_above, lowest_eigenvalues, smallest_eigenvalue, smallest_value
-from softjaw.lsfit.quartic import convex_quartic
-from softjaw.lsfit.round import ball_coefficients
+from softjaw.lsfit.quartic_fit import convex_quartic
+from softjaw.lsfit.sos import ball_coefficients
 from softjaw.lsfit.surface import Image
 
 

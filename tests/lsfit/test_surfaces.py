@@ -5,15 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
 from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.flag import FitFlag, OpenBodyError, UndecidedError
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.geometry import directions, quartic_volume, shadow_area, sphere_rule, supported_shadow
+from softjaw.lsfit.geometry import directions, quartic_volume, sphere_rule
 from softjaw.lsfit.lowest import smallest_eigenvalue, smallest_value
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.surface import Image
-from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, shadow_area, supported_shadow
 
 AXES = np.array([1.0, 0.7, 0.1])
 E = exponents(3, 4)

@@ -7,12 +7,11 @@ import pytest
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
+from softjaw.lsfit.ellipsoid import TiltedEllipsoid
 from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.flag import FitFlag
-from softjaw.lsfit.samples import normalised_samples
-from softjaw.lsfit.six import six_samples
-from softjaw.lsfit.span import CollapsedFitError, sphere_motions
-from softjaw.lsfit.tilted import TiltedEllipsoid
+from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
+from softjaw.lsfit.span import CollapsedFitError
+from softjaw.lsfit.surface import FitFlag
 from softjaw.lsfit.zhou import SIX_WEIGHTS, ZhouWeights, zhou_ellipsoid, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
 
@@ -180,7 +179,7 @@ def test_a_fit_that_collapses_is_refused(fit):
 def test_three_samples_may_leave_an_ellipsoid_open():
     W, T = samples(points_patch([[-1, 0], [1, 0], [0, 1]], [1, 1, 8]), 3)
     for weights in (ZhouWeights(), SIX_WEIGHTS):
-        with pytest.raises(CollapsedFitError, match="reaches more than 10 times as far as the samples"):
+        with pytest.raises(CollapsedFitError):
             zhou_ellipsoid(W, T, weights)
 
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from softjaw.scoring.boundary import ellipsoid_matrix
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.epsilon_search import epsilon, separating_wrench
-from softjaw.scoring.grasp import grasp_score
-from softjaw.scoring.graspit import graspit_score
-from softjaw.scoring.inscribed import is_ellipsoid
-from softjaw.scoring.polytope import graspit_vertices, hull_volume
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, ellipsoid_matrix, hull_volume, is_ellipsoid
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon, separating_wrench
+from softjaw.scoring.graspit import graspit_score, graspit_vertices
 from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score
 from softjaw.scoring.rays import ray_volume
-from softjaw.scoring.score import ScoreFlag, contact_flag, score
 from softjaw.scoring.task import hold_task, least_grip_force
 
 TURNS = 200
@@ -33,7 +31,7 @@ def shaken(rng, x):
 
 def pair(one, two, tilt=0.0, apart=0.06):
     """Contacts on the x axis, their normals turned away from facing by an angle."""
-    bodies = [EllipsoidBody(b) if np.ndim(b) == 1 else PolytopeBody(b) for b in (one, two)]
+    bodies = [Ellipsoid(b) if np.ndim(b) == 1 else PolytopeBody(b) for b in (one, two)]
     c, s = np.cos(tilt), np.sin(tilt)
     return [
         SoftContact([side * apart / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
@@ -46,8 +44,8 @@ def moved(rng, contacts):
     R, p = Rotation.random(random_state=rng).as_matrix(), 0.1 * rng.normal(size=3)
     there = []
     for k in contacts:
-        if isinstance(k.body, EllipsoidBody):
-            body = EllipsoidBody(shaken(rng, k.body.semi_axes))
+        if isinstance(k.body, Ellipsoid):
+            body = Ellipsoid(shaken(rng, k.body.semi_axes))
         else:
             body = PolytopeBody(shaken(rng, k.body.vertices))
         there.append(SoftContact(shaken(rng, R @ k.position + p), shaken(rng, k.axes @ R.T), body))
@@ -90,10 +88,10 @@ def test_rounding_of_no_torque_is_no_torque():
     for noise in (0.0, 1e-17, 6e-17):
         for unit in (1.0, 1e3):
             axes = 0.8, 0.6, unit * noise
-            assert contact_flag([EllipsoidBody(axes)], 0.05 * unit) == NO_TORQUE
+            assert contact_flag([Ellipsoid(axes)], 0.05 * unit) == NO_TORQUE
             assert score(axes, axes, 0.06 * unit, 0.2 * unit, 0.05 * unit).flag == NO_TORQUE
-    assert contact_flag([EllipsoidBody([0.8, 6e-17, 0.01])], 0.05) == NO_FORCE
-    assert contact_flag([EllipsoidBody([0.8, 1e-6, 1e-9])], 0.05) == CLEAN
+    assert contact_flag([Ellipsoid([0.8, 6e-17, 0.01])], 0.05) == NO_FORCE
+    assert contact_flag([Ellipsoid([0.8, 1e-6, 1e-9])], 0.05) == CLEAN
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1e-9, 1e-6, 1e-3, 1e3, 1e9])
@@ -185,7 +183,7 @@ X, Y, ABOUT, OFF, BACK, STILL = (
     "slides along x", "slides along y", "turns about its normal", "lets go", "is pushed back along its normal",
     "stays in place",
 )  # fmt: skip
-BELOW = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), EllipsoidBody(T))]
+BELOW = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), Ellipsoid(T))]
 BOTH = pytest.mark.parametrize("normal", ["up_to", "fixed"])
 
 

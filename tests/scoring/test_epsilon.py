@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
-from softjaw.scoring.epsilon_search import epsilon, separating_wrench
-from softjaw.scoring.gauge import gauge, joint_support
-from softjaw.scoring.inscribed import ellipsoid_inside, is_ellipsoid
-from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, ellipsoid_inside, fibonacci_vertices, is_ellipsoid, joined
+from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.epsilon import epsilon, separating_wrench
+from softjaw.scoring.gauge import contact_support, gauge
 from softjaw.scoring.reach import reach
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
@@ -23,15 +23,13 @@ def ring(n, rng, tilt, scale=(1, 1, 0.4)):
     for phi in 2 * np.pi * np.arange(n) / n:
         out = np.array([np.cos(phi), np.sin(phi), 0])
         position, N = out / 2 + tilt / 2 * rng.normal(size=3), tilt * rng.normal(size=3) - out
-        contacts.append(
-            SoftContact(position, contact_axes(N, [0, 0, 1]), EllipsoidBody(rng.uniform(0.2, 1, 3) * scale))
-        )
+        contacts.append(SoftContact(position, contact_axes(N, [0, 0, 1]), Ellipsoid(rng.uniform(0.2, 1, 3) * scale)))
     return contacts
 
 
 def facing(a, b, d=1.3, tilt=0.0):
     c, s = math.cos(tilt), math.sin(tilt)
-    bodies = [body if hasattr(body, "support") else EllipsoidBody(body) for body in (a, b)]
+    bodies = [body if hasattr(body, "support") else Ellipsoid(body) for body in (a, b)]
     return [
         SoftContact([side * d / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
         for side, body in zip((-1, 1), bodies, strict=True)
@@ -42,6 +40,10 @@ def maps(contacts, *arguments):
     C = np.array([contact.wrench_map(*arguments) for contact in contacts])
     D = [contact.body.semi_axes[:, None] * Ci[:, 1:].T for contact, Ci in zip(contacts, C, strict=True)]
     return C[:, :, 0], np.array(D)
+
+
+def joint_support(c, D, u, kind):
+    return joined(contact_support(c, D, u).T, kind)
 
 
 def unit(u):
@@ -185,7 +187,7 @@ def test_any_body_is_bounded_by_an_ellipsoid_inside_it():
         assert not is_ellipsoid(body)
         inside = np.linalg.norm(t @ ellipsoid_inside(body).T, axis=1) / body.support(t)
         assert 0.93 < inside.max() <= 1
-    tilted = ellipsoid_inside(EllipsoidBody(A)) @ contact_axes([1, 1, 1], [1, 0, 0])
+    tilted = ellipsoid_inside(Ellipsoid(A)) @ contact_axes([1, 1, 1], [1, 0, 0])
 
     class Tilted:
         def support(self, t):

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.grasp import grasp_score
-from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices, joint_support
+from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.score import ScoreFlag, score
+from softjaw.scoring.quality import ScoreFlag, grasp_score, score
 
 A, B = (0.8, 0.6, 0.015), (0.5, 0.9, 0.025)
 LENGTHS = 0.2, 0.05
@@ -17,7 +17,7 @@ LENGTHS = 0.2, 0.05
 
 def facing(angle=0.0, bodies=(A, B), d=0.06):
     c, s = math.cos(angle), math.sin(angle)
-    bodies = [EllipsoidBody(b) if isinstance(b, tuple) else b for b in bodies]
+    bodies = [Ellipsoid(b) if isinstance(b, tuple) else b for b in bodies]
     one = SoftContact([-d / 2, 0, 0], contact_axes([c, s, 0], [0, 0, 1]), bodies[0])
     return one, SoftContact([d / 2, 0, 0], contact_axes([-c, s, 0], [0, 0, 1]), bodies[1])
 
@@ -39,7 +39,7 @@ def test_epsilon_off_the_line_and_of_turned_contacts_is_searched():
         found = grasp_score(contacts, *LENGTHS, centre_of_mass=com)
         assert (found.quality, found.method) == (pytest.approx(exact.quality, rel=1e-12), "antipodal")
         assert 0 < found.epsilon < 1
-    equal = [facing(bodies=(A, b)) for b in (A, EllipsoidBody(A))]
+    equal = [facing(bodies=(A, b)) for b in (A, Ellipsoid(A))]
     assert grasp_score(equal[0], *LENGTHS) == grasp_score(equal[1], *LENGTHS)
 
 
@@ -59,18 +59,15 @@ def test_tilted_contacts_go_on_from_facing_ones():
 def test_any_limit_surface_has_a_score():
     polytope = PolytopeBody(fibonacci_vertices(A, 4000))
     exact = score(A, B, 0.06, *LENGTHS)
-    for found in (
-        score(polytope, B, 0.06, *LENGTHS),
-        grasp_score(facing(bodies=(polytope, B)), *LENGTHS, with_epsilon=False),
-    ):
-        assert found.quality == pytest.approx(exact.quality, rel=3e-3)
-        assert found.quality < exact.quality
-        assert math.isnan(found.epsilon)
+    found = grasp_score(facing(bodies=(polytope, B)), *LENGTHS, with_epsilon=False)
+    assert found.quality == pytest.approx(exact.quality, rel=3e-3)
+    assert found.quality < exact.quality
+    assert math.isnan(found.epsilon)
 
 
 @pytest.mark.long
 def test_three_contacts():
-    third = SoftContact([0, -0.03, 0], contact_axes([0, 1, 0], [0, 0, 1]), EllipsoidBody(A))
+    third = SoftContact([0, -0.03, 0], contact_axes([0, 1, 0], [0, 0, 1]), Ellipsoid(A))
     found = grasp_score([*facing(), third], *LENGTHS, with_epsilon=False)
     two = grasp_score(facing(), *LENGTHS, with_epsilon=False)
     assert found.method == "rays"
@@ -98,17 +95,15 @@ def test_bad_arguments_are_named():
         grasp_score([one, two], 0.0, 0.05)
     with pytest.raises(ValueError, match="perpendicular unit vectors"):
         SoftContact([0, 0, 0], 2 * np.eye(3), one.body)
-    with pytest.raises(ValueError, match="no semi-axis can be negative"):
-        EllipsoidBody([1, -1, 1])
     with pytest.raises(ValueError, match="position is"):
         SoftContact([0, 0, math.nan], np.eye(3), one.body)
     with pytest.raises(ValueError, match="is parallel to N"):
         contact_axes([0, 0, 1], [0, 0, 2])
 
 
-def test_a_cone_reaches_as_far_as_its_wrenches():
+def test_the_support_of_a_contact_is_that_of_its_wrenches():
     one, _ = facing(0.2, bodies=(PolytopeBody(fibonacci_vertices(A, 50)), B))
     C = one.wrench_map(*LENGTHS, centre_of_mass=(0.1, 0.2, 0.3))
     wrenches = np.vstack([np.zeros(6), np.column_stack([np.ones(50), one.body.vertices]) @ C.T])
     u = np.random.default_rng(0).normal(size=(30, 6))
-    np.testing.assert_allclose(one.cone_support(C, u), (u @ wrenches.T).max(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(joint_support(C[None], [one.body], u, "l1"), (u @ wrenches.T).max(axis=1), rtol=1e-12)

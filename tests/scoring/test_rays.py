@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact
-from softjaw.scoring.polytope import fibonacci_vertices
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import cone_volume, pose_volume
 from softjaw.scoring.rays import ray_volume
 
 
 def somewhere(rng, axes):
     Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return SoftContact(rng.normal(size=3), Q * np.linalg.det(Q), EllipsoidBody(axes))
+    return SoftContact(rng.normal(size=3), Q * np.linalg.det(Q), Ellipsoid(axes))
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -63,7 +64,7 @@ def test_three_polytopes_lie_between_their_hull_and_the_estimate():
 def test_wrenches_in_fewer_dimensions_have_no_volume():
     rng = np.random.default_rng(0)
     place = rng.normal(size=3)
-    contacts = [SoftContact(place, somewhere(rng, (1, 1, 1)).axes, EllipsoidBody([1, 1, 0])) for _ in "123"]
+    contacts = [SoftContact(place, somewhere(rng, (1, 1, 1)).axes, Ellipsoid([1, 1, 0])) for _ in "123"]
     for kind in ("linf", "l1"):
         assert ray_volume(contacts, 1.0, 1.0, kind=kind).volume == 0
     nothing = [somewhere(rng, (0, 0, 0)) for _ in "123"]

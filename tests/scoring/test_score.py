@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.epsilon import epsilon_l1, epsilon_linf
-from softjaw.scoring.polytope import fibonacci_vertices, graspit_vertices, polytope_volume
-from softjaw.scoring.score import ScoreFlag, score, simplified_contact
-from softjaw.scoring.volume import volume_l1, volume_linf
+from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
+from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
+from softjaw.scoring.graspit import graspit_vertices
+from softjaw.scoring.quality import ScoreFlag, score, simplified_contact
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody, SoftContact, contact_axes
-from softjaw.scoring.polytope import fibonacci_vertices
-from softjaw.scoring.reach import body_point
-from softjaw.scoring.simplex import best_columns
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices, touching_points
+from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.task import GRAVITY, hold_task, least_grip_force, weight_wrench
 
 A, B = (0.8, 0.6, 0.010), (0.5, 0.9, 0.008)
@@ -21,7 +20,7 @@ BOTH = pytest.mark.parametrize("normal", ["up_to", "fixed"])
 def facing(a, b, tilt=0.0):
     """Contacts on the x axis whose own x is the space's z."""
     c, s = math.cos(tilt), math.sin(tilt)
-    bodies = [body if hasattr(body, "support") else EllipsoidBody(body) for body in (a, b)]
+    bodies = [body if hasattr(body, "support") else Ellipsoid(body) for body in (a, b)]
     return [
         SoftContact([side * D / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
         for side, body in zip((-1, 1), bodies, strict=True)
@@ -104,7 +103,7 @@ def test_a_wedge_under_fixed_forces_needs_a_load_to_hold_it_down():
 @BOTH
 def test_one_contact_alone(normal):
     """A finger below carries a weight up to its grip force; one beside the object carries none."""
-    below = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), EllipsoidBody(A))]
+    below = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), Ellipsoid(A))]
     load = weight_wrench(1.0, DOWN)
     assert hold_task(below, GRAVITY, load, normal).safety_factor == pytest.approx(1, rel=1e-7)
     assert hold_task(below, 20, load, normal).holds == (normal == "up_to")
@@ -146,7 +145,7 @@ class Plain:
     volume = shadow_area = float("nan")
 
     def __init__(self, semi_axes):
-        self.body = EllipsoidBody(semi_axes)
+        self.body = Ellipsoid(semi_axes)
 
     def support(self, t):
         return self.body.support(t) * (1 + 1e-8 * np.cos(7 * np.arctan2(*np.atleast_2d(t).T[:2])))
@@ -159,7 +158,7 @@ def test_cutting_planes_agree_with_the_cones(normal):
     assert cut.safety_factor == pytest.approx(smooth.safety_factor, rel=2e-7)
     assert cut.gap <= 1e-6
     np.testing.assert_allclose(
-        body_point(Plain(A), np.array([1.0, 2, 30])) @ [1, 2, 30], EllipsoidBody(A).support([1, 2, 30])[0], rtol=1e-7
+        touching_points(Plain(A), [1.0, 2, 30])[0] @ [1, 2, 30], Ellipsoid(A).support([1, 2, 30])[0], rtol=1e-7
     )
 
 
@@ -174,7 +173,7 @@ def test_the_factor_depends_on_no_convention(normal):
     there = np.concatenate([force, Q @ load[3:] + np.cross(shift, force)])
     assert hold_task(moved, 10, there, normal).safety_factor == pytest.approx(factor, rel=1e-6)
     assert hold_task(contacts, 20, 4 * load, normal).safety_factor == pytest.approx(factor / 2, rel=1e-7)
-    milli = [SoftContact(1e3 * k.position, k.axes, EllipsoidBody(k.body.semi_axes * [1, 1, 1e3])) for k in contacts]
+    milli = [SoftContact(1e3 * k.position, k.axes, Ellipsoid(k.body.semi_axes * [1, 1, 1e3])) for k in contacts]
     assert hold_task(milli, 10, load * np.repeat([1, 1e3], 3), normal).safety_factor == pytest.approx(factor, rel=1e-6)
 
 
@@ -226,23 +225,3 @@ def test_least_grip_force_is_the_one_at_which_the_factor_is_reached():
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
         call()
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_the_simplex_method_finds_the_vertices_that_matter(seed):
-    """The programme on its few vertices reaches as far as the one on all, up to what its tiny right sides change."""
-    random = np.random.default_rng(seed)
-    parts, r, k = 2, 6, 300
-    G, w = random.normal(size=(k, r)) + 0.5, random.normal(size=r)
-    owner = np.arange(k) % parts
-
-    def farthest(rows):
-        A = np.vstack([np.hstack([w[:, None], -G[rows].T]), np.zeros((parts, 1 + len(rows)))])
-        A[r + owner[rows], 1 + np.arange(len(rows))] = 1.0
-        cost = -np.eye(1 + len(rows))[0]
-        found = linprog(cost, A_eq=A[:r], b_eq=np.zeros(r), A_ub=A[r:], b_ub=np.ones(parts))
-        return -found.fun
-
-    basis = best_columns(G, owner, parts, w)
-    assert farthest(basis[basis >= 0]) == pytest.approx(farthest(np.arange(k)), rel=1e-6)
-    assert farthest(np.arange(k)) > 0.1

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from softjaw.friction.frame import FrameFlag
-from softjaw.scoring.score import ScoreFlag
+from softjaw.scoring.quality import ScoreFlag
 from softjaw.study import pipeline
 from softjaw.study.case import sweep
 from softjaw.study.cli import main

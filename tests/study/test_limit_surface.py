@@ -8,10 +8,11 @@ import pytest
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.flag import FitError
+from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
-from softjaw.scoring.contact import EllipsoidBody, SoftContact
+from softjaw.lsfit.surface import FitError
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import limit_surface
 from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
@@ -112,7 +113,7 @@ def soft_contacts(values, m):
     for f in range(2):
         R = values["fingers/pose_rotation"][f]
         position = R @ values["fingers/frame_origin"][f] + values["fingers/pose_origin"][f]
-        body = EllipsoidBody(values["limit_surface/semi_axes"][f][m])
+        body = Ellipsoid(values["limit_surface/semi_axes"][f][m])
         yield SoftContact(position, values["fingers/frame_axes"][f] @ R.T, body)
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 import softjaw
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.volume import volume_linf
+from softjaw.scoring.closed_form import volume_linf
 from softjaw.study.case import probing, sweep
 from softjaw.study.case.candidates import axis_poses
 from softjaw.study.case.probing import _volume

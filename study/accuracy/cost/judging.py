@@ -12,9 +12,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
-from softjaw.scoring.contact import EllipsoidBody, PolytopeBody
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.bodies import PolytopeBody, hull_volume
 from softjaw.scoring.graspit import linearised_contacts
-from softjaw.scoring.polytope import hull_volume
 from softjaw.study.accuracy.cost.knobs import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.accuracy.cost.measure import QUANTITIES, Measured, cpu_seconds, from_maps, least_seconds
 from softjaw.study.case import model
@@ -117,8 +117,8 @@ def _surface(found: SolvedProbe, level: str) -> Callable:
 
 
 def _score(found: SolvedProbe, level: str) -> Callable:
-    def ellipsoids(contacts: list[Contact]) -> list[EllipsoidBody]:
-        return [EllipsoidBody(c.ellipsoids["ccm"].semi_axes) for c in contacts]
+    def ellipsoids(contacts: list[Contact]) -> list[Ellipsoid]:
+        return [Ellipsoid(c.ellipsoids["ccm"].semi_axes) for c in contacts]
 
     if level == "exact":
         return lambda contacts, _: _with_quality(found, contacts, ellipsoids(contacts))

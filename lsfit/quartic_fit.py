@@ -1,0 +1,271 @@
+"""Fits of quartic limit surfaces: least squares, and the best convex quartic with the proof that it is convex.
+
+All is done in coordinates in which the samples lie near the unit ball, so that coefficients are of one size and
+margins mean the same for every contact.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from softjaw.lsfit.ellipsoid import FAR, full_ellipsoid, nearest_solution
+from softjaw.lsfit.form import exponents, powers, substitute
+from softjaw.lsfit.lowest import lies_above, smallest_eigenvalue
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.samples import checked_motions, principal_frame
+from softjaw.lsfit.sos import MARGIN, ball_coefficients, ball_freedom, convex_least_squares, gram_matrix, smallest
+from softjaw.lsfit.surface import FitError, FitFlag, Image
+
+FloatArray = NDArray[np.float64]
+TILT = 50.0  # spread of a frame's directions from which coefficients lose digits: its fourth power times rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What proves a quartic ``P`` convex.
+
+    Parameters
+    ----------
+    gram_eigenvalue : float
+        Smallest eigenvalue of ``gram``. Not negative: ``P`` is convex.
+    gram : (r * r, r * r) array
+        ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the products ``z_i y_j``.
+    frame : (d, r) array
+        ``B``.
+    by : str
+        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
+    surface : Quartic or Image
+        What is proved convex.
+    """
+
+    gram_eigenvalue: float
+    gram: FloatArray
+    frame: FloatArray
+    by: str
+    surface: Quartic | Image = field(repr=False)
+
+    @cached_property
+    def smallest_eigenvalue(self) -> float:
+        """Smallest eigenvalue of the second derivative of ``P`` over unit wrenches (of a flat body, those in its span).
+
+        Searched from every direction that is softer than its neighbours; the proof is the Gram matrix.
+        """
+        # Curvature is at least this. Rounding of very unequal coefficients can hide it from the search.
+        bound = self.gram_eigenvalue * float(np.linalg.norm(self.frame, 2)) ** -4
+        surface = self.surface
+        if isinstance(surface, Quartic):
+            return max(smallest_eigenvalue(surface.coefficients, surface.dimension), bound)
+        R, inner = np.linalg.qr(surface.B)[1], surface.inner
+        assert isinstance(inner, Quartic)
+        turned = substitute(inner.coefficients, inner.exponents, np.linalg.inv(R))
+        return max(smallest_eigenvalue(turned, inner.dimension), bound)
+
+
+class QuarticFit(NamedTuple):
+    """A convex quartic limit surface, and what is known about it.
+
+    Parameters
+    ----------
+    surface : Quartic or Image
+        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
+    certificate : Certificate
+        Proof that the quartic is convex.
+    flag : FitFlag
+        What the reader should know.
+    """
+
+    surface: Quartic | Image
+    certificate: Certificate
+    flag: FitFlag
+
+
+def least_squares_quartic(
+    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01
+) -> Quartic | Image:
+    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, which may fail to be convex.
+
+    Parameters
+    ----------
+    W : (m, d) array
+        Normalised wrenches [-].
+    T : (m, d) array
+        Unit motions; needed unless ``gamma`` is 0 [-].
+    beta, gamma : float
+        Weights of wrenches and of motions. A little weight on the motions bends the surface the right way between
+        samples; with 1 and 1 the directions are bought with radii that are off by some per cent.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite, or all wrenches are zero.
+    """
+    samples = round_samples(W, T)
+    v, flag = nearest_solution(*normal_equations(samples, beta, gamma), ball_coefficients(samples.B.shape[1]))
+    return placed(v, samples, samples.flag | flag)
+
+
+def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
+    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
+
+    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
+    the semidefinite programme is solved, which asks for eigenvalues of at least `lsfit.sos.MARGIN`, so that rounding
+    cannot undo the proof. A body that would reach more than `lsfit.ellipsoid.FAR` times as far as the ellipsoid of the
+    samples is bounded there by a larger margin, and flagged.
+
+    Parameters
+    ----------
+    W, T, beta, gamma
+        As for `least_squares_quartic`.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite, or all wrenches are zero.
+    FitError
+        If the programme is not solved, or its result fails the certificate.
+    """
+    samples = round_samples(W, T)
+    r = samples.B.shape[1]
+    N, b = normal_equations(samples, beta, gamma)
+    v, flag = nearest_solution(N, b, ball_coefficients(r))
+    loose, free, by = bool(flag), ball_freedom(r), "least squares"
+    if smallest(gram_matrix(v, free, r)) < MARGIN:
+        bound, free = convex_least_squares(N, b, r, loose)
+        # Where convexity does not bind, the programme ends in the middle of the matrices that prove its result, and
+        # the same free numbers prove the quartic of the linear equations, which has more digits.
+        if smallest(gram_matrix(v, free, r)) < MARGIN:
+            v, by = bound, "semidefinite programme"
+    if not lies_above(v, r, FAR**-4):
+        by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
+        v, free = convex_least_squares(N, b, r, loose, 12 * FAR**-4)
+    surface, gram = placed(v, samples, samples.flag | flag), gram_matrix(v, free, r)
+    low = smallest(gram)
+    if low < MARGIN / 4:
+        raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
+    return QuarticFit(surface, Certificate(low, gram, samples.B, by, surface), surface.flag)
+
+
+class RoundSamples(NamedTuple):
+    """Samples in coordinates ``w = B y`` in which their ellipsoid is the unit ball.
+
+    ``Y (m, r)`` are wrenches, ``T (m, d)`` unit motions within the span or zero where a motion has no part in it,
+    ``B (d, r)`` the map and ``inverse (r, d)`` its pseudo-inverse.
+    """
+
+    Y: FloatArray
+    T: FloatArray | None
+    B: FloatArray
+    inverse: FloatArray
+    flag: FitFlag
+
+
+def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
+    """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
+    W, T = checked_motions(W, T)
+    ball = full_ellipsoid(W)
+    B, inverse = ball.F, ball.inverse
+    assert B is not None
+    if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them
+        B = principal_frame(W)[0] * np.sqrt(ball.rank)
+        inverse = np.linalg.pinv(B)
+    if T is not None and ball.rank < ball.dimension:
+        T = T @ ball.span @ ball.span.T
+        length = np.linalg.norm(T, axis=1, keepdims=True)
+        T = np.where(length > 1e-9, T / np.maximum(length, 1e-9), 0.0)
+    return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.UNDERDETERMINED)
+
+
+def normal_equations(samples: RoundSamples, beta: float, gamma: float) -> tuple[FloatArray, FloatArray]:
+    """Matrix ``N (k, k)`` and right side ``b (k,)`` of the least squares.
+
+    Gradients are in the wrench's components, coefficients in the coordinates of the samples.
+    """
+    Y, T, _, inverse, _ = samples
+    if gamma != 0 and T is None:
+        raise ValueError(f"gamma is {gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
+    if min(beta, gamma) < 0:
+        raise ValueError(f"beta is {beta} and gamma is {gamma}: weights must not be negative")
+    E, m = exponents(Y.shape[1], 4), len(Y)
+    # residuals per coefficient: of the wrenches, then of the directions across the motions
+    out = np.empty((len(E), 1 if T is None or gamma == 0 else T.shape[1], m))
+    arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
+    fill_residuals(*arrays, E, float(beta), float(gamma), out)
+    R = out.reshape(len(E), -1)
+    return R @ R.T / m, R[:, :m] @ np.full(m, math.sqrt(beta) / m)
+
+
+def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Image:
+    """Quartic with coefficients ``v`` of the round frame, in the wrench's components."""
+    d, r = samples.B.shape
+    E = exponents(r, 4)
+    # coefficients in the components do not exist for a flat body, and lose their digits in a tilted frame
+    if r < d:
+        return Image(Quartic(v, E), samples.B, flag)
+    reach = np.linalg.norm(samples.B, axis=1)
+    turn = samples.B / reach[:, None]
+    if np.linalg.cond(turn) > TILT:
+        return Image(Quartic(v, E), samples.B, flag)
+    coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
+    return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None, reach)
+
+
+@njit(cache=True)
+def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - compiled
+    """Write what ``sqrt(beta) P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
+
+    In ``d`` dimensions the ``d - 1`` directions across a motion hold all of the latter: columns of the reflection that
+    takes the motion to the last axis.
+
+    Parameters
+    ----------
+    Y : (m, r) array
+        Wrenches ``w = B y``.
+    T : (m, d) array
+        Unit motions, or zero where they do not count.
+    inverse : (r, d) array
+        Pseudo-inverse of B, which takes gradients along ``y`` to those along ``w``.
+    E : (k, r) array of int
+        Exponents of degree 4.
+    out : (k, d, m) or (k, 1, m) array
+        Receives P and then its slopes, if there is room for them.
+    """
+    (k, r), d, m = E.shape, T.shape[1], len(Y)
+    power = powers(Y, E)
+    for j in range(k):
+        out[j, 0] = math.sqrt(beta) * power[0, E[j, 0]]
+        for i in range(1, r):
+            out[j, 0] *= power[i, E[j, i]]
+    out[:, 1:] = 0.0
+    if out.shape[1] == 1:
+        return
+    along, slope = np.empty((r, d - 1, m)), np.empty(m)
+    for c in range(d - 1):
+        for n in range(m):
+            t = T[n]
+            u = t[c] / (1.0 + abs(t[d - 1]))
+            end = 1.0 if t[d - 1] >= 0.0 else -1.0
+            moving = 0.0
+            for a in range(d):
+                moving = math.sqrt(gamma) if t[a] != 0.0 else moving
+            for i in range(r):
+                x = inverse[i, c] - u * end * inverse[i, d - 1]
+                for a in range(d):
+                    x -= u * t[a] * inverse[i, a]
+                along[i, c, n] = moving * x
+    for j in range(k):
+        for i in range(r):
+            if E[j, i] == 0:
+                continue
+            slope[:] = E[j, i] * power[i, E[j, i] - 1]
+            for a in range(r):
+                if a != i:
+                    slope *= power[a, E[j, a]]
+            for c in range(d - 1):
+                out[j, c + 1] += along[i, c] * slope

@@ -1,0 +1,232 @@
+"""Limit surfaces as scores see them: any body, polytopes, and the ellipsoids that other bodies are or hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+FloatArray = NDArray[np.float64]
+FLAT = 1e-12  # of the longest extent: points that are thinner have no volume
+STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
+ALONG = 1e-14  # of the product of two axes: what is left of a form whose axes are parallel to the components
+ROUND = 1e-9  # of the squared support: how far it may be from a quadratic form
+DIRECTIONS = 6000
+SPACING = 2.8 / np.sqrt(DIRECTIONS)  # no direction is farther than this from the nearest of the Fibonacci points
+
+
+class Body(Protocol):
+    """Limit surface in ``(f_x, f_y, tau_z)`` per unit normal force, with 0 inside or on it.
+
+    A body that has ``vertices (k, 3)`` counts as their hull, one of ``degree`` 2 as an ellipsoid about 0.
+    """
+
+    @property
+    def volume(self) -> float:
+        """Volume."""
+
+    @property
+    def shadow_area(self) -> float:
+        """Area of the shadow on the first two coordinates."""
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class PolytopeBody:
+    """Hull of wrenches, such as samples of a limit surface or the vertices of a linearised one.
+
+    Parameters
+    ----------
+    vertices : (k, 3) array
+        ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; 0 must not lie outside.
+    """
+
+    vertices: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse what is no set of wrenches."""
+        points = np.array(self.vertices, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
+            raise ValueError(f"vertices has shape {points.shape}: expected finite wrenches, (k, 3)")
+        points.flags.writeable = False
+        object.__setattr__(self, "vertices", points)
+
+    @cached_property
+    def _sizes(self) -> tuple[float, float]:
+        return polytope_volume(self.vertices)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the hull."""
+        return self._sizes[0]
+
+    @property
+    def shadow_area(self) -> float:
+        """Area of the hull's shadow on the plane of the forces."""
+        return self._sizes[1]
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
+        return (np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).max(axis=1)
+
+
+def vertices_of(body: Body) -> FloatArray | None:
+    """Vertices ``(k, 3)`` of a polytope, None of any other body."""
+    vertices = getattr(body, "vertices", None)
+    return None if vertices is None else np.asarray(vertices, float)
+
+
+def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Reach ``(3,)``, lengths ``(3,)`` that scale loads to one, and form ``Q`` of the scaled body's squared support.
+
+    Six supports determine the form of an ellipsoid; of another body it means nothing.
+    """
+    reach = body.support(np.eye(3))
+    # a short axis keeps its digits beside long ones only if all are made one size first
+    scale = np.where(reach > 0, reach, 1.0)
+    e, pairs = np.diag(1 / scale), [(0, 1), (0, 2), (1, 2)]
+    Q = np.diag((reach / scale) ** 2)
+    for (i, j), h in zip(pairs, body.support(np.array([e[i] + e[j] for i, j in pairs])), strict=True):
+        product = (h**2 - Q[i, i] - Q[j, j]) / 2
+        Q[i, j] = Q[j, i] = product if abs(product) > ALONG else 0.0
+    return reach, scale, Q
+
+
+def is_ellipsoid(body: Body) -> bool:
+    """Whether the squared support is a quadratic form, as of an ellipsoid about 0."""
+    _, scale, Q = quadratic_form(body)
+    # six supports always fit some form: others have to confirm it
+    t = fibonacci_vertices(np.ones(3), 60)
+    h2 = body.support(t / scale) ** 2
+    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= ROUND * h2.max())
+
+
+def ellipsoid_matrix(body: Body) -> FloatArray | None:
+    """Symmetric ``A (3, 3)`` such that the body is the image of the unit ball under it; None if its degree is not 2."""
+    if getattr(body, "degree", None) != 2:
+        return None
+    reach, scale, Q = quadratic_form(body)
+    if np.array_equal(Q, np.diag(Q.diagonal())):
+        return np.diag(reach)
+    return _root(Q * np.outer(scale, scale))
+
+
+def ellipsoid_inside(body: Body) -> FloatArray:
+    """Root ``A (3, 3)`` of an ellipsoid inside the body: ``|A t| <= support(t)``, with equality if it is one.
+
+    Otherwise it has the proportions of the body's semi-axes. Its size follows from the support on a few thousand
+    directions, less what a support function can fall between them, 2 to 4 % of its largest value.
+    """
+    # a root from the scaled form keeps the digits of short axes, which a symmetric root would mix up
+    if is_ellipsoid(body):
+        _, scale, Q = quadratic_form(body)
+        size, V = np.linalg.eigh(Q)
+        return np.sqrt(np.maximum(size, 0))[:, None] * V.T * scale
+    ends = body.support(np.vstack([np.eye(3), -np.eye(3)]))
+    axes = (ends[:3] + ends[3:]) / 2
+    if (axes <= 0).any():
+        return np.zeros((3, 3))
+    # between samples a support of the even body falls by no more than the distance times its largest value
+    h = body.support(fibonacci_vertices(np.ones(3), DIRECTIONS) / axes)
+    return np.diag(axes * max(h.min() - SPACING * h.max() / (1 - SPACING), 0))
+
+
+def ellipsoid_near(body: Body) -> FloatArray:
+    """Root ``(3, 3)`` of the quadratic form that fits the squared support best on evenly spread directions."""
+    reach = body.support(np.eye(3))
+    scale = 1 / np.where(reach > 0, reach, 1.0)
+    t = fibonacci_vertices(np.ones(3), 160)
+    i, j = np.triu_indices(3)
+    h = (body.support(t * scale) + body.support(-t * scale)) / 2
+    fit = np.linalg.lstsq(t[:, i] * t[:, j] / h.max() ** 2, (h / h.max()) ** 2, rcond=None)[0]
+    B = np.zeros((3, 3))
+    B[i, j] += fit / 2
+    B[j, i] += fit / 2
+    return _root(B / np.outer(scale, scale))
+
+
+def _root(B: FloatArray) -> FloatArray:
+    """Symmetric root of a symmetric matrix whose eigenvalues are negative by rounding at most."""
+    values, vectors = np.linalg.eigh(B)
+    return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
+
+
+def touching_points(body: Body, t: ArrayLike) -> FloatArray:
+    """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
+    T = np.atleast_2d(np.asarray(t, float))
+    vertices = vertices_of(body)
+    if vertices is not None:
+        return vertices[(T @ vertices.T).argmax(axis=1)]
+    A = ellipsoid_matrix(body)
+    if A is not None:
+        felt = T @ A
+        length = np.linalg.norm(felt, axis=1, keepdims=True)
+        return felt / np.where(length > 0, length, 1.0) @ A
+    if hasattr(body, "support_points"):
+        return np.asarray(body.support_points(T))
+    reach = body.support(np.eye(3))
+    scale = 1 / np.where(reach > 0, reach, 1.0)
+    S = T / scale
+    length = np.linalg.norm(S, axis=1, keepdims=True)
+    S /= np.where(length > 0, length, 1.0)
+    steps = STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
+    h = body.support(((S[None] + steps[:, None]) * scale).reshape(-1, 3)).reshape(7, len(S))
+    p = (h[:3] - h[3:6]).T / (2 * STEP)
+    # along the direction itself the support is known better than its differences are
+    along = (p * S).sum(axis=1)
+    return p * np.where(along > 0, h[6] / np.where(along > 0, along, 1.0), 1.0)[:, None] / scale
+
+
+def joint_support(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> FloatArray:
+    """Support ``(m,)`` of the grasp wrench space of contacts ``C (n, r, 4)`` along ``u (m, r)``; kind: `joined`."""
+    felt = np.einsum("mr,irc->imc", u, C)
+    h = np.array([part[:, 0] + body.support(part[:, 1:]) for part, body in zip(felt, bodies, strict=True)])
+    return joined(h, kind)
+
+
+def joined(h: FloatArray, kind: str) -> FloatArray:
+    """Supports ``(n, m)`` of the contacts for unit normal forces as one of the grasp; "linf", "l1" or "fixed"."""
+    if kind == "fixed":
+        return h.sum(axis=0)
+    # without a normal force a contact adds nothing, and can be let go where it would resist
+    h = np.maximum(h, 0)
+    return h.max(axis=0) if kind == "l1" else h.sum(axis=0)
+
+
+def fibonacci_vertices(semi_axes: ArrayLike, m: int) -> FloatArray:
+    """``m`` points spread evenly over the unit sphere and stretched to the ellipsoid, ``(m, 3)``."""
+    i = np.arange(m)
+    z = 1 - (2 * i + 1) / m
+    phi = i * np.pi * (3 - np.sqrt(5))
+    r = np.sqrt(1 - z**2)
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z]) * np.asarray(semi_axes, float)
+
+
+def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
+    """Volume of the hull of the vertices ``(m, 3)`` and area of its shadow on the first two coordinates.
+
+    Flat vertices give the volume 0, and vertices on a line through the shadow the area 0.
+    """
+    points = np.asarray(vertices, float)
+    return hull_volume(points), hull_volume(points[:, :2])
+
+
+def hull_volume(points: FloatArray) -> float:
+    """Volume of the hull of points ``(m, d)``; 0 where they are flat, thinner than `FLAT` of their longest extent."""
+    centred = points - points.mean(axis=0)
+    _, extent, axes = np.linalg.svd(centred, full_matrices=False)
+    if len(points) <= points.shape[1] or extent[-1] <= FLAT * extent[0]:
+        return 0.0
+    even = centred @ axes.T / extent  # Qhull loses facets of points that are much longer than wide
+    try:
+        return float(ConvexHull(even).volume * extent.prod())
+    except QhullError:
+        # Joggled input always gives a hull; its volume is off by 1e-6 to 1e-5.
+        return float(ConvexHull(even, qhull_options="QJ").volume * extent.prod())

@@ -1,0 +1,247 @@
+"""Quality of a grasp: volumes and epsilons of two contacts that face each other, and of any soft contacts anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softjaw.scoring.bodies import Body, ellipsoid_matrix
+from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
+from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.epsilon import epsilon
+from softjaw.scoring.pose import pose_volume
+from softjaw.scoring.rays import ray_volume
+
+FloatArray = NDArray[np.float64]
+
+
+ON_LINE = 1e-12  # of arms, angles and axes: contacts that face each other up to this have closed forms
+NOTHING = 1e-12
+"""Share of the largest load, torques divided by their length, up to which a load is the rounding of none."""
+
+
+class ScoreFlag(IntFlag):
+    """Why a score is zero or smaller than the forces suggest; flags add up."""
+
+    CLEAN = 0
+    NO_TORQUE = 1  # a contact carries no torque about its normal
+    NO_FORCE = 2  # a contact carries no friction along one of its axes
+
+
+@dataclass(frozen=True)
+class Score:
+    """Qualities of a grasp, for normal forces of one.
+
+    Parameters
+    ----------
+    quality : float
+        Volume of the L-infinity grasp wrench space [-].
+    quality_l1 : float
+        Volume of the L1 grasp wrench space [-].
+    epsilon : float
+        Radius of the largest ball around 0 in the L-infinity grasp wrench space [-].
+    flag : ScoreFlag
+        0 if nothing is unusual.
+    epsilon_l1 : float
+        The same radius in the L1 grasp wrench space [-].
+    method : str
+        How the volumes were found: "antipodal" in closed form, "pose" by division of two contacts in any pose, "rays"
+        by an estimate for three or more.
+    error : float
+        Relative error of the volumes left by that method [-].
+    """
+
+    quality: float
+    quality_l1: float
+    epsilon: float
+    flag: ScoreFlag
+    epsilon_l1: float
+    method: str = "antipodal"
+    error: float = 0.0
+
+
+def score(
+    contact1: Sequence[float],
+    contact2: Sequence[float],
+    distance: float,
+    object_length: float,
+    contact_length: float,
+    centre_of_mass: float = 0.0,
+) -> Score:
+    """Score of two soft contacts that face each other.
+
+    Parameters
+    ----------
+    contact1, contact2 : (3,) sequence
+        Semi-axes ``(f_x, f_y, tau_z)`` of an ellipsoid, per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the
+        simplified surface of Eq. (12), see `simplified_contact`. Other bodies go to `grasp_score`.
+    distance : float
+        Distance of the contacts [m].
+    object_length : float
+        Length by which the arms of the contacts are divided [m].
+    contact_length : float
+        Length by which the torques about the normals are divided [m].
+    centre_of_mass : float
+        Its place on the line of the contacts, from the midpoint towards contact 2 [m]; only epsilon depends on it.
+
+    Examples
+    --------
+    >>> score((1, 1, 0.01), (1, 1, 0.01), distance=0.06, object_length=0.06, contact_length=0.05).flag
+    <ScoreFlag.CLEAN: 0>
+    """
+    rho = _positive("contact_length", contact_length)
+    L = _positive("object_length", object_length)
+    d = _positive("distance", distance) / L
+    a, b = _scaled("contact1", contact1, rho), _scaled("contact2", contact2, rho)
+    x = centre_of_mass / L
+    (V1, A1), (V2, A2) = _volume_and_shadow(a), _volume_and_shadow(b)
+    linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)
+    arms = -d / 2 - x, d / 2 - x
+    return Score(linf, l1, epsilon_linf(a, b, *arms), _lacking(a, b), epsilon_l1(a, b, *arms))
+
+
+def contact_flag(bodies: Sequence[Body], contact_length: float) -> ScoreFlag:
+    """What some contact does not carry at all, up to `NOTHING`; torques are divided by the length [m]."""
+    return _lacking(*((body.support(np.eye(3)) / [1.0, 1.0, contact_length]).tolist() for body in bodies))
+
+
+def _lacking(*contacts: Sequence[float]) -> ScoreFlag:
+    flag = ScoreFlag.CLEAN
+    for f_x, f_y, tau in contacts:
+        least = NOTHING * max(f_x, f_y, tau)
+        if tau <= least:
+            flag |= ScoreFlag.NO_TORQUE
+        if f_x <= least or f_y <= least:
+            flag |= ScoreFlag.NO_FORCE
+    return flag
+
+
+def simplified_contact(mu: float, e_n: float) -> tuple[float, float, float]:
+    """Semi-axes ``mu (1, 1, e_n)`` of Eq. (12), the simplified limit surface, too large for curved contacts."""
+    return mu, mu, mu * e_n
+
+
+def _scaled(name: str, contact: Sequence[float], length: float) -> tuple[float, float, float]:
+    f_x, f_y, tau_z = map(float, contact)
+    for label, value in (("f_x", f_x), ("f_y", f_y), ("tau_z", tau_z)):
+        if not 0 <= value < math.inf:
+            raise ValueError(f"{name}: {label} is {value}; semi-axes must be finite and not negative")
+    return f_x, f_y, tau_z / length
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0 < value < math.inf:
+        raise ValueError(f"{name} is {value}: it must be a positive length in metres")
+    return float(value)
+
+
+def _volume_and_shadow(axes: tuple[float, float, float]) -> tuple[float, float]:
+    f_x, f_y, tau_z = axes
+    return 4 / 3 * math.pi * f_x * f_y * tau_z, math.pi * f_x * f_y
+
+
+def grasp_score(
+    contacts: Sequence[SoftContact],
+    object_length: float,
+    contact_length: float,
+    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+    tolerance: float = 1e-4,
+    with_epsilon: bool = True,
+) -> Score:
+    """Score of two or more soft contacts in any poses, with any limit surfaces.
+
+    Parameters
+    ----------
+    contacts : sequence of SoftContact
+        At least two.
+    object_length : float
+        Length by which the arms of the contacts are divided [m].
+    contact_length : float
+        Length by which the torques about the normals are divided [m].
+    centre_of_mass : (3,) array
+        Point about which torques are taken [m]; only epsilon depends on it.
+    tolerance : float
+        Two contacts count as facing each other, and the closed form is used, if both normals are within this angle of
+        the line of the contacts [rad]; the volume is then off by up to some 10 times its square.
+    with_epsilon : bool
+        Whether to find both epsilons, which without a closed form takes longer than the volumes; else they are nan.
+
+    Returns
+    -------
+    Score
+        Epsilon is the lower bound if `scoring.epsilon` left a gap.
+
+    Examples
+    --------
+    >>> from softjaw.lsfit.ellipsoid import Ellipsoid
+    >>> from softjaw.scoring.contact import contact_axes
+    >>> body = Ellipsoid([1, 1, 0.2])
+    >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
+    >>> found = grasp_score(pads, object_length=1.0, contact_length=1.0)
+    >>> found.method, abs(found.quality / (14 / 9 * math.pi**2 * 0.2) - 1) < 1e-12
+    ('antipodal', True)
+    """
+    if len(contacts) < 2:
+        raise ValueError(f"contacts has {len(contacts)} entry: a grasp needs at least two")
+    lengths = object_length, contact_length, centre_of_mass
+    # the closed form would take any length
+    contacts[0].wrench_map(*lengths)  # refuses lengths that are none
+    bodies = [contact.body for contact in contacts]
+    if len(contacts) > 2:
+        rays = [ray_volume(contacts, *lengths, kind=kind) for kind in ("linf", "l1")]
+        # Of bodies that are no ellipsoids the estimate tends to be high, by an unknown share of what exceeds the bound.
+        error = max(1 - v.lower / v.volume if v.high else v.relative_error for v in rays)
+        linf, l1, method = rays[0].volume, rays[1].volume, "rays"
+    elif faces(contacts, tolerance):
+        d = float(np.linalg.norm(contacts[1].position - contacts[0].position)) / object_length
+        (V1, A1), (V2, A2) = ((body.volume / contact_length, body.shadow_area) for body in bodies)
+        linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)
+        method, error = "antipodal", 10 * tolerance**2
+    else:
+        linf, l1, error = pose_volume(contacts[0], contacts[1], *lengths)
+        method = "pose"
+    epsilons = _epsilons(contacts, *lengths) if with_epsilon else (math.nan, math.nan)
+    return Score(linf, l1, epsilons[0], contact_flag(bodies, contact_length), epsilons[1], method, error)
+
+
+def faces(contacts: Sequence[SoftContact], tolerance: float) -> bool:
+    """Whether two contacts press against each other along their common line, up to an angle [rad]."""
+    line = contacts[1].position - contacts[0].position
+    # compared by components, not by the arc cosine, which has no digits near 0
+    d = float(np.linalg.norm(line))
+    N1, N2 = contacts[0].axes[2], contacts[1].axes[2]
+    return d > 0 and max(np.abs(N1 * d - line).max(), np.abs(N2 * d + line).max()) <= tolerance * d
+
+
+def _epsilons(
+    contacts: Sequence[SoftContact], object_length: float, contact_length: float, centre_of_mass: ArrayLike
+) -> tuple[float, float]:
+    """L-infinity and L1, in closed form where there is one."""
+    arms = np.array([contact.position for contact in contacts]) - np.asarray(centre_of_mass, float)
+    if len(contacts) == 2 and faces(contacts, ON_LINE):
+        one, two = (_line_axes(contacts[0], contact) for contact in contacts)
+        along = arms @ contacts[0].axes[2]
+        on_line = np.abs(arms - np.outer(along, contacts[0].axes[2])).max() <= ON_LINE * np.abs(arms).max()
+        if on_line and one is not None and two is not None:
+            a, b = (axes / [1, 1, contact_length] for axes in (one, two))
+            arm1, arm2 = (along / object_length).tolist()
+            return epsilon_linf(a, b, arm1, arm2), epsilon_l1(a, b, arm1, arm2)
+    bounds = (epsilon(contacts, object_length, contact_length, centre_of_mass, kind) for kind in ("linf", "l1"))
+    linf, l1 = (bound.lower for bound in bounds)
+    return linf, l1
+
+
+def _line_axes(first: SoftContact, contact: SoftContact) -> FloatArray | None:
+    """Semi-axes of an ellipsoid along the first contact's axes; None if it is no ellipsoid or not aligned with them."""
+    A = ellipsoid_matrix(contact.body)
+    if A is None:
+        return None
+    turn = first.axes @ contact.axes.T
+    B = turn @ A @ turn.T
+    axes = B.diagonal().copy()
+    return axes if np.abs(B - np.diag(axes)).max() <= ON_LINE * np.abs(axes).max() else None
