@@ -1,0 +1,370 @@
+"""Antipodal grasps of any triangle surface: sampled, set straight, ranked on a spring foundation, thinned.
+
+A gripper closes along a line, so what each pad meets is a height field over its face: of every line along the approach
+the first point of the object from one side and from the other. Both fields come from one pass over the triangles. They
+need no closed mesh and no normals, and inner walls or thin parts behind do not count.
+
+From points of the surface the gripper is turned and shifted until both pads meet the object squarely and in their
+middles. A bed of springs gives the pressures that rank them; nothing is solved. What is wider than the opening, runs
+into the fingers or slips comes with that state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from softjaw.friction.patch import NoContactError
+from softjaw.study.case.contact import angle, slips
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+GRID = (25, 11)  # points of a pad's face along length and width
+FINGER_GRID = (31, 21)  # of a finger, where it is larger than its pad
+SAMPLES = 300  # points of the surface from which grasps are looked for
+TURNS = 4  # rounds of setting a grasp straight; most end after two
+STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
+CENTRED = 5e-4  # shift between two rounds that ends them [m]
+FLATTEST = 0.05  # relative difference of principal curvatures below which the long side follows the object's own axes
+APART = 0.25  # of the pad's length: grasps that are nearer, and alike in direction, are one
+ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
+STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
+WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of a grasp
+WIDE, COLLIDES, SLIPS = "too wide", "collides", "slips"
+
+
+@dataclass(frozen=True)
+class SampledGrasp:
+    """A grasp as the spring foundation sees it.
+
+    Parameters
+    ----------
+    point : (3,) array
+        Middle between both contacts [m].
+    approach, long_side : (3,) arrays
+        Finger 1's approach and the pads' long side.
+    opening : float
+        Distance of the pads' faces at first touch [m].
+    quality : float
+        Torque arm of the weaker finger, less what curvature and misalignment take, for ranking [m].
+    state : str
+        Empty, or why it is not worth a solve: `WIDE`, `COLLIDES`, `SLIPS`.
+    """
+
+    point: FloatArray
+    approach: FloatArray
+    long_side: FloatArray
+    opening: float
+    quality: float
+    state: str = ""
+
+
+@dataclass(frozen=True)
+class Jaws:
+    """What a grasp is looked for with: lengths [m], stiffness of the springs [Pa/m], normal force [N]."""
+
+    pad: tuple[float, float, float]
+    stiffness: float
+    mu: float
+    force: float
+    max_opening: float = math.inf
+    finger: tuple[float, float] | None = None  # length and width of what carries the pad; None: as the pad
+
+
+@njit(cache=True)
+def height_fields(points, triangles, x, y):
+    """Lowest and highest z of a surface over the grid ``x (m,)`` times ``y (n,)``: two ``(m, n)`` arrays.
+
+    Infinite (positive in the lowest, negative in the highest) where a line along z misses every triangle. ``points
+    (k, 3)`` are in the frame of the grid, whose steps are even.
+    """
+    m, n = len(x), len(y)
+    low, high = np.full((m, n), np.inf), np.full((m, n), -np.inf)
+    dx, dy = x[1] - x[0], y[1] - y[0]
+    for t in range(len(triangles)):
+        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
+        left, right = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
+        near, far = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        if right < x[0] or left > x[-1] or far < y[0] or near > y[-1]:
+            continue
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if area == 0.0:  # seen from its edge: its neighbours have the line
+            continue
+        first, last = max(0, math.ceil((left - x[0]) / dx)), min(m - 1, math.floor((right - x[0]) / dx))
+        start, stop = max(0, math.ceil((near - y[0]) / dy)), min(n - 1, math.floor((far - y[0]) / dy))
+        for i in range(first, last + 1):
+            for j in range(start, stop + 1):
+                u = ((b[0] - x[i]) * (c[1] - y[j]) - (b[1] - y[j]) * (c[0] - x[i])) / area
+                v = ((c[0] - x[i]) * (a[1] - y[j]) - (c[1] - y[j]) * (a[0] - x[i])) / area
+                w = 1.0 - u - v
+                if u >= -1e-12 and v >= -1e-12 and w >= -1e-12:
+                    z = u * a[2] + v * b[2] + w * c[2]
+                    low[i, j], high[i, j] = min(low[i, j], z), max(high[i, j], z)
+    return low, high
+
+
+def axes_of(approach: FloatArray, along: FloatArray) -> FloatArray:
+    """Rotation with the long side (the part of ``along`` across the approach), short side and approach as columns."""
+    across = along - (along @ approach) * approach
+    if np.linalg.norm(across) < 1e-6:
+        across = np.eye(3)[np.argmin(np.abs(approach))] - approach[np.argmin(np.abs(approach))] * approach
+    long_side = across / np.linalg.norm(across)
+    return np.column_stack([long_side, np.cross(approach, long_side), approach])
+
+
+class Side:
+    """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
+
+    def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
+        self.touch = float(np.min(height))
+        self.height = height - self.touch
+        self.x, self.y = np.meshgrid(x, y, indexing="ij")
+        self.cell = (x[1] - x[0]) * (y[1] - y[0])
+        depth = _closing(np.sort(self.height[np.isfinite(self.height)]), jaws.force / (jaws.stiffness * self.cell))
+        self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
+        filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
+        self.slope = np.stack(np.gradient(filled, x, y), axis=-1)
+        # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
+        edge = np.abs(self.slope).max(axis=-1) > STEEPEST
+        self.slope[edge] = 0.0
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre of pressure on the face ``(2,)`` [m]."""
+        total = self.pressure.sum()
+        return np.array([(self.pressure * self.x).sum(), (self.pressure * self.y).sum()]) / total
+
+    @property
+    def normal(self) -> FloatArray:
+        """Mean direction into the object in the pad's frame, weighted by pressure; z is the approach ``(3,)``."""
+        mean = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
+        # the height grows where the surface recedes: its outward normal leans towards that side
+        direction = np.array([-mean[0], -mean[1], 1.0])
+        return direction / np.linalg.norm(direction)
+
+    @property
+    def arm(self) -> float:
+        """Mean distance of the pressure from its centre: e_n of a planar contact [m]."""
+        cx, cy = self.centre
+        return float((self.pressure * np.hypot(self.x - cx, self.y - cy)).sum() / self.pressure.sum())
+
+    @property
+    def kept(self) -> float:
+        """Share of the pressure sum that acts along the approach: what curvature leaves of the normal force."""
+        cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
+        return float((self.pressure * cosine).sum() / self.pressure.sum())
+
+
+def _closing(height: FloatArray, wanted: float) -> float:
+    """Closing at which springs that touch at ``height``, ascending [m], sum up to ``wanted`` [m]."""
+    goal = (wanted + np.cumsum(height)) / np.arange(1, len(height) + 1)
+    return float(goal[np.flatnonzero(goal >= height)[-1]])
+
+
+class Grip:
+    """Both pads on a surface, in one pose of the gripper."""
+
+    def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
+        self.point, self.axes, self.jaws = point, axes, jaws
+        length, width, _ = jaws.pad
+        x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
+        local = (surface[0] - point) @ axes
+        self.local, self.triangles = np.ascontiguousarray(local), surface[1]
+        low, high = height_fields(self.local, self.triangles, x, y)
+        if not np.isfinite(low).any():
+            raise NoContactError("the pad passes the object")
+        # finger 2 looks against the approach, with its short side reversed
+        self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
+
+    @property
+    def opening(self) -> float:
+        """Distance of the pads' faces at first touch [m]."""
+        return -self.sides[0].touch - self.sides[1].touch
+
+    @property
+    def tilt(self) -> FloatArray:
+        """Approach that meets both contacts squarely, in the frame of the gripper ``(3,)``."""
+        one, two = (side.normal for side in self.sides)
+        mean = one + np.array([two[0], -two[1], two[2]]) * [-1.0, -1.0, 1.0]
+        return mean / np.linalg.norm(mean)
+
+    @property
+    def shift(self) -> FloatArray:
+        """From the middle of the pads to the middle of both centres of pressure ``(2,)`` [m]."""
+        one, two = (side.centre for side in self.sides)
+        return 0.5 * (one + two * [1.0, -1.0])
+
+    @property
+    def misalignment(self) -> tuple[float, float]:
+        """Angle between one contact normal and the other reversed, and of their line to a normal [rad]."""
+        one, two = self.sides[0].normal, self.sides[1].normal * [1.0, -1.0, -1.0]
+        (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
+        line = np.array([u - x, -v - y, self.opening])
+        return angle(one, -two), max(angle(one, line), angle(-two, line))
+
+    def collides(self) -> bool:
+        """Whether the object reaches past a backing plate beside the pad, where the finger is larger than the pad."""
+        if self.jaws.finger is None:
+            return False
+        steps = (np.linspace(-0.5, 0.5, n) * side for side, n in zip(self.jaws.finger, FINGER_GRID, strict=True))
+        low, high = height_fields(self.local, self.triangles, *steps)
+        depth = self.jaws.pad[2]
+        return bool(low.min() < self.sides[0].touch - depth or high.max() > -self.sides[1].touch + depth)
+
+
+def straightened(surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> Grip:
+    """Turn and shift a gripper until both pads meet the object squarely and in their middles, or a few rounds are over.
+
+    Raises
+    ------
+    NoContactError
+        Where the pads pass the object.
+    """
+    grip = Grip(surface, point, axes, jaws)
+    for _ in range(TURNS):
+        tilt, shift = grip.tilt, grip.shift
+        approach = grip.axes @ tilt
+        depth = 0.5 * (
+            grip.sides[0].touch - grip.sides[1].touch
+        )  # the middle between both contacts, along the approach
+        point = grip.point + grip.axes @ np.array([*shift, depth])
+        axes = axes_of(approach / np.linalg.norm(approach), grip.axes[:, 0])
+        done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < CENTRED
+        grip = Grip(surface, point, axes, jaws)
+        if done:
+            break
+    return grip
+
+
+def same_place(one: Grip, other: Grip) -> bool:
+    """Whether two grips are so near that both would lead to the same grasps."""
+    near = np.linalg.norm(one.point - other.point) < 0.5 * APART * one.jaws.pad[0]
+    return bool(near and abs(one.axes[:, 2] @ other.axes[:, 2]) > math.cos(0.5 * ALIKE))
+
+
+def long_sides(grip: Grip, own: FloatArray) -> list[FloatArray]:
+    """Directions for the pads' long side, in space: the flattest of the surface and the one across it.
+
+    Where the surface curves alike every way, the object's own longest axis ``own`` decides.
+    """
+    H = sum(_curvature(side, flip) for side, flip in zip(grip.sides, (1.0, -1.0), strict=True))
+    values, vectors = np.linalg.eigh(H)
+    order = np.argsort(np.abs(values))
+    small, large = np.abs(values)[order]
+    flattest = grip.axes[:, :2] @ vectors[:, order[0]]
+    if large - small <= FLATTEST * max(large, 1.0 / grip.jaws.pad[0]):
+        flattest = axes_of(grip.axes[:, 2], own)[:, 0]
+    return [flattest, np.cross(grip.axes[:, 2], flattest)]
+
+
+def _curvature(side: Side, flip: float) -> FloatArray:
+    """Hessian ``(2, 2)`` of the quadratic that fits the height field under the pressure best [1/m]."""
+    loaded = side.pressure > 0.0
+    if np.count_nonzero(loaded) < 8:
+        return np.zeros((2, 2))
+    x, y = side.x[loaded], flip * side.y[loaded]
+    A = np.column_stack([np.ones_like(x), x, y, 0.5 * x * x, x * y, 0.5 * y * y])
+    w = np.sqrt(side.pressure[loaded])
+    a = np.linalg.lstsq(A * w[:, None], side.height[loaded] * w, rcond=None)[0]
+    return np.array([[a[3], a[4]], [a[4], a[5]]])
+
+
+def antipodal_grasps(
+    surface: tuple[FloatArray, IntArray], jaws: Jaws, count: int, seed: int = 0, samples: int = SAMPLES
+) -> list[SampledGrasp]:
+    """At most ``count`` distinct grasps of a surface, the best first; then those that are not worth a solve.
+
+    Parameters
+    ----------
+    surface : (k, 3) array, (m, 3) int array
+        Points [m] and triangles.
+    jaws : Jaws
+    count : int
+        Grasps that can be solved.
+    seed : int
+        Of the points where grasps are looked for; the same seed gives the same grasps on every machine.
+    """
+    points, triangles = (np.ascontiguousarray(part) for part in surface)
+    own = longest_axis(points, triangles)
+    seen: list[SampledGrasp] = []
+    starts: list[Grip] = []
+    for place, normal in sampled(points, triangles, samples, seed):
+        try:
+            start = straightened((points, triangles), place, axes_of(-normal, own), jaws)
+            if any(same_place(start, other) for other in starts):
+                continue
+            starts.append(start)
+            for along in long_sides(start, own):
+                axes = axes_of(start.axes[:, 2], along)
+                seen.append(judged(straightened((points, triangles), start.point, axes, jaws)))
+        except NoContactError:
+            continue
+    return thinned(seen, count, jaws.pad[0])
+
+
+def sampled(points: FloatArray, triangles: IntArray, count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:
+    """Points spread evenly over the area of a surface, with the normals of their triangles."""
+    corners = points[triangles]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    rng = np.random.default_rng(seed)
+    # one point in each of `count` equal shares of the area: fewer gaps than independent points have
+    share = (np.arange(count) + rng.random(count)) / count * area.sum()
+    chosen = np.minimum(np.searchsorted(np.cumsum(area), share), len(triangles) - 1)
+    u, v = rng.random((2, count))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    a, b, c = corners[chosen].transpose(1, 0, 2)
+    place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return list(zip(place, cross[chosen] / area[chosen, None], strict=True))
+
+
+def longest_axis(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Direction in which a surface extends furthest: the first principal axis of its area ``(3,)``."""
+    corners = points[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = corners.mean(axis=1)
+    off = middle - area @ middle / area.sum()
+    axis = np.linalg.eigh((off * area[:, None]).T @ off)[1][:, -1]
+    return axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
+
+
+def judged(grip: Grip) -> SampledGrasp:
+    """State and rank of a grasp: the weaker finger's torque arm, less what curvature and misalignment take."""
+    normals, line = grip.misalignment
+    quality = min(side.arm * side.kept for side in grip.sides) * max(0.0, 1.0 - normals / WORST)
+    state = ""
+    if grip.opening > grip.jaws.max_opening:
+        state = WIDE
+    elif grip.collides():
+        state = COLLIDES
+    elif slips(line, grip.jaws.mu):
+        state = SLIPS
+    return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, quality, state)
+
+
+def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[SampledGrasp]:
+    """The best ``count`` distinct grasps, worth a solve first; of those that are not, as many at most."""
+    kept: list[SampledGrasp] = []
+    for good in (True, False):
+        chosen: list[SampledGrasp] = []
+        for grasp in sorted((g for g in seen if (not g.state) is good), key=lambda g: -g.quality):
+            if len(chosen) == count:
+                break
+            if not any(same_grasp(grasp, other, length) for other in (*kept, *chosen)):
+                chosen.append(grasp)
+        kept += chosen
+    return kept
+
+
+def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
+    """Whether two grasps are alike in place, approach and roll; the fingers may change places."""
+    return (
+        float(np.linalg.norm(one.point - other.point)) < APART * length
+        and abs(float(one.approach @ other.approach)) > math.cos(ALIKE)
+        and abs(float(one.long_side @ other.long_side)) > math.cos(ROLLED)
+    )

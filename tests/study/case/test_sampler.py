@@ -1,0 +1,109 @@
+"""Sampled grasps: height fields by closed forms, grasps of bodies whose best place is known, states, determinism."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from softjaw.study.case.sampler import (
+    COLLIDES,
+    WIDE,
+    Grip,
+    Jaws,
+    antipodal_grasps,
+    axes_of,
+    height_fields,
+    same_grasp,
+)
+
+PAD = (0.05, 0.022, 0.015)
+JAWS = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0)
+NARROW = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0, max_opening=0.1)  # the ends are too far apart
+
+
+def surface(mesh):
+    return np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+
+
+def box(*size):
+    return surface(trimesh.creation.box(extents=size))
+
+
+def test_height_fields_of_a_ball_are_its_two_caps():
+    radius = 0.03
+    points, triangles = surface(trimesh.creation.icosphere(5, radius))
+    x = np.linspace(-0.02, 0.02, 9)
+    low, high = height_fields(points, triangles, x, x)
+    cap = np.sqrt(radius**2 - x[:, None] ** 2 - x[None, :] ** 2)
+    np.testing.assert_allclose(high, cap, atol=2e-5)
+    np.testing.assert_allclose(low, -cap, atol=2e-5)
+
+
+def test_lines_that_miss_the_object_are_infinite():
+    low, high = height_fields(*box(0.01, 0.01, 0.01), np.linspace(-0.02, 0.02, 5), np.linspace(-0.02, 0.02, 5))
+    assert np.isfinite(low).sum() == np.isfinite(high).sum() == 1
+    assert (low[2, 2], high[2, 2]) == pytest.approx((-0.005, 0.005))
+
+
+def test_a_bar_is_held_across_its_short_side_in_its_middle():
+    """Every pad that lies flat within the 40 x 200 mm faces is as good as any other; none is across the long side."""
+    grasps = antipodal_grasps(box(0.04, 0.06, 0.2), Jaws(**vars(JAWS) | {"max_opening": 0.05}), 6, samples=60)
+    good = [g for g in grasps if not g.state]
+    assert good
+    for g in good:
+        assert abs(g.approach[0]) == pytest.approx(1.0, abs=2e-3)
+        assert g.opening == pytest.approx(0.04, abs=2e-4)
+    assert all(g.opening > 0.05 for g in grasps if g.state == WIDE)
+    assert any(g.state == WIDE for g in grasps)
+
+
+def test_a_cylinder_is_held_through_its_axis_with_the_long_side_along_it():
+    grasps = antipodal_grasps(surface(trimesh.creation.cylinder(0.03, 0.2, sections=96)), NARROW, 4, samples=60)
+    best = grasps[0]
+    axis_distance = np.linalg.norm(np.cross(best.point - [0, 0, 0], [0, 0, 1]))
+    assert axis_distance < 5e-4
+    assert abs(best.approach[2]) < 0.02
+    assert abs(best.long_side[2]) > 0.99
+    assert best.opening == pytest.approx(0.06, rel=5e-3)
+
+
+def test_inner_walls_holes_and_windings_do_not_count():
+    outer, inner = trimesh.creation.icosphere(4, 0.03), trimesh.creation.icosphere(4, 0.028)
+    hollow = trimesh.util.concatenate([outer, inner])
+    turned = surface(outer)[0], surface(outer)[1][:, ::-1]
+    grip = Grip(surface(outer), np.zeros(3), np.eye(3), JAWS)
+    for other in (surface(hollow), turned):
+        same = Grip(other, np.zeros(3), np.eye(3), JAWS)
+        np.testing.assert_allclose(same.sides[0].pressure, grip.sides[0].pressure, atol=1e-6)
+        assert same.opening == pytest.approx(grip.opening, rel=1e-12)
+
+
+def test_the_pressure_carries_the_force_and_is_symmetric_on_a_ball():
+    grip = Grip(surface(trimesh.creation.icosphere(5, 0.03)), np.zeros(3), np.eye(3), JAWS)
+    for side in grip.sides:
+        assert side.pressure.sum() * side.cell == pytest.approx(JAWS.force, rel=1e-12)
+        np.testing.assert_allclose(side.centre, 0.0, atol=1e-5)
+    assert max(grip.misalignment) < 1e-3
+
+
+def test_fingers_that_are_larger_than_the_pads_meet_a_step():
+    """A plate with a rim that is higher than the pad is thick: the pad fits inside the rim, the finger does not."""
+    plate, rim = trimesh.creation.box(extents=(0.2, 0.2, 0.01)), trimesh.creation.box(extents=(0.01, 0.2, 0.08))
+    rim.apply_translation([0.035, 0, 0])
+    body = surface(trimesh.util.concatenate([plate, rim]))
+    pose = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
+    assert not Grip(body, np.zeros(3), pose, JAWS).collides()
+    assert Grip(body, np.zeros(3), pose, Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).collides()
+    assert COLLIDES
+
+
+def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():
+    body = surface(trimesh.creation.annulus(0.02, 0.03, 0.1))
+    one, two = (antipodal_grasps(body, JAWS, 8, seed=3, samples=40) for _ in range(2))
+    assert len(one) == len(two)
+    for a, b in zip(one, two, strict=True):
+        np.testing.assert_array_equal(a.point, b.point)
+        np.testing.assert_array_equal(a.approach, b.approach)
+    for i, a in enumerate(one):
+        assert not any(same_grasp(a, b, PAD[0]) for b in one[:i] if a.state == b.state)
