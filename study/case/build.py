@@ -142,6 +142,15 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls, *mended)
 
 
+def with_sampled_grasps(scene: Scene) -> Scene:
+    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`."""
+    if scene.candidates.sampler is None:
+        return scene
+    from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
+
+    return sampler.with_sampled_grasps(scene)
+
+
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
     """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
     shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)

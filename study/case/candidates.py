@@ -236,7 +236,7 @@ def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
         every point of the sweep, because a sweep can change the shape.
     """
     made: list[Unit] = []
-    forces, count = len(scene.load.normal_force_n), scene.candidates.count
+    forces, count = len(scene.load.normal_force_n), scene.candidates.total
     for point, values in enumerate(product(*scene.sweep.values())):
         here = scene.with_values(dict(zip(scene.sweep, values, strict=True)))
         places, cost = candidates(here), path_cost(here)

@@ -13,6 +13,7 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
+from softjaw.study.case.sampler import stiffness
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -207,12 +208,6 @@ def winkler_pad(gripper: Gripper, finger: model.Finger, points: tuple[int, int] 
     x, y = ((np.arange(n) + 0.5) / n - 0.5 for n in (nx, ny))
     place = np.stack(np.meshgrid(length * x, width * y, indexing="ij"), axis=-1).reshape(-1, 2)
     return WinklerPad(place, length * width / (nx * ny), _heights(finger, place, thickness), stiffness(gripper))
-
-
-def stiffness(gripper: Gripper) -> float:
-    """Modulus of confined compression over the pad's thickness [Pa/m]."""
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
 
 
 def _heights(finger: model.Finger, place: FloatArray, thickness: float) -> FloatArray:

@@ -20,7 +20,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import NoContactError
+from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import angle, slips
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.scene import Scene
+from softjaw.study.scene.grasps import Candidates, GraspPose
+from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -368,3 +373,60 @@ def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
         and abs(float(one.approach @ other.approach)) > math.cos(ALIKE)
         and abs(float(one.long_side @ other.long_side)) > math.cos(ROLLED)
     )
+
+
+# --- scenes -----------------------------------------------------------------------------------------------------------
+
+
+def stiffness(gripper: Gripper) -> float:
+    """Modulus of confined compression over the pad's thickness [Pa/m]."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
+
+
+def with_sampled_grasps(scene: Scene) -> Scene:
+    """The scene with the grasps that its sampler finds as explicit poses; as it is where it has no sampler.
+
+    Poses are rounded to 1 um and 1e-6, so that they are the same on every machine.
+
+    Raises
+    ------
+    StudyError
+        Where no grasp fits between the pads.
+    """
+    if scene.candidates.sampler is None:
+        return scene
+    gripper, forces = scene.gripper, scene.load.normal_force
+    jaws = Jaws(
+        gripper.pad_size, stiffness(gripper), scene.friction.mu, forces[len(forces) // 2],
+        math.inf if gripper.max_opening is None else gripper.max_opening,
+    )  # fmt: skip
+    obj = build_object(scene.object)
+    found = antipodal_grasps(obj.surface(), jaws, scene.candidates.count, scene.candidates.seed)
+    poses = tuple(_as_pose(grasp) for grasp in found if not grasp.state)
+    if not poses:
+        states = sorted({grasp.state for grasp in found}) or ["the pads pass the object"]
+        raise StudyError(
+            USAGE,
+            f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
+            " poses, another pad, or a larger gripper.max_opening_mm",
+        )
+    return scene.model_copy(update={"candidates": Candidates(poses=poses)})
+
+
+def _as_pose(grasp: SampledGrasp) -> GraspPose:
+    place = tuple(round(1e3 * float(x), 3) + 0.0 for x in grasp.point)
+    approach, long_side = (tuple(round(float(x), 6) + 0.0 for x in v) for v in (grasp.approach, grasp.long_side))
+    label = f"{place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f} mm, {_angle_text(approach)}"
+    return GraspPose(point_mm=place, approach=approach, long_side=long_side, label=label)
+
+
+def _angle_text(approach: Sequence[float]) -> str:
+    """Azimuth and elevation of an approach, which tell grasps at one place apart.
+
+    >>> _angle_text((0.0, 1.0, 0.0))
+    'from 90/0 deg'
+    """
+    azimuth = math.degrees(math.atan2(approach[1], approach[0]))
+    elevation = math.degrees(math.asin(max(-1.0, min(1.0, approach[2]))))
+    return f"from {azimuth:.0f}/{elevation:.0f} deg"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.case.build import build_object, check_object, warnings
+from softjaw.study.case.build import build_object, check_object, warnings, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.plan import make_plan, plan_text
 from softjaw.study.run.scaling import scaling_text
@@ -62,9 +62,12 @@ def schema(_options: Namespace) -> str:
 def scene_of(options: Namespace) -> Scene:
     """The scene that the command line names, with what it changes."""
     try:
-        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+        scene = load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
     except SceneError as error:
         raise StudyError(USAGE, str(error)) from error
+    if scene.candidates.sampler:
+        check_object(scene)
+    return with_sampled_grasps(scene)
 
 
 def target(options: Namespace, scene: Scene) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -58,7 +58,7 @@ class GraspPose(SceneSection):
 
 
 class Candidates(SceneSection):
-    """Where to grasp: stations along the object's axis x angles about it, or explicit poses."""
+    """Where to grasp: stations along the object's axis x angles about it, explicit poses, or sampled grasps."""
 
     stations: int | None = Field(
         None, ge=2, le=10_000, description="number of stations, spread evenly over station_range_mm"
@@ -81,6 +81,11 @@ class Candidates(SceneSection):
     poses: tuple[GraspPose, ...] = Field(
         (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
     )
+    sampler: Literal["antipodal"] | None = Field(
+        None, description="looks for grasps itself: pairs of places of the surface that face each other"
+    )
+    count: int = Field(12, ge=1, le=1000, description="distinct grasps that the sampler gives at most")
+    seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
 
     @property
@@ -99,8 +104,10 @@ class Candidates(SceneSection):
         return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
 
     @property
-    def count(self) -> int:
-        """Number of candidates."""
+    def total(self) -> int:
+        """Number of candidates; of a sampler as many as it may give."""
+        if self.sampler:
+            return self.count
         return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
 
     def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
@@ -111,17 +118,23 @@ class Candidates(SceneSection):
         """Exactly one way of giving the candidates."""
         spread = self.stations is not None or self.station_range_mm is not None
         given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
+        given["sampler"] = self.sampler is not None
         ways = [way for way in given if given[way]]
         if len(ways) != 1:
-            expected = "one of stations_mm, stations with station_range_mm, or [[candidates.poses]]"
+            expected = "one of stations_mm, stations with station_range_mm, sampler, or [[candidates.poses]]"
             remedy = "keep one of them" if ways else f"add one, {EXAMPLE}"
             yield Finding(tuple(ways[-1:]), " and ".join(ways) or "no grasp candidates", expected, remedy)
         if spread and (self.stations is None or self.station_range_mm is None):
             found, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
             yield Finding((found,), f"{found} alone", f"{missing} beside it", f"add {missing}, {EXAMPLE}")
-        for key in ("angles_deg", "roll_deg") if self.poses else ():
+        for key in ("count", "seed") if not self.sampler else ():
             if getattr(self, key) != Candidates.model_fields[key].default:
-                yield Finding((key,), f"{key} beside explicit poses", "it with stations only", "remove it")
+                yield Finding(
+                    (key,), f"{key} without a sampler", 'sampler = "antipodal" beside it', "add it, or remove this"
+                )
+        for key in ("angles_deg", "roll_deg") if self.poses or self.sampler else ():
+            if getattr(self, key) != Candidates.model_fields[key].default:
+                yield Finding((key,), f"{key} without stations", "it with stations only", "remove it")
         for i, pose in enumerate(self.poses):
             yield from (f.below("poses", i) for f in pose.findings())
 

@@ -114,7 +114,7 @@ class Scene(SceneSection):
         """Numbers of the candidates whose sampled wrenches are stored, rising."""
         names = self.limit_surface.wrench_samples
         if isinstance(names, str):
-            return tuple(range(self.candidates.count)) if names == "all" else ()
+            return tuple(range(self.candidates.total)) if names == "all" else ()
         return tuple(sorted(self.candidates.numbers(names)))
 
     @property
@@ -128,15 +128,18 @@ class Scene(SceneSection):
     @property
     def cases(self) -> int:
         """Number of cases: candidates x forces x points of the sweep."""
-        return self.candidates.count * len(self.load.normal_force_n) * math.prod(map(len, self.sweep.values()))
+        return self.candidates.total * len(self.load.normal_force_n) * math.prod(map(len, self.sweep.values()))
 
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""
         data = self.model_dump(exclude_none=True)
         if self.candidates.poses:
             data["candidates"] = {"poses": data["candidates"]["poses"]}
+        elif self.candidates.sampler:
+            data["candidates"] = {key: data["candidates"][key] for key in ("sampler", "count", "seed")}
         else:
-            del data["candidates"]["poses"]
+            for key in ("poses", "count", "seed"):
+                del data["candidates"][key]
         return data
 
     def effective_toml(self) -> str:

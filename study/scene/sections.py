@@ -52,12 +52,16 @@ class Gripper(SceneSection):
     grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
     grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
+    max_opening_mm: float | None = Field(
+        None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not sampled"
+    )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
     sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
     sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
+    max_opening = si("max_opening_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
     sheet_support = si("sheet_support_mm")
 

@@ -16,9 +16,9 @@ def scene_text(scene: Any, file: str) -> str:
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
     where = (
-        f"{c.count} explicit poses"
+        f"{c.total} explicit poses"
         if c.poses
-        else f"{c.count}: {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
+        else f"{c.total}: {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
     )
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
     mesh = " x ".join(map(str, g.elements))

@@ -15,7 +15,10 @@ from softjaw.study.case.sampler import (
     axes_of,
     height_fields,
     same_grasp,
+    with_sampled_grasps,
 )
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.scene import SceneError, parse_scene
 
 PAD = (0.05, 0.022, 0.015)
 JAWS = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0)
@@ -107,3 +110,48 @@ def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():
         np.testing.assert_array_equal(a.approach, b.approach)
     for i, a in enumerate(one):
         assert not any(same_grasp(a, b, PAD[0]) for b in one[:i] if a.state == b.state)
+
+
+SCENE = """
+[object]
+shape = "box"
+size_mm = [40, 60, 120]
+edge_radius_mm = 4
+[gripper]
+max_opening_mm = {opening}
+[friction]
+[load]
+normal_force_n = [2, 5]
+[candidates]
+sampler = "antipodal"
+count = 3
+{more}
+"""
+
+
+def sampled_scene(opening=50, more=""):
+    return with_sampled_grasps(parse_scene(SCENE.format(opening=opening, more=more)))
+
+
+def test_a_scene_gets_the_grasps_as_poses_once_and_for_all():
+    scene = sampled_scene()
+    poses = scene.candidates.poses
+    assert 1 <= len(poses) <= 3
+    assert all(abs(pose.approach[0]) > 0.99 for pose in poses)  # across the 40 mm
+    assert scene.digest == sampled_scene().digest
+    assert parse_scene(scene.effective_toml()).digest == scene.digest  # what a file keeps needs no sampler
+    assert sampled_scene(more="seed = 7").digest != scene.digest
+
+
+def test_a_scene_without_a_grasp_between_the_pads_is_refused():
+    with pytest.raises(StudyError) as refused:
+        sampled_scene(opening=20)
+    assert refused.value.code == USAGE
+    assert "max_opening_mm" in str(refused.value)
+
+
+@pytest.mark.parametrize("more", ["angles_deg = [0]", "stations_mm = [20]"])
+def test_a_sampler_excludes_stations(more):
+    with pytest.raises(SceneError) as refused:
+        parse_scene(SCENE.format(opening=50, more=more))
+    assert any("candidates" in problem for problem in map(str, refused.value.problems))
