@@ -14,7 +14,7 @@ from pathlib import Path
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 
 HERE = Path(__file__).parent
-PAD_LENGTH, PAD_WIDTH = 50.0, 22.0  # mm; of objects that are large enough for such pads
+PAD_LENGTH = 50.0  # mm, as in the templates
 
 
 def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) -> str:
@@ -74,25 +74,22 @@ def _filled(template: str, words: dict[str, str]) -> str:
 
 
 def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str, str]:
-    """What the scene says about a mesh: its file, and stations and pads that fit its size."""
+    """What the scene says about a mesh: its file, its size, and stations that fit it."""
     if not options.mesh or not options.unit:
         needs = {"--mesh FILE": options.mesh, "--unit": options.unit}
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
     *across, height = measure(options)
-    length = min(PAD_LENGTH, _rounded(0.5 * height))
-    width = min(PAD_WIDTH, _rounded(min(across)))
+    half = 0.5 * min(PAD_LENGTH, _rounded(0.5 * height))
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
     return {
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
         "AXIS": options.axis,
         "SIZE": " x ".join(f"{side:.4g}" for side in (*across, height)),
-        "LENGTH": f"{length:g}",
-        "WIDTH": f"{width:g}",
-        "LOW": f"{_rounded(0.5 * length):g}",
-        "HIGH": f"{height - 0.5 * length:.4g}",
+        "LOW": f"{_rounded(half):g}",
+        "HIGH": f"{height - half:.4g}",
     }
 
 

@@ -21,8 +21,7 @@ SMALL = {  # what makes a run of a second or two of each kind
     "cup": ["candidates.stations=2", "load.normal_force_n=[0.5]",
             "effects.object='rigid'"],
     "cylinder": ["load.normal_force_n=[3]", "accuracy.meshes=1"],
-    "mesh": ["candidates.stations=2", "candidates.angles_deg=[0]",
-             "load.normal_force_n=[2]"],
+    "mesh": ["candidates.count=2", "load.normal_force_n=[2]"],
 }  # fmt: skip
 
 
@@ -80,17 +79,18 @@ def test_lines_behind_a_number_sign_make_the_bottle_thin_walled(tmp_path):
     assert (scene.object.wall_mm, scene.object.allowed_dent_mm) == (0.4, 3)
 
 
-def test_stations_and_pads_follow_the_box_round_the_mesh(tmp_path):
-    """The flask is 120 mm high and 49.7 mm wide along y."""
+def test_a_mesh_gets_a_sampler_and_keeps_the_pads(tmp_path):
+    """The flask is 120 mm high and 49.7 mm wide along y; stations that fit it stand in comments."""
     assert started("mesh", "-o", "sub/flask") == 0
     scene = load_scene(tmp_path / "sub" / "flask.toml")
-    assert scene.candidates.station_range_mm == (25, 95)
+    assert (scene.candidates.sampler, scene.candidates.count) == ("antipodal", 12)
+    assert "# station_range_mm = [25, 95]" in (tmp_path / "sub" / "flask.toml").read_text()
     assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
     assert (tmp_path / "sub" / scene.object.mesh).resolve() == FLASK.resolve()
     assert started("mesh", "-o", "lying.toml", "--axis", "y") == 0
-    lying = load_scene(tmp_path / "lying.toml")  # shorter pads
-    assert (lying.object.axis, lying.gripper.pad_length_mm) == ("y", 25)
-    assert lying.candidates.station_range_mm[0] == 12
+    lying = load_scene(tmp_path / "lying.toml")
+    assert (lying.object.axis, lying.gripper.pad_length_mm) == ("y", 50)
+    assert "# station_range_mm = [12, " in (tmp_path / "lying.toml").read_text()
 
 
 @pytest.mark.parametrize("there", ["bottle.toml", "bottle.sbatch"])
