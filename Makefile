@@ -45,7 +45,7 @@ help:
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
-	@echo 'make lint       ruff'
+	@echo 'make lint       ruff and mypy'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
 	@echo 'make setup      only what each of the above does first: packages and .venv'
 
@@ -94,6 +94,7 @@ bench: setup
 
 lint: setup
 	$(BIN)/ruff check .
+	$(BIN)/python -m mypy -p softjaw
 
 doctor: setup
 	@$(BIN)/softjaw doctor

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
-from softjaw.friction.wrench import Model, checked_mu, friction_sums, model_faces
+from softjaw.friction.wrench import checked_mu, friction_sums, model_faces
 
 MAX_CUTS = 2000
 
 
-def pure_torque(patch: ContactPatch, mu: float, model: Model = "ccm", tolerance: float = 1e-9) -> float:
+def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: float = 1e-9) -> float:
     """Torque limit at zero net force: the least ``H(v_x, v_y, 1)`` over all sliding velocities.
 
     `FrictionLimits.tau_z` is the largest torque about the origin whatever force comes with it; on asymmetric patches

@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
@@ -32,8 +31,7 @@ from numpy.typing import ArrayLike
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
-Model = Literal["ccm", "pcm", "pcm_projected", "unrolled"]
-MODELS: tuple[str, ...] = get_args(Model)
+MODELS = ("ccm", "pcm", "pcm_projected", "unrolled")
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ class FrictionLimits:
 
 
 def friction_wrench(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
+    patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
 ) -> FloatArray:
     """Total friction wrench on the patch for each slip motion, Eqs. (6)-(8), in the load convention.
 
@@ -109,7 +107,7 @@ def friction_wrench(
 
 
 def friction_support(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
+    patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
 ) -> FloatArray:
     """Power ``H(t) = w(t) . t = mu sum p a |P v|`` that friction takes from each motion, ``(m,)`` [W].
 
@@ -121,7 +119,7 @@ def friction_support(
 
 
 def friction_limits(
-    patch: ContactPatch, mu: float, model: Model = "ccm", unrolled: ArrayLike | None = None
+    patch: ContactPatch, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
 ) -> FrictionLimits:
     """Largest forces along x and y and largest torque about z, from three motions; see `friction_wrench`."""
     # for mu = 1, so that e_n, a length of the patch, does not change in its last bits with mu
@@ -133,7 +131,7 @@ def friction_limits(
 
 
 def model_faces(
-    patch: ContactPatch, model: Model, unrolled: ArrayLike | None = None
+    patch: ContactPatch, model: str, unrolled: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Arms ``(3, n)``, unit normals ``(3, n)`` and loads ``(n,)`` of the loaded faces, as the model sees them.
 
@@ -168,7 +166,7 @@ def checked_mu(mu: float) -> float:
 
 
 def _sums(
-    patch: ContactPatch, twist: ArrayLike, model: Model, unrolled: ArrayLike | None
+    patch: ContactPatch, twist: ArrayLike, model: str, unrolled: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
     """Kernel sums ``(m, 7)`` for motions scaled by ``1 / scale``, and ``scale (m,)``."""
     arm, normal, load = model_faces(patch, model, unrolled)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 
@@ -66,8 +66,8 @@ class Score:
 
 
 def score(
-    contact1: Sequence[float],
-    contact2: Sequence[float],
+    contact1: Iterable[float],
+    contact2: Iterable[float],
     distance: float,
     object_length: float,
     contact_length: float,
@@ -126,7 +126,7 @@ def simplified_contact(mu: float, e_n: float) -> tuple[float, float, float]:
     return mu, mu, mu * e_n
 
 
-def _scaled(name: str, contact: Sequence[float], length: float) -> tuple[float, float, float]:
+def _scaled(name: str, contact: Iterable[float], length: float) -> tuple[float, float, float]:
     f_x, f_y, tau_z = map(float, contact)
     for label, value in (("f_x", f_x), ("f_y", f_y), ("tau_z", tau_z)):
         if not 0 <= value < math.inf:

@@ -51,9 +51,8 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     values, fits = evaluate(fine, settings)
     values |= _state_values(fine)
     values["maps/flags"] |= state_flags(fine)
-    # a rigid object has no wall, and neither values nor flags of one
+    values |= solving.wall_values(outcome)
     if outcome.grips:
-        values |= solving.wall_values(outcome)
         values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
     if scene.accuracy.meshes == 2:
         values |= mesh_errors(fine, [c for _, c in outcome.contacts], values, settings)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, Self
 
 import numpy as np
@@ -164,7 +165,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         grazed |= bool((g[t < reach] < GRAZE).any())
         hit = g <= -GRAZE
         if hit.any():
-            first = min(first, _bisected(lambda s, which=active[hit]: gap(which, s), low[hit], t[hit]).min())
+            first = min(first, _bisected(partial(gap, active[hit]), low[hit], t[hit]).min())
         keep = ~hit & (t < min(first, reach))
         active, t, g = active[keep], t[keep], g[keep]
     if np.isinf(first) and grazed:

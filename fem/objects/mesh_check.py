@@ -263,7 +263,7 @@ def _oriented(
     flip = label[:n] > label[n:]
     triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
     piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
-    volume = np.bincount(piece, _volumes(points, triangles))
+    volume = np.asarray(np.bincount(piece, _volumes(points, triangles)), dtype=float)
     _refuse_flat(points, triangles, piece, volume)
     inverted = volume < 0
     triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)

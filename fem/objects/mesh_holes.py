@@ -30,7 +30,9 @@ def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
         return points, triangles, np.zeros(len(triangles), dtype=bool), []
     sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     taken = set(map(tuple, sides.tolist()))
-    parts, is_lid, filled, covered = [triangles], [np.zeros(len(triangles), dtype=bool)], [], []
+    parts, is_lid = [triangles], [np.zeros(len(triangles), dtype=bool)]
+    filled: list[str] = []
+    covered: list[str] = []
     for loop in loops:
         x = points[loop]
         across, middle = float(np.linalg.norm(np.ptp(x, axis=0))), x.mean(axis=0)
@@ -122,9 +124,9 @@ def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) ->
     while spans:
         i, j = spans.pop()
         if j > i + 1:
-            k = int(cut[i, j])
-            found.append((loop[i], loop[k], loop[j]))
-            spans += [(i, k), (k, j)]
+            corner = int(cut[i, j])
+            found.append((loop[i], loop[corner], loop[j]))
+            spans += [(i, corner), (corner, j)]
     return np.array(found)
 
 

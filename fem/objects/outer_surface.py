@@ -230,19 +230,19 @@ def _surface(body: Revolution, sections: list[Section]) -> OuterSurface:
 
 def _by_height(z: Sequence[float], values: ArrayLike) -> Callable:
     """Monotone cubic through the values, level at both ends and beyond."""
-    values = np.asarray(values, dtype=float)
-    if np.ptp(values) == 0:
-        return lambda x, order=0: np.full(np.shape(x), values[0] if order == 0 else 0.0)
+    y = np.asarray(values, dtype=float)
+    if np.ptp(y) == 0:
+        return lambda x, order=0: np.full(np.shape(x), y[0] if order == 0 else 0.0)
     far = np.ptp(z)
-    z, values = np.concatenate([[z[0] - far], z, [z[-1] + far]]), np.concatenate([values[:1], values, values[-1:]])
-    h, slope = np.diff(z), _slopes(z, values)
-    d, m, n = np.diff(values) / h, slope[:-1], slope[1:]
-    c = np.stack([values[:-1], m, (3 * d - 2 * m - n) / h, (m + n - 2 * d) / h**2])  # powers of x - z on each piece
+    knots, y = np.concatenate([[z[0] - far], z, [z[-1] + far]]), np.concatenate([y[:1], y, y[-1:]])
+    h, slope = np.diff(knots), _slopes(knots, y)
+    d, m, n = np.diff(y) / h, slope[:-1], slope[1:]
+    c = np.stack([y[:-1], m, (3 * d - 2 * m - n) / h, (m + n - 2 * d) / h**2])  # powers of x - z on each piece
 
     def derivative(x: FloatArray, order: int = 0) -> FloatArray:
-        x = np.clip(x, z[0], z[-1])
-        k = np.clip(np.searchsorted(z, x, side="right") - 1, 0, len(h) - 1)
-        return polyval(x - z[k], polyder(c[:, k], order), tensor=False)
+        x = np.clip(x, knots[0], knots[-1])
+        k = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(h) - 1)
+        return polyval(x - knots[k], polyder(c[:, k], order), tensor=False)
 
     return derivative
 
@@ -292,7 +292,8 @@ class Turned:
         quarters = self.angle / (0.5 * np.pi)
         if abs(quarters - round(quarters)) * 0.5 * np.pi > RIGHT_ANGLE:
             return False, False
-        return self.original.symmetric[:: -1 if round(quarters) % 2 else 1]
+        x, y = self.original.symmetric
+        return (y, x) if round(quarters) % 2 else (x, y)
 
     def station(self, z: float) -> float:
         """Place s on the wall at the height z [m]."""

@@ -183,7 +183,7 @@ def _on_a_line(points: FloatArray) -> bool:
 
 def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Points ``(n, 2)`` of the arc that leaves p along t and ends along u, and their arc length ``(n,)``."""
-    angle = np.arctan2(t[0] * u[1] - t[1] * u[0], t @ u)
+    angle = float(np.arctan2(t[0] * u[1] - t[1] * u[0], t @ u))
     angle = -np.pi if angle > np.pi - 1e-6 else angle
     phi = np.linspace(0.0, angle, 1 + max(2, int(np.ceil(abs(angle) / ARC_STEP))))
     left = np.sign(angle) * np.array([-t[1], t[0]])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, straight_runs, through
@@ -41,6 +42,8 @@ class Revolution(Analytic):
     curve: Curve = field(init=False, repr=False)
     smallest_radius: float = field(init=False)
     overshoot: float = field(init=False)
+    _places: FloatArray = field(init=False, repr=False)
+    _line: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Draw the curve, and refuse profiles that are no body's."""
@@ -128,7 +131,7 @@ def _checked_points(profile: FloatArray) -> FloatArray:
     return points if area > 0 else points[::-1].copy()
 
 
-def _first(flags: FloatArray) -> int:
+def _first(flags: NDArray[np.bool_]) -> int:
     """Number, from 1, of the first element that is set."""
     return int(np.flatnonzero(flags)[0]) + 1
 

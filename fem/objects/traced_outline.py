@@ -112,7 +112,8 @@ def cast(points: FloatArray, triangles: IntArray, z: FloatArray, centre: FloatAr
     np.maximum.at(outer, place, distance)
     np.minimum.at(inner, place, distance)
     outer[hits == 0] = inner[hits == 0] = np.nan
-    return Rays(*(v.reshape(len(z), count) for v in (outer, inner, hits)))
+    shape = len(z), count
+    return Rays(outer.reshape(shape), inner.reshape(shape), hits.reshape(shape))
 
 
 def _hits(segments: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatArray]:

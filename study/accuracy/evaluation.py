@@ -120,6 +120,7 @@ def _with_hulls(found: SolvedProbe, contacts: Sequence[Contact], points: int | N
     settings = found.settings
     cones = []
     for contact in linearised_contacts(soft(contacts, _ellipsoids(contacts)), points, settings.torques):
+        assert isinstance(contact.body, PolytopeBody)
         V = contact.body.vertices
         loads = contact.wrench_map(settings.arms, settings.torques, np.zeros(3))
         cones.append(np.vstack([np.zeros(6), np.hstack([np.ones((len(V), 1)), V]) @ loads.T]))

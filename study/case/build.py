@@ -38,7 +38,7 @@ def build_object(shape: Any) -> GapObject:
         case "mesh":
             return geometry().mesh_object(shape)
         case "revolution":
-            return objects.Revolution(np.array(shape.profile))
+            return _revolution(shape)
         case "sections":
             return geometry().stacked(outer_surface(shape)[0])
         case "elliptic_cylinder":
@@ -53,6 +53,11 @@ def build_object(shape: Any) -> GapObject:
 
 
 @lru_cache(maxsize=8)
+def _revolution(shape: Any) -> objects.Revolution:
+    return objects.Revolution(np.array(shape.profile))
+
+
+@lru_cache(maxsize=8)
 def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
     """Outer surface of an object that can have a wall, and whether it is a body of revolution.
 
@@ -62,7 +67,7 @@ def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
         For geometry that cannot be.
     """
     if shape.shape == "revolution":
-        return of_revolution(build_object(shape)), True
+        return of_revolution(_revolution(shape)), True
     if shape.shape == "mesh":
         surface, _ = geometry().traced_surface(shape)
         return surface, surface.round
@@ -138,7 +143,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
     meshes = dict.fromkeys(shape for shape in shapes if shape.shape == "mesh")
-    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in build_object(shape).notes]
+    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
     return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls, *mended)
 
 

@@ -72,7 +72,8 @@ def backing_plate_level(scene: Scene) -> BackingPlateLevel:
 
 @lru_cache(maxsize=8)
 def _compliance(gripper: Gripper) -> float:
-    shape, halves = pad_shape(gripper), tuple(n % 2 == 0 for n in gripper.elements[:2])
+    shape, (n, m, _) = pad_shape(gripper), gripper.elements
+    halves = n % 2 == 0, m % 2 == 0
     x, y = (tuple(map(float, shape.lines(axis, half))) for axis, half in enumerate(halves))
     foam = shape.size[2] / pad_material(gripper).young_modulus
     return relative_compliance(x, y, halves, backing_plate(gripper), foam)

@@ -68,9 +68,8 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
     """
     lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
     size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
-    wall = shape.wall if isinstance(shape.wall, float) else [list(pair) for pair in shape.wall]
     try:
-        body_mesh(surface, wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
+        body_mesh(surface, shape.wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
     except ValueError as error:
         key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
         raise StudyError(USAGE, f"object.{key}: {error}") from error

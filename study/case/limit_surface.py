@@ -28,7 +28,7 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
 from softjaw.lsfit.span import CollapsedFitError, span_ellipsoid
-from softjaw.lsfit.surface import FitError, LimitSurface
+from softjaw.lsfit.surface import FitError, Image, LimitSurface
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
@@ -130,7 +130,7 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
         return ellipsoid, STANDS_IN
 
 
-def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> Flag:
+def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> int:
     """`Flag.NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
     return Flag.NO_FIT * any(b.certificate == STANDS_IN for own in fits for b in own.values())
 
@@ -207,6 +207,8 @@ def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray
     surface = fit.surface
     if isinstance(surface, TiltedEllipsoid):
         return surface.A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+    assert isinstance(surface, Image)  # of a flat ellipsoid
+    assert isinstance(surface.inner, TiltedEllipsoid)
     inverse = np.linalg.pinv(surface.B)
     A = inverse.T @ surface.inner.A @ inverse
     return A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))

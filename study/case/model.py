@@ -124,7 +124,7 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     if wanted == "full":
         return False, False
     found = mirror_planes(finger.gap, scene.gripper.pad_size)
-    usable = tuple(plane and n % 2 == 0 for plane, n in zip(found, elements, strict=False))
+    usable = found[0] and elements[0] % 2 == 0, found[1] and elements[1] % 2 == 0
     # a coarser mesh for error estimates takes what it can use
     need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0
     if sum(usable) < need:
@@ -155,8 +155,7 @@ def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     fallback = None if nodal is wanted else nodal
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
-        steps = {"problem_of": problem, "load_steps": load_steps, "stepping": Stepping}
-        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), **steps)
+        return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), problem, load_steps, Stepping)
     return Press(wanted, finger.gap, dict(scene.petsc), fallback, settings(scene))
 
 

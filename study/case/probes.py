@@ -94,7 +94,7 @@ def held_out(scene: Scene, found: Sequence[Probe], count: int = HELD_OUT) -> lis
     units = grasps.units(scene, lambda point: point.axis_symmetry)
     new = [unit for unit in units if unit.index not in taken]
     lower, chosen = forces[:-1] or forces, _evenly(new, -(-count // min(2, len(forces))))
-    made = [(unit, (lower[i % len(lower)],)) for i, unit in enumerate(chosen)]
+    made: list[tuple[Any, Sequence[float]]] = [(unit, (lower[i % len(lower)],)) for i, unit in enumerate(chosen)]
     if not new:
         made = [(p.unit, _evenly([f for f in forces if f not in p.forces], count)) for p in found]
     return [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,7 @@ class Probing:
             path.close()
 
 
-def _path(unit: Any, variation: Variation) -> Iterator[tuple[float, float]]:
+def _path(unit: Any, variation: Variation) -> Generator[tuple[float, float], None, None]:
     """e_n [m] and quality, curved model, at each force of one further solve."""
     scene = unit.scene.with_values(variation.values) if variation.values else unit.scene
     poses = moved_poses(unit.candidate.poses, variation.shift, variation.turn)

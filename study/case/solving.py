@@ -75,7 +75,7 @@ class PressedContact(Contact):
         return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
 
 
-def state_flags(contacts: Sequence[PressedContact]) -> Flag:
+def state_flags(contacts: Sequence[PressedContact]) -> int:
     """Flags of the solved states of both fingers."""
     one, two = contacts
     between_faces = float((two.finger.pose.origin - one.finger.pose.origin) @ one.finger.pose.rotation[:, 2])
@@ -105,12 +105,18 @@ class Solver(Protocol):
     ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
     """
 
-    level: WallLevel | None
     fingers_solved: int
     planes: int
 
+    @property
+    def level(self) -> WallLevel | None:
+        """Of the object's compliance."""
+
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
+
+    def wall_values(self, solved: Solved) -> dict[str, Any]:
+        """What the wall bears at one force, keyed as in ``study.quantities``; a rigid object has none."""
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
@@ -135,7 +141,8 @@ class OnRigid:
 
     def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: WallLevel | None) -> None:
         self.scene, self.fingers, self.level = scene, fingers, level
-        self.shared = turn_of_pose(*poses, scene.object.axis_symmetry) is not None
+        one, other = poses
+        self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
         self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
@@ -150,6 +157,10 @@ class OnRigid:
             if self.shared:  # an image finger has its partner's states; only its place differs
                 contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
             yield Solved(contacts, [s for own in states for s in own], [])
+
+    def wall_values(self, solved: Solved) -> dict[str, Any]:
+        """See `Solver`."""
+        return {}
 
     def destroy(self) -> None:
         """See `Solver`."""
@@ -176,7 +187,7 @@ class OnWall:
             yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
 
     def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.quantities``."""
+        """See `Solver`."""
         shell = self.grips[0].problem.model.shell
         return wall_values(self.scene, self.held[0], solved.grips[0], shell)
 
@@ -216,7 +227,7 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     """Grasp frame and the planes of symmetry that meshes and scene allow."""
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
     wanted = scene.effects.model_size
-    body, poses = thin_body(scene.object), tuple(f.pose for f in fingers)
+    body, poses = thin_body(scene.object), (fingers[0].pose, fingers[1].pose)
     held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
     if wanted == "half" and all(held.mirrors):
         held = grasp(body, poses, (False, True))

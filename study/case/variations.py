@@ -14,6 +14,7 @@ import numpy as np
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.scene import Scene
+from softjaw.study.scene.objects import Walled
 
 COARSEST_WALL, FEWEST = 50.0, 2  # mm, and elements along a side, as scenes allow
 
@@ -96,7 +97,7 @@ def _stiffer(scene: Scene) -> dict[str, Any]:
 
 def _thicker(scene: Scene) -> dict[str, Any]:
     times, shape = 1 + scene.uncertainty.wall_thickness_percent / 100, scene.object
-    if not has_wall(shape):
+    if not isinstance(shape, Walled) or shape.wall is None:
         return {}
     found: dict[str, Any] = {}
     if shape.wall_mm is not None:

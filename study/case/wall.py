@@ -32,6 +32,7 @@ ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level 
 @lru_cache(maxsize=8)
 def thin_body(shape: Walled) -> ThinWalled:
     """Wall of an object that has one (``shape.wall`` is not None)."""
+    assert shape.wall is not None
     surface, is_round = outer_surface(shape)
     return ThinWalled(
         surface,

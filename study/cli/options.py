@@ -148,12 +148,6 @@ def _add_watch_options(parser: argparse.ArgumentParser) -> None:
     parser.description = textwrap.fill(f"{parser.description} {ending} Ctrl-C ends the view, not the run.", 78)
 
 
-def _seconds(text: str) -> float:
-    if not 0.1 <= (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
-    return value
-
-
 def _add_init_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     kinds = "kinds:\n" + "\n".join(f"  {name:<9} {text}" for name, text in KINDS.items())

@@ -294,7 +294,8 @@ def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
 
 
 def _heights(surface: Any) -> tuple[float, float]:
-    z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
+    first, last = surface.wall
+    z = surface.curve.derivative(np.linspace(first, last, 257))[:, 0]
     return float(z.min()), float(z.max())
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -32,7 +32,7 @@ class GraspPose(SceneSection):
         description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
     )
     label: Text = Field("", max_length=100, description="name of the grasp")
-    point = si("point_mm")
+    point: ClassVar[Any] = si("point_mm")
 
     def findings(self) -> Iterator[Finding]:
         """Directions that do not fix a frame, points far from any object."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -37,7 +37,7 @@ class Shape(SceneSection):
         shape: str  # a literal of each subclass
     name: Text = Field("", max_length=100, description="name for titles and tables")
     mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
-    mass = si("mass_g")
+    mass: ClassVar[Any] = si("mass_g")
 
     @property
     def axis_symmetry(self) -> int:
@@ -94,7 +94,7 @@ class Walled(Shape):
     springs_n_per_mm: float = Field(1.0, gt=0, le=1e4, description="total stiffness of springs in place of friction")
     base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
     yield_strength, allowed_dent = si("yield_strength_mpa"), si("allowed_dent_mm")
-    springs = si("springs_n_per_mm")
+    springs: ClassVar[Any] = si("springs_n_per_mm")
 
     @property
     def wall(self) -> float | tuple[Span, ...] | None:
@@ -141,7 +141,7 @@ class SphereShape(Shape):
     SIZE_KEYS = ("radius_mm",)
     shape: Literal["sphere"]
     radius_mm: Length = Field(description="radius")
-    radius = si("radius_mm")
+    radius: ClassVar[Any] = si("radius_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         return 0, dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
@@ -191,7 +191,7 @@ class Plate(Shape):
     SIZE_KEYS = ("thickness_mm",)
     shape: Literal["plane"]
     thickness_mm: Length = Field(description="distance of the two planes, which the fingers press along x")
-    thickness = si("thickness_mm")
+    thickness: ClassVar[Any] = si("thickness_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         return 2, {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
@@ -209,7 +209,7 @@ class RevolutionShape(Walled):
         description="outline as points [z, radius] with rising z",
         examples=[[[0, 30], [50, 30], [80, 20], [100, 20]]],
     )
-    profile = si("profile_mm")
+    profile: ClassVar[Any] = si("profile_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         radius = max(r for _, r in self.profile_mm)

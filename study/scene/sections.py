@@ -6,7 +6,7 @@ import math
 import string
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -63,7 +63,7 @@ class Gripper(SceneSection):
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     max_opening = si("max_opening_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
-    sheet_support = si("sheet_support_mm")
+    sheet_support: ClassVar[Any] = si("sheet_support_mm")
 
     @model_validator(mode="before")
     @classmethod
@@ -170,7 +170,7 @@ class Load(SceneSection):
     normal_force_n: Annotated[
         tuple[Force, ...], Field(strict=False, min_length=1, max_length=1000), AfterValidator(once_and_rising)
     ] = Field(description="normal forces per finger", examples=[[1, 2, 5]])
-    normal_force = si("normal_force_n")
+    normal_force: ClassVar[Any] = si("normal_force_n")
 
 
 class ScoreKeys(SceneSection):
@@ -220,7 +220,7 @@ class TaskKeys(SceneSection):
     centre_of_mass_mm: Vector | Literal["auto"] = Field(
         "auto", description="centre of mass [x, y, z]; auto is the middle of the box round the object"
     )
-    centre_of_mass = si("centre_of_mass_mm")
+    centre_of_mass: ClassVar[Any] = si("centre_of_mass_mm")
 
 
 class Effects(SceneSection):
