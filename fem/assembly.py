@@ -34,6 +34,7 @@ class Pattern:
 
     def slots(self, rows: IntArray, columns: IntArray) -> IntArray:
         """Index into ``values`` of every entry, -1 for negative rows or columns; all must be in the pattern."""
+        # fixed unknowns keep -1, so that element matrices are added whole and `add_up` skips those entries
         slots = np.full(len(rows), -1, dtype=np.int32)
         slots[(rows >= 0) & (columns >= 0)] = np.searchsorted(self.keys, self._keys(rows, columns))
         return slots

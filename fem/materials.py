@@ -30,6 +30,7 @@ def blatz_ko(F, B, J, par, P, A):
         for j in range(3):
             D[i, j] = B[0, i] * M[0, j] + B[1, i] * M[1, j] + B[2, i] * M[2, j]
             P[i, j] = G * (J * B[j, i] - D[i, j])
+    # a residual asks for the stress alone, and the tangent costs several times as much
     if A.size == 0:
         return
     for i in range(3):
@@ -127,6 +128,7 @@ def hyperfoam(F, B, J, par, P, A):
     ``beta = nu / (1 - 2 nu)`` (Storakers, J. Mech. Phys. Solids 34, 1986).
     """
     beta = par[0] / (1.0 - 2.0 * par[0])
+    # rotations keep eigenvectors at right angles also where stretches are nearly equal
     c, V = principal(_transposed_product(F, F))
     stretch = np.sqrt(c)
     s, ds = np.zeros(3), np.zeros((3, 3))  # second Piola-Kirchhoff S_a and dS_a / dl_b
@@ -171,6 +173,7 @@ def hyperfoam(F, B, J, par, P, A):
                         for m in range(3):
                             A[i, j, k, m] += x * X[k, m] + y * Y[k, m]
     for i in range(3):
+        # the geometric part, the same for every component of the displacement
         A[i, :, i, :] += S
 
 
@@ -239,7 +242,9 @@ def material(
                 f"hyperfoam needs one exponent, not 0, for every shear modulus; found {len(shear_moduli)} moduli and "
                 f"the exponents {list(exponents)}"
             )
+        # in this form of the law the first modulus is the sum, whatever the exponents
         shear_modulus = float(np.sum(shear_moduli))
+    # `not >` refuses NaN as well
     if not shear_modulus > 0:
         raise ValueError(f"material '{law}' needs a positive shear modulus, found {shear_modulus} Pa")
     # the law has one constant: another Poisson's ratio would be ignored without a word

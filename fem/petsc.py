@@ -206,6 +206,7 @@ class NonlinearSolver:
         try:
             yield
         finally:
+            # the database is the whole process's: other solvers must not find our options
             for key in mine:
                 if key in given:
                     database.setValue(key, given[key])
@@ -239,6 +240,7 @@ class NonlinearSolver:
             ) from error
         finally:
             snes.setTolerances(max_it=limit)
+            # unknown until this solve has converged: a failed one leaves no solution to start from
             self._end = None
             self.seconds.total += time.perf_counter() - start
             self.seconds.factorisation += factorisation_seconds() - factor

@@ -25,7 +25,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: f
     mu : float
         Coulomb friction coefficient [-].
     model : str
-        ``curved``, ``flat`` or ``projected``.
+        ``ccm``, ``pcm`` or ``pcm_projected``.
     tolerance : float
         Bound of the error, relative to the torque about the origin [-].
 

@@ -4,16 +4,16 @@ All quantities follow the *load convention*: the wrench is the one that drives t
 friction that the patch returns is ``-w``. (The paper prints the force of the friction beside the torque of the load;
 limit surfaces of asymmetric patches need one sign for both.)
 
-Models, as limit surfaces ``projected`` lies inside ``curved`` lies inside ``flat``, face by face:
+Models, as limit surfaces ``pcm_projected`` lies inside ``ccm`` lies inside ``pcm``, face by face:
 
-=========== ==================== ================ ==========================================
-model       normal of a face     load of a face   arm of a face
-=========== ==================== ================ ==========================================
-curved      its own              p a              its position (x, y, z)
-flat        contact normal       p a              (x, y, 0): the paper's planar model
-projected   contact normal       p a abs(n_z)     (x, y, 0)
-unrolled    contact normal       p a              arc lengths (x, y, 0), given by the caller
-=========== ==================== ================ ==========================================
+============= ==================== ================ ==========================================
+model         normal of a face     load of a face   arm of a face
+============= ==================== ================ ==========================================
+ccm           its own              p a              its position (x, y, z)
+pcm           contact normal       p a              (x, y, 0): the paper's planar model
+pcm_projected contact normal       p a abs(n_z)     (x, y, 0)
+unrolled      contact normal       p a              arc lengths (x, y, 0), given by the caller
+============= ==================== ================ ==========================================
 
 Reference: Xu, Alt, Zhang, Steinbach, "Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material
 Jaws using a Curved Contact Area Friction Model".
@@ -87,7 +87,7 @@ def friction_wrench(
     mu : float
         Coulomb friction coefficient [-].
     model : str
-        ``curved``, ``flat``, ``projected`` or ``unrolled``.
+        ``ccm``, ``pcm``, ``pcm_projected`` or ``unrolled``.
     unrolled : (n, 2) array, optional
         Arc-length coordinates of the faces, for the model of that name [m].
 

@@ -65,6 +65,7 @@ def check(
     pad = foam.pad
     pressure, gap, points = state
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
+    # an element's side in the plane of the contact face is the length by which a gap is small or not
     size = float(np.ptp(pad.nodes[pad.face_nodes[0]], axis=0)[:2].min())
     # a state without any pressure has to fail by its force balance, not by a division by zero
     largest = max(float(pressure.max(initial=0.0)), 1e-300)
@@ -94,7 +95,9 @@ def check(
 
 def _hemisphere(n: int) -> FloatArray:
     """Unit vectors spread evenly over a hemisphere ``(n, 3)`` (Fibonacci)."""
+    # half of all directions is enough: the acoustic tensor is even in its direction
     z = (np.arange(n) + 0.5) / n
+    # the golden angle: directions never line up, whatever their number
     phi = np.arange(n) * np.pi * (3.0 - np.sqrt(5.0))
     return np.column_stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
 
@@ -117,6 +120,7 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
     # the reason is looked for in the last state in equilibrium: what failed beyond it has no state to look at
     if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < TOO_MUCH):
         return error
+    # still elliptic, so it is the strain that is too much
     if ellipticity > BARELY_ELLIPTIC:
         return ConvergenceError(
             f"the pad is compressed too far: at {force:.4g} N its largest strain is {strain:.0%}, its smallest det F "

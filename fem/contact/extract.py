@@ -46,6 +46,7 @@ def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
 
 def half_turned(patch: ContactPatch) -> ContactPatch:
     """Patch of a pad that was solved turned by half a turn about its approach, in the pad's own frame."""
+    # half a turn reverses the order of the faces along both sides of the grid
     return _moved(patch, lambda values: values[::-1], (-1.0, -1.0, 1.0), [2, 3, 0, 1])
 
 
@@ -55,6 +56,7 @@ def mirrored(pad: Pad, patch: ContactPatch) -> ContactPatch:
     def flipped(values: FloatArray) -> FloatArray:
         return np.flip(values.reshape(*pad.shape.patch_faces, *values.shape[1:]), 1).reshape(values.shape)
 
+    # a mirror image turns the sense of every face, so its corners run backwards to keep their normal
     return _moved(patch, flipped, (1.0, -1.0, 1.0), [3, 2, 1, 0])
 
 
@@ -100,6 +102,7 @@ def _unfold(pad: Pad, grid: FloatArray, shared: bool) -> FloatArray:
         if pad.symmetry[axis]:
             mirrored = np.flip(grid, axis).copy()
             if grid.shape[2] == 3:
+                # vectors change sign across the mirror, loads do not; only vectors have three components here
                 mirrored[..., axis] *= -1.0
             grid = np.concatenate([np.delete(mirrored, -1, axis) if shared else mirrored, grid], axis)
     return grid

@@ -33,6 +33,7 @@ def load_steps(reached: float, force: float) -> list[float]:
     [2.8284271247461903, 4.0]
     """
     low = reached or START * force
+    # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
     steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
     between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
     return [*([] if reached else [low]), *between, force]
@@ -58,6 +59,7 @@ class CoupledProblem(ContactProblem):
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""
         R = super().residual(x)
+        # the contact face was not evaluated for a refused step: tractions would be those of another state
         if np.isnan(R[0]):
             return R
         pad = self.pad
@@ -69,6 +71,7 @@ class CoupledProblem(ContactProblem):
         N, weight = self.pad.face_N, self.pad.face_area
         _, by_place, by_pressure = self._traction(x, derivatives=True)
         self._K_uu -= np.einsum("fq,qa,qb,fqik->fiakb", weight, N, N, by_place, optimize=True)
+        # slip grows with the pressure, which makes the tangent unsymmetric
         entries = self._parts()[2]
         entries -= self.kappa * np.einsum("fq,qb,qa,fqi->fbia", weight, N, N, by_pressure, optimize=True).ravel()
 
@@ -92,6 +95,7 @@ class CoupledProblem(ContactProblem):
         They are those by the points' places ``(..., 3, 3)`` [Pa/m] and by the pressure ``(..., 3)`` [-].
         """
         n, closed, most = self._normal, self._closed[..., None], self.mu * self._pressure(x)
+        # a point that was open has stuck nowhere that its motion could be measured from
         d = np.where(closed, self._before - self.stick * (self._points - self._at), 0.0)
         across = np.einsum("fqi,fqi->fq", n, d)
         trial = d - across[..., None] * n
@@ -104,9 +108,11 @@ class CoupledProblem(ContactProblem):
             return (t,)
         share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
         P = np.eye(3) - n[..., :, None] * n[..., None, :]
+        # the tangent plane turns as the point slides, wherever the object's surface is curved
         bent = (
             across[..., None, None] * self._hessian + n[..., :, None] * (self._hessian @ d[..., None])[..., None, :, 0]
         )
         D = np.where(closed[..., None], -self.stick * P, 0.0) - bent
+        # the length of a slipping point's traction is given, so only the change across it counts
         D = np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
         return t, share * D, np.where(slips & (most > 0.0)[..., None], self.mu * along, 0.0)

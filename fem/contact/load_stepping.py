@@ -175,6 +175,7 @@ class Stepping:
         self.solver.thrifty = self.floor <= BALANCE * scale * self.share  # or states would fail their checks
         work.steps += 1
         try:
+            # a tolerance below what rounding leaves would never be met
             x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor), most)
         except ConvergenceError:
             work.halvings += 1
@@ -189,6 +190,7 @@ class Stepping:
         fraction, done = 1.0, 0.0
         while done < 1.0:
             goal = min(1.0, done + fraction)
+            # the last target is the force itself, not a sum that rounding leaves beside it
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
                 x = self.solve(x, Control(force=target), work, self.most)
@@ -219,6 +221,7 @@ class Stepping:
             try:
                 ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
                 high = (ahead, problem.normal_force(ahead))
+                # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
                     return self._land(low, high, force, work)
                 self.watch(*high)
@@ -311,6 +314,7 @@ class Following(Stepping):
                 x = self.solve(here.x, Control(force=target), work, self.most)
             except ConvergenceError:
                 cut *= 0.5
+                # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
                 if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > LEAST:
                     if not by_displacement:
                         raise
@@ -320,6 +324,7 @@ class Following(Stepping):
             leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
             # a state may have converged and still belong to another branch: it is judged before it is passed on
             if leaves or forks or ahead.strain - here.strain > FOLD:
+                # here NaN has to go on with the halving, down to the fewest
                 if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
@@ -328,17 +333,20 @@ class Following(Stepping):
                 self.jumped |= forks
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
+            # the tangent costs a triangular solve, and behind the last step nobody asks for it
             here = replace(ahead, tangent=self._tangent(x)) if done < 1.0 else ahead
         self._last = here
         return here.x
 
     def _begin(self, x: FloatArray, reached: float, work: Work) -> _Place:
         """Place at ``reached`` [N] on the path of this problem; the state there may be another one's."""
+        # the tangent of the path needs factors, and these are at hand only where the last solve ended
         known = self.solver.is_at(x)
         if known and self._last is not None and self._last.x is x:
             return replace(self._last, tangent=self._tangent(x))
         if not known:
             try:
+                # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
                 x, known = self.solve(x, Control(force=reached), work, self.most), True
             except ConvergenceError:
                 pass
@@ -348,6 +356,7 @@ class Following(Stepping):
 
     def _place(self, x: FloatArray, force: float, tangent: FloatArray | None) -> _Place:
         strain = self.problem.largest_strain(x)
+        # foam that is strained little does not buckle: the check's factorisation is spared
         return _Place(x, force, strain, strain <= STRAINED or self._stable(x), tangent)
 
     def _tangent(self, x: FloatArray) -> FloatArray | None:
@@ -356,11 +365,13 @@ class Following(Stepping):
 
     def _stable(self, x: FloatArray) -> bool:
         entries, held = self.problem.symmetric_tangent(x)
+        # every node in contact has one as a multiplier; any more is a direction of instability
         return self.solver.negative_eigenvalues(entries) == held
 
     def _allowed(self, here: _Place, step: float) -> float:
         """Part of a step [N] that may be made at once; all of it where nothing is foretold."""
         foretold = self._foretold(here, step)
+        # NaN compares as false: the whole step where nothing is foretold
         return LONGEST / foretold if foretold > LONGEST else 1.0
 
     def _foretold(self, here: _Place, step: float) -> float:
@@ -370,6 +381,7 @@ class Following(Stepping):
     def _leaves(self, here: _Place, ahead: _Place) -> bool:
         """Whether the state ``ahead`` is not the one that the path leads to from ``here``."""
         if here.tangent is not None:
+            # displacements and closing only: the bound is a distance in space, which pressures are not
             off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.thickness:
                 return True

@@ -139,10 +139,13 @@ class Press(LoadPath):
             except ConvergenceError:
                 if self.fallback is None:
                     raise
+                # the path of one pad does not lead to states of the other, so it starts afresh
                 x = self._from_first_contact(self.fallback, force, work)
+            # the solver cannot see this: both states are in equilibrium and may pass their own checks
             if below is not None:
                 refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
+            # rows of displacements and closing alone; those of pressures are judged as gap and adhesion
             left_over = np.abs(self.problem.residual(x)[: self.pad.closing_dof + 1]).max() / self.pad.share
             state = self.problem.contact_state(x)
             yield pressed(
@@ -155,6 +158,7 @@ class Press(LoadPath):
 
         All forces that follow keep to the pad that was found to serve.
         """
+        # no fallback from here on, so that displacement control may take over and jumps are passed
         pads, self.fallback, errors = (nodal, self.pad), None, []
         for pad in pads:
             self.pad = pad
@@ -163,6 +167,7 @@ class Press(LoadPath):
                 return self._step_to(None, 0.0, force, work)
             except ConvergenceError as error:
                 errors.append(error)
+        # the nodal pad's: what failed for the pad itself has failed once before
         raise errors[0]
 
     def _step_to(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
@@ -170,8 +175,10 @@ class Press(LoadPath):
         steps = self.load_steps(reached, force)
         if x is None:
             x, reached = self._stepping.first(self._bed.closing(steps[0]), steps[0], work)
+        # friction is measured from this state, and a failure on the way is explained by it
         self._remember(x, reached)
         try:
+            # the first contact may bear more than the first steps ask for
             for goal in (f for f in steps if f > reached or f == force):
                 x, reached = self._stepping.step_to(x, reached, goal, work, by_displacement=self.fallback is None), goal
             return x

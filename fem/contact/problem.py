@@ -149,6 +149,7 @@ class ContactProblem(PressedPad):
         super().__init__(pad)
         self.gap, self.control, self.complementarity = gap, Control(closing=0.0), False
         self.size, self.non_negative = pad.size, self.pressures
+        # makes the closing row a force like all others, so that one norm judges them
         self.closing_stiffness = self.kappa * self.area.sum()
         self._by_force: bool | None = None  # whether the last tangent was that under force control
         self.closing_step = 0.1 * pad.shape.size[2]  # longest change of closing displacement in one iteration
@@ -161,6 +162,7 @@ class ContactProblem(PressedPad):
         self._K_ul = np.empty((m, k, 3, k))
         self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
         face, pressure = self.local_dofs, self.pressure_dofs
+        # the diagonal of closing and pressures: an idle node has nothing else in its row
         own = np.arange(self.pad.closing_dof, self.size, dtype=np.int32)
         parts = (
             (self.foam.rows, self.foam.columns),
@@ -237,6 +239,7 @@ class ContactProblem(PressedPad):
             own[1:] = np.where(active, 0.0, self.kappa * self.area)
         self._by_force = self.control.force is not None
         if not self._by_force:
+            # this row holds the control instead of the foam's force on the backing plate
             elements[self.foam.closing_entries] = 0.0
             own[0] = self.closing_stiffness
 
@@ -258,6 +261,7 @@ class ContactProblem(PressedPad):
             return self.pad.share * change
         # the factors are those of another control: they give the direction, and a central difference the force
         along = change / change[self.closing_dof]
+        # small against the bends of the path, large against rounding of the force
         h = 1e-6 * self.pad.shape.size[2]
         rise = (self.normal_force(x + h * along) - self.normal_force(x - h * along)) / (2.0 * h)
         return along / rise if rise > 0.0 else None
@@ -269,13 +273,17 @@ class ContactProblem(PressedPad):
         the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
         """
         before = self.control, self._tangent_set, self._by_force  # the latter two belong to the factors at hand
+        # any force will do: the kind of control enters the tangent, its value does not
         self.control = Control(force=1.0)
         self._evaluate_entries(x)
         active = self._tangent_set
         self.control, self._tangent_set, self._by_force = before
         _, _, by_pressure, by_displacement, _ = self._parts()
+        # the sign with which the pressures are multipliers and the matrix is symmetric
         by_displacement *= -1.0
+        # columns of idle pressures go, as their rows have gone by the active set
         by_pressure[~np.repeat(active[self.nodes], by_pressure.size // self.nodes.size)] = 0.0
+        # not into the pattern's own values, which stay those of the last tangent
         values = np.empty_like(self.pattern.values)
         self._add_up(values)
         return values, int(np.count_nonzero(active))
@@ -335,12 +343,14 @@ class SpringBed:
 
     def force_scale(self, closing: float) -> float:
         """Force that a residual at this closing displacement is judged by, never zero [N]."""
+        # before the bed touches its force is zero and would be no scale
         one_node = self.pad.modulus_per_thickness * self.pad.node_area.max() * abs(closing)
         return max(self.force(closing), 1e-3 * one_node)
 
     def closing(self, force: float) -> float:
         """Closing displacement at which the bed carries the force [m]."""
         low, high = 0.0, 1e-3 * self.pad.shape.size[2]
+        # bounded, because a bed beside the object never carries the force
         while self.force(high) < force and high < 10 * self.pad.shape.size[2]:
             high *= 2.0
         # bisection: the bed's force is monotonous but has kinks wherever a column touches
@@ -356,6 +366,7 @@ class SpringBed:
         shortening = np.clip(closing - self.height, 0.0, 0.6 * pad.shape.size[2])
         u = np.zeros(pad.dofs.shape)
         u[:, 2] = closing
+        # foam that hardly changes its volume would start with huge stresses
         if pad.material.poisson_ratio <= STIFF_VOLUME:
             u[:, 2] -= shortening[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
         x = np.zeros(pad.size)
@@ -369,6 +380,7 @@ class SpringBed:
         """For every node the index, in ``contact_nodes``, of the node above it (columns are straight)."""
         face = self.pad.nodes[self.pad.contact_nodes].reshape(*self.pad.contact_grid, 3)
         x, y = face[:, 0, 0], face[0, :, 1]
+        # the nearest line, not an equal one: nodes inside elements are off their line by rounding
         i = np.abs(self.pad.nodes[:, 0, None] - x).argmin(axis=1)
         j = np.abs(self.pad.nodes[:, 1, None] - y).argmin(axis=1)
         return i * len(y) + j

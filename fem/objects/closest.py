@@ -20,6 +20,7 @@ def _multiplier(z0, z1, excess):
     side G is convex and decreasing; Newton's method on 1 / sqrt(G), which is nearly linear in T, is kept inside a
     bracket that shrinks by its geometric mean where Newton's step leaves it.
     """
+    # G is at least 1 at the lower end and at most 1 at the upper: the root is bracketed from the start
     low, high = z1, math.hypot((1.0 + excess) * z0, z1)
     T = low if low > 0.0 else high
     for _ in range(200):
@@ -32,6 +33,7 @@ def _multiplier(z0, z1, excess):
         slope = p * p / (T + excess) + q * q / T
         new = T + G * (math.sqrt(G) - 1.0) / slope
         if not low < new < high:
+            # two roots, because the product of both ends may underflow
             new = math.sqrt(low) * math.sqrt(high) if high > 4.0 * low else 0.5 * (low + high)
         if abs(new - T) <= 4e-16 * T or high - low <= 4e-16 * high:
             return new
@@ -46,6 +48,7 @@ def ellipse_foot(x, y, a, b):
     e0, e1 = (b, a) if swap else (a, b)
     y0, y1 = (abs(y), abs(x)) if swap else (abs(x), abs(y))
     z0, z1 = y0 / e0, y1 / e1
+    # as a product: the difference of the squares would cancel for a nearly round ellipse
     excess = (e0 - e1) * (e0 + e1) / (e1 * e1)
     if z1 > 0.0:
         T = _multiplier(z0, z1, excess)
@@ -55,6 +58,7 @@ def ellipse_foot(x, y, a, b):
         s = math.sqrt((1.0 - c) * (1.0 + c))
     else:
         c, s = 1.0, 0.0
+    # the root is known up to rounding, but the foot has to lie on the ellipse
     length = math.hypot(c, s)
     c, s = c / length, s / length
     c, s = (s, c) if swap else (c, s)
@@ -86,6 +90,7 @@ def _nearest_segment(z, r, line, blocks, size):
     ``blocks`` bounds runs of ``size`` segments by circles (centre z, centre r, radius), so that most are skipped.
     """
     m, best, segment, place = len(line) - 1, np.inf, 0, 0.0
+    # the block that is certainly near comes first, so that most others are skipped
     first, reach = 0, np.inf
     for k in range(len(blocks)):
         d = math.hypot(z - blocks[k, 0], r - blocks[k, 1]) + blocks[k, 2]
@@ -133,6 +138,7 @@ def _foot(z, r, low, high, s, breaks, coefficients):
             high = s
         else:
             low = s
+        # without a positive slope Newton's method would go to a farthest point: bisect instead
         new = s - f / slope if slope > 0.0 else low - 1.0
         if not low <= new <= high:
             new = 0.5 * (low + high)
@@ -155,6 +161,7 @@ def profile_gap(x, breaks, coefficients, line, places, blocks, size):
         z, r = x[i, 2], math.hypot(x[i, 0], x[i, 1])
         c, d = (x[i, 0] / r, x[i, 1] / r) if r > 0.0 else (1.0, 0.0)
         k, t = _nearest_segment(z, r, line, blocks, size)
+        # a segment more on either side: the foot on the curve may lie beyond that on the polyline
         low, high = places[max(k - 1, 0)], places[min(k + 2, len(places) - 1)]
         s = _foot(z, r, low, high, places[k] + t * (places[k + 1] - places[k]), breaks, coefficients)
         c_z, t_z, k_z, c_r, t_r, k_r = _cubic(s, breaks, coefficients)
@@ -163,6 +170,7 @@ def profile_gap(x, breaks, coefficients, line, places, blocks, size):
         g[i] = (z - c_z) * n_z + (r - c_r) * n_r
         curvature = (t_r * k_z - t_z * k_r) / speed**3
         along = curvature / max(1.0 + curvature * g[i], SMALLEST_STRETCH)
+        # on the axis this is 0 / 0, and both curvatures agree there
         around = n_r / r if r > 1e-9 else along
         e = (c * n_z, d * n_z, -n_r)  # along the meridian, at right angles to the normal
         f = (-d, c, 0.0)

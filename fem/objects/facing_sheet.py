@@ -58,6 +58,7 @@ def _seen(which, normals, directions, spacing, rotation, origin, lower, upper, l
         longest = 0.0
         for k in range(3):
             longest = max(longest, ((p[(k + 1) % 3] - p[k]) ** 2).sum())
+        # many spots on a large triangle: a part of it may be hidden by another piece
         n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), MOST_SPOTS)
         for i in range(n * n):
             b, c = (i // n + 1.0 / 3.0) / n, (i % n + 1.0 / 3.0) / n
@@ -74,6 +75,7 @@ def _seen(which, normals, directions, spacing, rotation, origin, lower, upper, l
             if not inside:
                 continue
             for k in range(len(directions)):
+                # seen on a slant already: only the straight line, which comes first, can tell more
                 if found[m] == 1 and k > 0:
                     break
                 if (normal * directions[k]).sum() > -GRAZING:
@@ -136,6 +138,7 @@ class FacingSheet:
         """Signed distance ``(n,)`` [m] to the sheet and its unit gradient ``(n, 3)``; in a shadow it is negative."""
         g, normal, border = self.sheet.signed(x)
         if border.any():
+            # pseudo-normals fail at the border of an open sheet, so lines of sight decide the sign
             out = _reached(np.ascontiguousarray(x[border]), self.directions, self.whole.nodes)
             turn = np.where(out == (g[border] >= 0), 1.0, -1.0)
             g[border] *= turn
@@ -152,6 +155,7 @@ class FacingSheet:
         known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
         places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
         g = evaluate(coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
+        # contact is decided near the sheet, so no sample is interpolated there
         near = np.abs(g) < EXACT * step
         g[near] = self.signed(x[near])[0]
         return _with_shadows(g, step, STAIRS)
@@ -172,6 +176,7 @@ def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
         shadow[two] |= change
     if not shadow.any():
         return g
+    # the shadow line runs between two marked samples, half a step from either
     away = step * (distance_transform_edt(~shadow) + 0.5)
     bound = np.where(g < 0, -1.0, 1.0) * np.minimum(np.abs(g), away)
     rough = np.clip(np.abs(g) / step - 1.0, 0.0, 1.0) * np.clip((np.abs(g) - away) / step, 0.0, 1.0)
@@ -225,8 +230,10 @@ def facing_sheet(
     straight[near[how == 2]] = True
     slanted = near[how == 1]
     hit, far = _behind(slanted, normals, lift, whole.nodes)
+    # without a hit the index is -1, which does no harm: the distance is infinite then
     slanted = slanted[~(straight[hit] & (far < THIN * depth))]
     chosen = np.union1d(np.flatnonzero(straight), slanted)
+    # nothing faces the finger here, and the whole mesh keeps the distance defined
     if not len(chosen):
         return FacingSheet(whole, whole, lines)
     x, small = smooth.refined(chosen, smooth.pieces_for(chosen, FOLLOWED * step))

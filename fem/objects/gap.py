@@ -39,6 +39,7 @@ class Pose:
 
     def __post_init__(self) -> None:
         """Refuse anything but a right-handed rotation."""
+        # a reflection passes the first test, so the determinant is asked as well
         if not np.allclose(self.rotation.T @ self.rotation, np.eye(3), atol=1e-9) or np.linalg.det(self.rotation) < 0:
             raise ValueError(
                 f"rotation must be orthonormal and right-handed, found {np.asarray(self.rotation).tolist()}"
@@ -162,6 +163,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         t = t + np.maximum(g, CREEP * reach)
         g = gap(active, t)
         closest = min(closest, g.min())
+        # a touch too shallow for a hit: told apart from a pad that passes well clear
         grazed |= bool((g[t < reach] < GRAZE).any())
         hit = g <= -GRAZE
         if hit.any():
@@ -184,12 +186,15 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
 
 def _bisected(gap: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
     """Places of the sign changes between ``low`` (outside) and ``high`` (inside), ``(k,)``."""
+    # the second condition ends it where neighbouring doubles are further apart than `SHARPNESS`
     while (high - low).max() > SHARPNESS and ((middle := 0.5 * (low + high)) != low).any():
         inside = gap(middle) <= 0
         low, high = np.where(inside, low, middle), np.where(inside, middle, high)
+    # the inner end: there the pad has certainly met the object
     return high
 
 
 def _vector(v: FloatArray) -> str:
     """Three numbers for a message."""
+    # adding zero turns -0 into 0
     return ", ".join(f"{x:.4g}" for x in v + 0.0)

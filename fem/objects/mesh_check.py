@@ -41,6 +41,7 @@ def _side(a, b, c, d, noise):
     t_2 = w[2] * (u[0] * v[1] - u[1] * v[0])
     U, V, W = np.sqrt((u * u).sum()), np.sqrt((v * v).sum()), np.sqrt((w * w).sum())
     volume = t_0 + t_1 + t_2
+    # a corner off by the noise changes the volume by that times the areas of the faces
     return 0 if abs(volume) <= noise * (U * V + V * W + W * U) else (1 if volume > 0 else -1)
 
 
@@ -96,6 +97,7 @@ def crossing_pairs(points: FloatArray, triangles: IntArray, most: int = 10_000) 
     """Pairs ``(c, 2)`` of triangles that cross, at most ``most``; touching and overlap in one plane do not count."""
     corners = points[triangles]
     lower, upper = corners.min(axis=1), corners.max(axis=1)
+    # along the longest side the fewest boxes overlap
     axis = int(np.ptp(points, axis=0).argmax())
     order, noise = np.argsort(lower[:, axis], kind="stable"), ROUNDED * np.abs(points).max()
     return _swept(points, triangles, lower, upper, order, axis, most, noise)
@@ -149,12 +151,14 @@ def sound_mesh(points: FloatArray, triangles: IntArray, unit: str = "m") -> Soun
         raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     _check_numbers(points, triangles)
     points, triangles, notes = _merged(points, triangles)
+    # points that no triangle uses are gone by now and do not count for the size
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points = points * UNITS[unit]
     given = len(triangles)
     points, triangles, lids, closed = without_holes(points, triangles)
     neighbours = _closed(triangles)
     triangles, turned = _oriented(points, triangles, *neighbours)
+    # the given triangles alone: those that close holes are not the user's to mend
     crossings = crossing_pairs(points, triangles[:given])
     if len(crossings) > TOLERATED_CROSSINGS * given:
         raise MeshError(
@@ -206,6 +210,7 @@ def _check_size(extent: float, unit: str) -> None:
 
 def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
     """Points within rounding of each other as one, unused ones left out, collapsed and doubled triangles dropped."""
+    # equal points first: STL files repeat every corner, and the tree then has less to search
     points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
     close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
@@ -223,6 +228,7 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     if not whole.all():
         notes.append(f"dropped {np.sum(~whole)} triangles without area")
     triangles = triangles[whole]
+    # in the file's order, so that a sound mesh keeps its triangles as they are
     first = np.sort(np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1])
     if len(first) < len(triangles):
         notes.append(f"dropped {len(triangles) - len(first)} doubled triangles")
@@ -254,10 +260,12 @@ def _oriented(
 ) -> tuple[IntArray, list[str]]:
     """Triangles turned so that neighbours agree and every piece encloses a positive volume."""
     n = len(triangles)
+    # every triangle counts twice, as given and turned; an edge links the copies that agree
     mirrored = np.where(clash, n, 0)
     ends = np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]
     links = coo_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
     _, label = connected_components(links, directed=False)
+    # both copies in one part: a walk over the surface comes back turned
     if (label[:n] == label[n:]).any():
         raise MeshError("the mesh has only one side (like a Moebius strip), so it has no inside; rebuild it as a solid")
     flip = label[:n] > label[n:]
@@ -289,6 +297,7 @@ def _refuse_flat(points: FloatArray, triangles: IntArray, piece: IntArray, volum
 
 def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Signed volumes ``(m,)`` of the tetrahedra from the bounding box's centre to each triangle [m^3]."""
+    # about the middle: an origin far away would cost digits
     a, b, c = (points[triangles] - 0.5 * (points.min(axis=0) + points.max(axis=0))).transpose(1, 0, 2)
     return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
@@ -330,6 +339,7 @@ def _outer_pieces(
 def _lies_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
     """Whether a piece lies inside another, by the first of its corners that does not lie on the other."""
     corners = np.unique(piece)
+    # a corner that lies on the other piece is neither outside nor inside: ask the next one
     for corner in corners[:: 1 + len(corners) // MOST_ASKED]:
         if abs((turns := winding_number(points[corner], points, other)) - 0.5) > 0.5 - SURE:
             return turns > 0.5

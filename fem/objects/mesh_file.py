@@ -65,11 +65,13 @@ def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
     if not faces:
         raise MeshError(f"{path}: the mesh is empty: it holds no triangles; export it as a surface mesh")
     mesh = _loaded(path, data)
+    # a reader may leave out what it cannot read without a word
     if len(mesh.faces) < faces:
         raise MeshError(
             f"{path}: is cut short or damaged: it declares {faces} faces, {len(mesh.faces)} triangles could be read; "
             "export it again"
         )
+    # polygons are cut into fans, which fold over where a polygon is not convex
     if len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
         raise MeshError(
             f"{path}: has faces of more than three corners that are not convex, expected triangles; triangulate the "
@@ -114,10 +116,12 @@ def _whole_binary_stl(path: Path, data: bytes) -> bytes:
 
 def _plain_obj(path: Path, data: bytes) -> bytes:
     """An OBJ file whose faces hold nothing but points: trimesh takes all faces to be written like the first."""
+    # a backslash continues a line, and the patterns below look at whole lines
     data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     data = re.sub(rb"^f[ \t].*$", lambda face: re.sub(rb"/\S*", b"", face[0]), data, flags=re.MULTILINE)
     if re.search(rb"^f(?:.*[ \t])?0(?:\s|$)", data, re.MULTILINE):
         raise MeshError(f"{path}: is damaged: a face refers to point 0, but OBJ files count from 1; export it again")
+    # such numbers count from the points read so far, not from the last of all
     back = re.search(rb"^f.*[ \t]-", data, re.MULTILINE)
     if back and re.search(rb"^v[ \t]", data[back.start() :], re.MULTILINE):
         raise MeshError(

@@ -41,6 +41,7 @@ def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
                 f"the mesh is not closed: a hole of {across * 1e3:.3g} mm near {named_place(middle)} leaves open what "
                 "is inside; fill it in a mesh editor, or give the object as a profile"
             )
+        # a triangle or two that are missing can be meant in one way only, so these may be larger
         small = across <= (SMALL_HOLE if len(loop) > FEW_SIDES else LARGEST_GAP) * size
         new = filling(points, loop, taken) if small else None
         (covered if new is None else filled).append(f"{across * 1e3:.3g} mm near {named_place(middle)}")
@@ -48,6 +49,7 @@ def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
         if new is None:
             centre, new = lid(points, loop)
             points = np.concatenate([points, centre[None]])
+        # the filling of the next hole must not use an edge of this one a third time
         taken.update(map(tuple, np.sort(new[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).tolist()))
         parts.append(new)
     notes = [

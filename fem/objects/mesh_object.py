@@ -120,6 +120,7 @@ class MeshObject:
         if not (size > 0).all():
             raise ValueError(f"the box from {box[0].tolist()} to {box[1].tolist()} m is empty; swap its corners")
         step = self._step(size, element)
+        # whole coarse cells, as `sampled` asks for; rounding of the quotient must not add one
         cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
             raise ValueError(
@@ -138,6 +139,7 @@ class MeshObject:
         if self.grid_step:
             return self.grid_step
         wanted = element / STEPS_PER_ELEMENT if element else float(size.max()) / STEPS_PER_BOX
+        # a large box with small elements gets a coarser grid rather than none
         return max(wanted, float(np.cbrt(np.prod(size) / MOST_CHOSEN)))
 
     @property
@@ -204,6 +206,7 @@ class MeshRegion:
     def centre_error(self) -> float:
         """Largest difference [m] to the distance itself at centres of cells within two steps of the surface."""
         near = np.argwhere(np.abs(self.samples[:-1, :-1, :-1]) < 2 * self.grid_step)
+        # centres of cells are furthest from all samples, so the spline is at its worst there
         y = self.first + self.grid_step * (near[:: 1 + len(near) // MOST_CENTRES] + 0.5)
         y = y[self._covers(y)]
         if not len(y):

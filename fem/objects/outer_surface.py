@@ -152,6 +152,7 @@ class OuterSurface:
         cos, sin = np.cos(theta), np.sin(theta)
         c, t = (Jet([v, w, none, -v, none, none]) for v, w in ((cos, -sin), (sin, cos)))
         exponent, ratio = by_height(self.exponent), by_height(self.ratio)
+        # powers by logarithms, so that the exponent may change along the outline, too
         terms = ((exponent * part).exp() for part in (log_of_size(c), log_of_size(t) + ratio.log().scaled(-1)))
         n = exponent.rows[0]
         inverse = exponent.through(-1 / n, 1 / n**2, -2 / n**3)
@@ -168,6 +169,7 @@ class OuterSurface:
         """
         s = np.linspace(*self.wall, 2001)
         off = self.curve.derivative(s)[:, 0] - z
+        # a height at a sample is that sample: a search could end beside it by rounding
         off[np.abs(off) < AT_LINE] = 0.0
         crossing = np.flatnonzero((off[:-1] <= 0) & (off[1:] >= 0))
         if not len(crossing):
@@ -207,11 +209,13 @@ def _surface(body: Revolution, sections: list[Section]) -> OuterSurface:
     given, closed = through(body.profile, body.rim)
     pieces = len(given.coefficients)
     lids = len(closed.coefficients) - pieces
+    # lids have varying numbers of pieces, so the given part is found by its coefficients
     first = next(k for k in range(lids + 1) if (closed.coefficients[k : k + pieces] == given.coefficients).all())
     s = closed.breaks
     on_axis = body.profile[[0, -1], 1] == 0
     ratio = [1.0 if p.b is None or p.a == 0 else p.b / p.a for p in sections]
     if len(sections) > 1:
+        # a section that is a point has no ratio of its own
         ratio[0] = ratio[1] if sections[0].a == 0 else ratio[0]
         ratio[-1] = ratio[-2] if sections[-1].a == 0 else ratio[-1]
     z = [p.z for p in sections]
@@ -231,8 +235,10 @@ def _surface(body: Revolution, sections: list[Section]) -> OuterSurface:
 def _by_height(z: Sequence[float], values: ArrayLike) -> Callable:
     """Monotone cubic through the values, level at both ends and beyond."""
     y = np.asarray(values, dtype=float)
+    # exactly constant, because rounding of a spline would cost round bodies their symmetry
     if np.ptp(y) == 0:
         return lambda x, order=0: np.full(np.shape(x), y[0] if order == 0 else 0.0)
+    # one more point beyond each end, so that the curve is level there
     far = np.ptp(z)
     knots, y = np.concatenate([[z[0] - far], z, [z[-1] + far]]), np.concatenate([y[:1], y, y[-1:]])
     h, slope = np.diff(knots), _slopes(knots, y)
@@ -293,6 +299,7 @@ class Turned:
         if abs(quarters - round(quarters)) * 0.5 * np.pi > RIGHT_ANGLE:
             return False, False
         x, y = self.original.symmetric
+        # a quarter turn exchanges the two planes
         return (y, x) if round(quarters) % 2 else (x, y)
 
     def station(self, z: float) -> float:

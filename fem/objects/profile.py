@@ -120,6 +120,7 @@ def b_splines(t: FloatArray, x: FloatArray, order: int = 0) -> FloatArray:
     B = (np.arange(len(t) - 1) == piece[:, None]).astype(float)
     for degree in (1, 2, 3):
         width = t[degree:] - t[:-degree]
+        # knots that coincide have no interval between them: their share is zero
         share = B / np.where(width > 0, width, np.inf)
         if degree > 3 - order:
             B = degree * (share[:, :-1] - share[:, 1:])
@@ -136,9 +137,11 @@ def _component(
     if n < 4:
         start, end = start or [(2, 0.0)], end or [(2, 0.0)]
     if not start:
+        # one condition less has to go with one knot less
         knots.remove(s[1])
     if not end:
         knots.remove(s[-2])
+    # in a single interval both additional knots would coincide in its middle
     both = n == 2 and len(start) == len(end) == 2
     if len(start) == 2:
         knots.append(s[0] + (s[1] - s[0]) / (3 if both else 2))
@@ -177,6 +180,7 @@ def _on_a_line(points: FloatArray) -> bool:
     e = chord / np.linalg.norm(chord)
     tolerance = COLLINEAR * np.linalg.norm(steps, axis=1).min()
     off = (points - points[0]) @ np.array([-e[1], e[0]])
+    # a slanted line that ends on the axis would give the surface a tip
     tipped = (points[:, 1] == 0).any() and abs(e[0]) > COLLINEAR
     return bool((steps @ e > 0).all() and np.abs(off).max() <= tolerance and not tipped)
 
@@ -184,6 +188,7 @@ def _on_a_line(points: FloatArray) -> bool:
 def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Points ``(n, 2)`` of the arc that leaves p along t and ends along u, and their arc length ``(n,)``."""
     angle = float(np.arctan2(t[0] * u[1] - t[1] * u[0], t @ u))
+    # at half a turn the sign hangs on rounding
     angle = -np.pi if angle > np.pi - 1e-6 else angle
     phi = np.linspace(0.0, angle, 1 + max(2, int(np.ceil(abs(angle) / ARC_STEP))))
     left = np.sign(angle) * np.array([-t[1], t[0]])
@@ -244,6 +249,7 @@ def _corner(
     if turn <= ONE_WAY:
         return None
     half = np.tan(turn / 2)
+    # at most 0.3 of each run, so that roundings at both its ends leave a straight part
     cut = min(max(half, SHORTEST_CUT) * rim, 0.3 * a, 0.3 * b)
     return *rounding(q - cut * t, t, u, cut / half), t, u
 
@@ -258,6 +264,7 @@ def _lid(given: Curve, rim: float, *, first: bool) -> list[Curve]:
     speed = np.linalg.norm(d1)
     d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2  # by arc length, so that the rim starts evenly
     t, axis = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
+    # a part of the cap has to stay flat, however narrow the end is
     radius = min(rim, 0.25 * p[1])
     pieces, start = [], p * mirror
     if t @ axis < 1 - 1e-9:

@@ -54,6 +54,7 @@ class Revolution(Analytic):
         places = _places(curve)
         line = curve.derivative(places)
         _check_line(line)
+        # of the given part alone: the rims that close it are sharper by choice
         bend = np.abs(given.curvature(given.inner(16))).max()
         values = {
             "profile": points,
@@ -98,6 +99,7 @@ class Revolution(Analytic):
         fine = self._places
         s = fine if len(fine) < 60 else fine[np.linspace(0, len(fine) - 1, 60).round().astype(int)]
         s = np.unique(np.concatenate([s, np.linspace(0, self.curve.breaks[-1], 25)]))
+        # rounding may leave the pole at a negative radius
         z, r = np.maximum(self.curve.derivative(s), [-np.inf, 0.0]).T[:, :, None]
         phi = np.linspace(0, 2 * np.pi, 48, endpoint=False)
         points = np.stack([r * np.cos(phi), r * np.sin(phi), z + 0 * phi], axis=-1).reshape(-1, 3)
@@ -128,6 +130,7 @@ def _checked_points(profile: FloatArray) -> FloatArray:
     area = 0.5 * np.sum((points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0]))
     if abs(area) < CLOSEST_POINTS * np.ptp(points, axis=0).max():
         raise ValueError("profile encloses no area; it must lead from one end of the object to the other")
+    # the normal lies to the left of the curve, so that has to run upwards to point outwards
     return points if area > 0 else points[::-1].copy()
 
 
@@ -141,6 +144,7 @@ def _places(curve: Curve) -> FloatArray:
     h = np.diff(curve.breaks)
     inner = curve.inner(16).reshape(-1, 16)
     speed = np.linalg.norm(curve.derivative(inner.ravel(), 1), axis=1).reshape(inner.shape)
+    # segments follow the turn, not the length: a straight run needs one, a rim many
     turn = (np.abs(curve.curvature(inner.ravel())).reshape(inner.shape) * speed).max(axis=1) * h
     n = np.maximum(1, np.ceil(turn / TURN)).astype(int)
     steps = [start + length * np.arange(k) / k for start, length, k in zip(curve.breaks[:-1], h, n, strict=True)]
@@ -160,6 +164,7 @@ def _check_line(line: FloatArray) -> None:
     split = (start * end < 0) | (np.minimum(np.abs(start), np.abs(end)) <= touch)
     low, high = np.minimum(a, line[1:]) - touch, np.maximum(a, line[1:])
     near = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=-1)
+    # neighbours share an end and always touch
     i, _ = np.nonzero(np.triu(split & split.T & near, k=2))
     if len(i):
         raise ValueError(

@@ -49,6 +49,7 @@ class Plane(Analytic):
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` (zero)."""
         normal = np.zeros((len(x), 3))
+        # the middle plane has to belong to one side: a sign of zero would be no normal
         normal[:, 0] = np.where(x[:, 0] < 0, -1.0, 1.0)
         return np.abs(x[:, 0]) - self.thickness / 2, normal, np.zeros((len(x), 3, 3))
 
@@ -161,6 +162,7 @@ class EllipticCylinder(Analytic):
         tube = (q > 0).all(axis=1)[:, None, None]
         distance, e, H = radial(q)
         directions = np.stack([normal[pick], up], axis=1)
+        # the tube's own curvature, and the ellipse's as far as the normal leans outwards
         bent = e[:, :1, None] * hessian[pick] + np.einsum("nia,nij,njb->nab", directions, H, directions)
         g[pick] = np.where(tube[:, 0, 0], distance, q[:, 1]) - r
         normal[pick] = np.where(tube[:, 0], np.einsum("ni,nia->na", e, directions), up)

@@ -59,6 +59,7 @@ class SmoothTriangles:
 
     def pieces_for(self, which: IntArray, tolerance: float) -> int:
         """Pieces of an edge with which flat triangles follow the smooth ones to ``tolerance`` [m], within limits."""
+        # not the largest: a single bad triangle of a scan must not refine them all
         bulge = float(np.quantile(self.bulge(which), 0.99, method="higher"))
         most = min(FINEST, int(np.sqrt(MOST_PIECES / len(which))))
         return int(np.clip(np.ceil(np.sqrt(bulge / tolerance) - 1e-6), 1, max(most, 1)))
@@ -79,6 +80,7 @@ class SmoothTriangles:
         for k in range(3):
             number[:, weights[:, k] == n] = corner[:, k : k + 1]
             on = np.flatnonzero((weights[:, (k + 2) % 3] == 0) & (weights[:, k] > 0) & (weights[:, (k + 1) % 3] > 0))
+            # from the end with the smaller number, so that both triangles of an edge find the same points
             forward = (chosen[:, k] < chosen[:, (k + 1) % 3])[:, None]
             place = np.where(forward, weights[on, (k + 1) % 3], weights[on, k])
             number[:, on] = len(used) + line[:, k : k + 1] * (n - 1) + place - 1
@@ -102,6 +104,7 @@ class SmoothTriangles:
         forward = chosen < np.roll(chosen, -1, axis=1)
         inner = self.inner[self.edge_of[which]]
         inner = np.where(forward[:, :, None, None], inner, inner[:, :, ::-1])  # from each corner to the next one
+        # with this middle point a quadratic triangle comes out exactly
         middle = 1.5 * inner.mean(axis=(1, 2)) - 0.5 * P.mean(axis=1)
         x = 6 * np.einsum("w,kd->kwd", weights.prod(axis=1), middle)
         for k in range(3):
@@ -123,6 +126,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     area = np.cross(b - a, c - a)
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     turn = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
+    # an edge at the very angle is a crease, whatever rounding makes of it
     crease = turn < np.cos(np.radians(crease_angle)) + 1e-9
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(key), 2, 3))

@@ -49,9 +49,11 @@ def evaluate(c, lower, step, x):
     for i in range(n):
         for d in range(3):
             s = (x[i, d] - lower[d]) / step
+            # a point on the last sample, or off the grid by rounding, belongs to the nearest cell
             k = min(max(int(np.floor(s)), 0), c.shape[d] - 2 * PADDING - 2)
             base[d] = k + PADDING - 1
             _weights(s - k, w[d])
+        # one axis at a time takes far fewer products than 64 weights for each of the ten values
         v = v_x = v_y = v_z = v_xx = v_yy = v_zz = v_xy = v_xz = v_yz = 0.0
         for a in range(4):
             p = p_y = p_z = p_yy = p_zz = p_yz = 0.0

@@ -63,6 +63,7 @@ def spline_surface(theta: ArrayLike, s: ArrayLike, points: ArrayLike, closed: bo
         off = np.abs(X[0] - X[-1]).max()
         if off > 1e-9 * np.abs(X).max():
             raise ValueError(f"a closed surface must end where it began, found {off:.3g} m between its two ends")
+        # periodic splines want both ends equal
         X[-1] = X[0]
     around = CubicSpline(theta, X, axis=0, bc_type="periodic" if closed else "not-a-knot").c[::-1]  # (4, m, k + 1, 3)
     along = CubicSpline(s, around, axis=2).c[::-1]  # (4, k, 4, m, 3)

@@ -57,6 +57,7 @@ class Stacked:
         none = np.zeros((self._wall.nodes.max() + 1, 3))
         near = np.flatnonzero(close)
         found = face(self._wall, x[near], self._wall.places(x[near]), none, none)
+        # points beyond the ends of the wall face nothing and are left to the triangles
         hit = found.gap < FAR
         for own, value in ((g, found.gap), (normal, found.normal), (hessian, found.H)):
             own[near[hit]] = value[hit]
@@ -116,6 +117,7 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
     inner = max(ends[0], outer.wall[0]), min(ends[1], outer.wall[1])
     runs = np.linspace(ends[0], inner[0], RIM), np.linspace(*ends, ALONG), np.linspace(inner[1], ends[1], RIM)
     s = np.unique(np.concatenate([*runs, breaks]))
+    # lines that coincide up to rounding would leave a spline an interval without length
     s = s[np.concatenate([[True], np.diff(s) > 1e-9])]
     theta = np.linspace(0.0, 2 * np.pi, AROUND + 1)
     T, S = np.meshgrid(theta, s, indexing="ij")

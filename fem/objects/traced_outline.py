@@ -121,6 +121,7 @@ def _hits(segments: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatAr
     angle = np.arctan2(segments[..., 1], segments[..., 0]) * (count / (2 * np.pi))
     # half-open intervals of ray numbers: where two segments meet, a ray crosses only one of them
     first = np.ceil(angle).astype(np.int64)
+    # a segment across the jump of the angle goes the short way round
     first[:, 1] -= np.round((angle[:, 1] - angle[:, 0]) / count).astype(np.int64) * count
     which, ray = _spread(first.min(axis=1), np.abs(first[:, 1] - first[:, 0]))
     c, s = np.cos(2 * np.pi / count * ray), np.sin(2 * np.pi / count * ray)
@@ -139,6 +140,7 @@ def smooth_spline(x: FloatArray, y: FloatArray, wavelength: float, ends: tuple[f
     pieces = max(4, int(np.ceil((ends[1] - ends[0]) * KNOTS / wavelength)))
     width = (ends[1] - ends[0]) / pieces
     knots = ends[0] + width * np.arange(-3, pieces + 4)
+    # exactly, because rounding of the sum would leave the last samples outside
     knots[[3, -4]] = ends
     B = csc_array(BSpline.design_matrix(np.clip(x, *ends), knots, 3))
     n = B.shape[1]
@@ -230,6 +232,7 @@ def _centre_line(
     z: FloatArray, centre: FloatArray, ends: tuple[float, float], wavelength: float, tolerance: float
 ) -> Callable:
     """Smooth line through centres ``(k, 2)``, upright beyond the ends and exactly on the axis where nearly so."""
+    # a centre off the axis by noise alone would cost the planes of symmetry
     centre = np.where(np.abs(centre).max(axis=0) <= tolerance, 0.0, centre)
     reach = ends[0] - wavelength, ends[1] + wavelength
     f = continued(z, centre, wavelength, reach)
@@ -244,6 +247,7 @@ def _centre_line(
 def continued(x: FloatArray, y: FloatArray, wavelength: float, ends: tuple[float, float]) -> BSpline:
     """Smooth spline near samples that goes over to the first and the last one beyond them."""
     step = float(np.median(np.diff(x)))
+    # half a wavelength without samples lets the spline bend over to the level part
     before = np.arange(ends[0], x[0] - 0.5 * wavelength, step)
     after = np.arange(ends[1], x[-1] + 0.5 * wavelength, -step)[::-1]
     values = np.concatenate([np.repeat(y[:1], len(before), axis=0), y, np.repeat(y[-1:], len(after), axis=0)])

@@ -97,8 +97,10 @@ def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, t
     """
     z = np.linspace(*wall.ends, MOST_ALONG)
     rays = cast(mesh.points, mesh.triangles, z, wall.centre(z), FEW)
+    # before any smoothing, which would draw a wall through the fold that is not there
     _refuse_folds(z, rays, facet)
     s = by_length(z, rays.outer.mean(axis=1))
+    # no shorter than the samples along and around the body can show
     wavelength = max(wavelength, 0.25 * PER_WAVE * s[-1] / MOST_ALONG, 8 * np.pi * wall.radius / AROUND)
     height = smooth_spline(s, z, wavelength, (0.0, s[-1]))
     s = np.linspace(0.0, s[-1], max(33, int(np.ceil(PER_WAVE * s[-1] / wavelength)) + 1))
@@ -132,6 +134,7 @@ def _symmetric(R: FloatArray, on_axis: FloatArray, tolerance: float) -> tuple[Fl
         image = R[:, mirrored % len(k)]
         found.append(bool(on_axis[axis] and np.abs(R - image).max() <= tolerance))
         if found[-1]:
+            # an exact symmetry lets the wall be meshed by halves
             R = 0.5 * (R + image)
     mean = R.mean(axis=1, keepdims=True)
     is_round = all(found) and bool(np.abs(R - mean).max() <= tolerance)
@@ -266,6 +269,7 @@ def _surface(wall: Wall, radii: Radii, rim: float) -> TracedSurface:
     curve = joined([*below, given, *above])
     first = sum(len(piece.coefficients) for piece in below)
     start, end = float(curve.breaks[first]), float(curve.breaks[-1])
+    # carried on over the lids, so that they have the shape of the last section
     q = continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end))
     n = R.shape[1] // 4
     ratio = CubicSpline(z, (R[:, n] + R[:, 3 * n]) / (R[:, 0] + R[:, 2 * n]))
@@ -291,6 +295,7 @@ def _shape(q: BSpline, around: int) -> SplineSurface:
     theta = np.linspace(0.0, 2 * np.pi, around + 1)
     e = np.stack([np.cos(theta), np.sin(theta), 0 * theta], axis=1)
     values = q(s)
+    # a closed surface has to end where it began
     values = np.concatenate([values, values[:, :1]], axis=1).T
     return spline_surface(theta, s, values[:, :, None] * e[:, None, :], closed=True)
 

@@ -43,6 +43,7 @@ def _built(centres, lower, upper):
         if n > LEAF:
             own = order[a : a + n].copy()
             along = centres[own, np.argmax(c_high - c_low)]
+            # a stable sort keeps equal centres in order, so the tree is the same everywhere
             order[a : a + n] = own[np.argsort(along, kind="mergesort")]
             start[used], count[used] = a, n // 2
             start[used + 1], count[used + 1] = a + n // 2, n - n // 2
@@ -122,6 +123,7 @@ def closest(x, corners, order, low, high, start, count):
         while top > 0:
             top -= 1
             node = stack[top]
+            # the best may have fallen since this box was put on the stack
             if bound[top] >= best:
                 continue
             if count[node]:
@@ -133,6 +135,7 @@ def closest(x, corners, order, low, high, start, count):
                 continue
             one, two = start[node], start[node] + 1
             d_one, d_two = _to_box(x[i], low[one], high[one]), _to_box(x[i], low[two], high[two])
+            # the nearer box comes to lie on top: what it yields often spares the other
             if d_one < d_two:
                 one, two, d_one, d_two = two, one, d_two, d_one
             stack[top], bound[top], stack[top + 1], bound[top + 1] = one, d_one, two, d_two
@@ -171,6 +174,7 @@ def first_hit(o, d, least, own, anyone, corners, order, low, high, start, count,
     while top > 0:
         top -= 1
         node = stack[top]
+        # a box behind the best hit so far cannot hold a nearer one
         enter, leave = least, best
         for k in range(3):
             if d[k] != 0.0:
@@ -202,6 +206,7 @@ def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray,
     size = np.linalg.norm(normal, axis=1)
     normal /= np.where(size > 0, size, 1.0)[:, None]  # a triangle without area has no say
     unit = along / np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
+    # rounding can push the cosine beyond 1
     angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", unit, np.roll(unit, 1, axis=1)), -1.0, 1.0))
     at_corner = np.stack([
         np.bincount(triangles.ravel(), (angle * normal[:, d : d + 1]).ravel(), len(points)) for d in range(3)
@@ -257,6 +262,7 @@ class TriangleTree:
         away, vector = x - feet, vectors[triangle, feature]
         length = np.linalg.norm(away, axis=1)
         sign = np.where(np.einsum("nd,nd->n", away, vector) < 0, -1.0, 1.0)
+        # on the surface itself the direction to the foot is rounding
         on = length <= 1e-9 * np.ptp(self.points)
         normal = np.where(on[:, None], vector, sign[:, None] * away)
         normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]

@@ -79,6 +79,7 @@ def relative_compliance(
     if not free.any():
         return 0.0
     load = np.zeros((shell.nodes, 6))
+    # a force on the plate's face works on the middle and on the director alike
     load[:, 2] = load[:, 5] = shell.node_area
     linear = LinearShell(shell, fixed)
     q = linear.solve(load.ravel()).reshape(-1, 6)

@@ -176,6 +176,7 @@ def _bound_to(laws):
                     for k in range(3):
                         C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
                 low, high = extreme_eigenvalues(C)
+                # rounding can leave the smallest eigenvalue of a crushed element below zero
                 strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
                 # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
                 if q > 0:
@@ -274,6 +275,7 @@ class Foam:
         self.closing_entries = np.flatnonzero(self.rows == pad.closing_dof)
         self._dofs = dofs.ravel()
         self._shape = (n, 3, nodes, 3, nodes)
+        # kept for all evaluations, so that an iteration allocates nothing as large
         self._r = np.empty((n, 3, nodes))
         self._none = np.empty((0, 0, 0, 0, 0))
 
@@ -289,6 +291,7 @@ class Foam:
         """Entries of the tangent [N/m] into ``out (entries,)``."""
         self._evaluate(x, out[: self._elements].reshape(self._shape))
         if self.pad.back:
+            # the plate is linear: its stiffness is the same in every state
             out[self._elements :] = self.pad.back.K.ravel()
 
     def normal_force(self, x: FloatArray) -> float:

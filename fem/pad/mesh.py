@@ -72,6 +72,7 @@ class Pad:
         contact: str = "weighted",
         backing_plate: BackingPlate | None = None,
     ) -> None:
+        # with an odd number the plane of symmetry would cut through a row of elements
         if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
             raise ValueError(f"a symmetric half needs an even number of elements across it, found {shape.elements}")
         self.shape, self.material, self.symmetry, self.backing_plate = shape, material, symmetry, backing_plate
@@ -169,6 +170,7 @@ class Pad:
 def _as_grid(nodes: FloatArray, chosen: NDArray[np.int64], tol: float) -> tuple[IntArray, tuple[int, int]]:
     """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
     column, row = (_lines(nodes[chosen, axis], tol) for axis in (0, 1))
+    # by the lines' numbers: rounding of coordinates would mix up the nodes of one line
     order = np.lexsort((row, column))
     return chosen[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
 
@@ -185,6 +187,7 @@ def _lines(x: FloatArray, tol: float) -> IntArray:
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
     if contact == "weighted":
+        # as many Gauss points along a side as nodes, which the grid of the contact patch counts on
         (points,), weights = get_quadrature(RefLine, 2 * per_side - 1)
     elif contact == "nodal":
         # Lobatto points are the nodes: the shape functions become the identity, and each node has a gap of its own

@@ -60,7 +60,9 @@ class PadShape:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""
         n, length, ratio = self.elements[axis], self.size[axis], self.grading[axis]
         if axis == 2:
+            # fine at the contact face, where the pressure changes most; the bonded back may be coarser
             return -length * _graded(n, ratio)[::-1]
+        # no mesh line lies in the middle from which a grading could start
         if n % 2:
             return np.linspace(-length / 2, length / 2, n + 1)
         positive = length / 2 * _graded(n // 2, ratio)

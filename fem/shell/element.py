@@ -202,6 +202,7 @@ def _metric(x: FloatArray, a: FloatArray, b: FloatArray, e1: FloatArray) -> tupl
     n = np.cross(A[:, 0], A[:, 1])
     area = np.linalg.norm(n, axis=1)
     n = n / np.where(area > 0, area, 1.0)[:, None]
+    # laid into the tangent plane of this point: a warped element has another at each
     f1 = e1 - np.einsum("nk,nk->n", e1, n)[:, None] * n
     f1 /= np.linalg.norm(f1, axis=1)[:, None]
     M = np.einsum("nak,nbk->nab", A, np.stack([f1, np.cross(n, f1)], axis=1))  # A_alpha . e_b
@@ -295,6 +296,7 @@ class Shell(Generic[MeshT]):
         # assigned, not added: the kernel adds the elements to it
         values[self._diagonal] = self.springs
         q = q.reshape(-1, 6)
+        # an array without rows, so that the compiled loop sees one type
         step = NO_STEP if before is None else q - before.reshape(-1, 6)
         kernel.tangent(*self.elements.loops, self._reference + q, step, self._place, self._width, values)
         return values

@@ -98,6 +98,7 @@ def _stress(e, membrane, in_plane, shear, thickness, nu, s):
     for q in range(4):
         c = membrane[q]
         s[2 * q], s[2 * q + 1] = c * (e[2 * q] + nu * e[2 * q + 1]), c * (nu * e[2 * q] + e[2 * q + 1])
+        # the mean of zeta^2 over the wall
         c = membrane[q] / 3.0
         s[8 + 2 * q] = c * (e[8 + 2 * q] + nu * e[9 + 2 * q])
         s[9 + 2 * q] = c * (nu * e[8 + 2 * q] + e[9 + 2 * q])
@@ -161,6 +162,7 @@ def _in_plane_rows(t, a, b, v, membrane, bending):
         y, z = t[0] * v[2, k] + t[2] * v[3, k], t[1] * v[3, k] + t[2] * v[2, k]
         for i in range(4):
             membrane[3 * i + k] = a[i] * p + b[i] * r
+            # bending is bilinear in places and directors: by the latter it has the membrane's derivative
             bending[12 + 3 * i + k] = membrane[3 * i + k]
             bending[3 * i + k] = a[i] * y + b[i] * z
 
@@ -219,6 +221,7 @@ def _material_tangent(M, B, CM, CB, K):
             c = B[r, i]
             for j in range(24):
                 K[i, j] += c * CB[r, j]
+    # membrane strains do not depend on directors, so only bending couples these
     for i in range(12, 24):
         for r in range(13):
             c = B[r, i]

@@ -127,6 +127,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         pick = (fresh[:, 1] > wall.ends[0]) & (fresh[:, 1] < wall.ends[1]) | np.isnan(found.gap[again])
         again, fresh = again[pick], fresh[pick]
         once_more = _search(wall, points[again], fresh, v, w)
+        # NaN compares as false: what is lost again keeps its first answer
         good = once_more.gap < FAR
         for one, other in zip(vars(found).values(), vars(once_more).values(), strict=True):
             one[again[good]] = other[good]
@@ -178,8 +179,10 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
             evaluate(lines_t, lines_s, coefficients, periodic, t0, s0, X)
             _element(theta, s, table, t0, s0, at, shape, shape_1, shape_2)
             length = _director(X, half, w, at, shape, shape_1, shape_2, n, n_1, n_2)
+            # a director that has vanished faces nowhere, and NaN does not get past either
             if not length > 0.0:
                 break
+            # a first gap that belongs to the place, so that the first step is not spent on it
             if iteration == 0:
                 for c in range(3):
                     x_s = X[0, c]

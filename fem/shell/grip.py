@@ -52,6 +52,7 @@ class Opening:
     """
 
     def __init__(self, mesh: BodyMesh) -> None:
+        # inner faces meet before the middle surfaces do
         self._inner = mesh.X - mesh.D
         x = self._inner[mesh.number, 0]
         bound = np.maximum(SIDES * np.abs(x).max(axis=0), 1e-6)
@@ -184,6 +185,7 @@ class Grip(LoadPath):
                 self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
                 if self.fallback is None:
                     raise
+                # the unknowns are numbered alike, so the path goes on from the last state
                 last, self.problem, self.fallback = self.opening.last, self.fallback(), None
                 self._start_again()
                 self.opening.last = last
@@ -229,6 +231,7 @@ class Grip(LoadPath):
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
     ) -> tuple[FloatArray, bool]:
         """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
+        # twice what the slope so far foretells; a snap goes much further
         expected = max(JUMP, 2.0 * compliance * (force - reached))
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
@@ -261,6 +264,7 @@ class Grip(LoadPath):
         fingers = []
         for k, f in enumerate(problem.fingers):
             left_over = residual[f.offset : f.closing_dof + 1].max() / f.pad.share
+            # both fingers are solved at once: their effort is counted with the first
             part = seconds if k == 0 else Seconds()
             fingers.append(pressed(
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,

@@ -92,6 +92,7 @@ class GripProblem:
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.area.sum() for f in self.fingers)
         self.control = Control(closing=0.0)
+        # kept from call to call: where a point was is the best start for where it is now
         self.places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
         self._build_pattern()
 
@@ -172,6 +173,7 @@ class GripProblem:
                 R[f.closing_dof] -= self.control.force * f.pad.share
             return
         if last is not one:
+            # forces of whole pads, whatever part of each is meshed
             R[last.closing_dof] = R[last.closing_dof] / last.pad.share - R[one.closing_dof] / one.pad.share
         closing = np.mean([x[f.closing_dof] for f in self.fingers])
         R[one.closing_dof] = self.stiffness * (closing - self.control.closing)
@@ -269,9 +271,11 @@ class GripProblem:
         f = self.fingers[number]
         c = self._contact(x, self._no_force())[number]
         own = f.points(x)
+        # a point that faces no wall gets the approach, so that the patch has no face without a normal
         normal = np.where(c.facing.gap[:, None] < FAR, c.facing.normal @ f.R, [0.0, 0.0, -1.0]).reshape(own.shape)
         gap = c.facing.gap.reshape(own.shape[:2])
         pressure = borne(f.pressure(x), c.active)
+        # a node may carry load over the rim, but its points beyond it press on nothing
         load = np.where(gap < FAR, f.loads(pressure), 0.0)
         return pressure, c.weighted / f.area, ContactPoints(own, normal, gap, load)
 
@@ -282,6 +286,7 @@ class GripProblem:
         """Contact forces on the wall's nodes ``(k, 3)`` [N]."""
         force = self._no_force()
         self._contact(x, force)
+        # the kernel adds what enters the residual, the negative of the load
         return -force
 
     def wall_state(self, x: FloatArray) -> FloatArray:

@@ -157,6 +157,7 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     ``allowed`` leaves out planes that the meshes cannot use.
     """
     approach = poses[0].rotation[:, 2]
+    # an approach along the axis has no angle about it, and any will do
     angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
     turned = Turned(body.surface, angle, body.round)
     one, two = (_turned(pose, angle) for pose in poses)
@@ -179,6 +180,7 @@ def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh:
     """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
     low, high, half = _footprint(held, pad_size)
     size = MeshSize((0.0, np.pi), (low, high), half, mesh.around, mesh.along, mesh.coarse)
+    # a pad may reach beyond the wall, where the outline has no station
     one = _supported(body, held, _within(body, size))
     found = one.shell.mesh
     wall = Wall(_surface(found), found.theta, found.s, found.number, 0.5 * found.thickness)
@@ -247,4 +249,5 @@ def _image(pose: Pose) -> Pose:
 
 def _is_own_image(pose: Pose, tolerance: float) -> bool:
     """Whether y = 0 of the grasp frame is the pad's own plane y = 0."""
+    # either sign: half a turn about the approach leaves the pad in the same plane
     return abs(abs(pose.rotation[1, 1]) - 1.0) <= ALIKE and abs(pose.origin[1]) <= tolerance

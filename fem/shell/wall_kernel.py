@@ -47,6 +47,7 @@ def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, f
                 weighted[f, i] += area[f, q] * N[q, i] * gap[m]
                 facing[f, i] += area[f, q] * N[q, i]
                 p += N[q, i] * lam[f, i]
+            # gaps count at every point that faces the wall, forces only where something presses
             if p == 0.0:
                 continue
             load = p * area[f, q]

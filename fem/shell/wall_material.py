@@ -36,6 +36,7 @@ class WallMaterial:
         """Refuse values that no wall has."""
         if not self.young_modulus > 0:
             raise ValueError(f"young_modulus must be positive, found {self.young_modulus} Pa")
+        # 0.5 is allowed, unlike for foam: in plane stress nothing becomes infinite
         if not -1.0 < self.poisson_ratio <= 0.5:
             raise ValueError(f"poisson_ratio must lie between -1 and 0.5, found {self.poisson_ratio}")
         if self.yield_strength is not None and not self.yield_strength > 0:
@@ -100,6 +101,7 @@ class FaceState:
     def principal_strain(self) -> FloatArray:
         """Smaller and larger principal strain in the wall, ``(n, 4, 2)``."""
         a, b, c = np.moveaxis(self.strain, -1, 0)
+        # half of c, because gamma is twice the tensor's shear
         middle, radius = 0.5 * (a + b), np.hypot(0.5 * (a - b), 0.5 * c)
         return np.stack([middle - radius, middle + radius], axis=-1)
 
@@ -112,6 +114,7 @@ def faces(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
     e -= parts.start
     membrane, bending = e[:, :8].reshape(-1, 4, 2), e[:, 8:16].reshape(-1, 4, 2)
     E, nu = shell.young_modulus, shell.poisson_ratio
+    # plane stress, as in the element, whose thickness strain has no coupling with the others
     C = E / (1.0 - nu**2) * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
     states = []
     for zeta in (1.0, -1.0):

@@ -78,6 +78,7 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
     # rounding just above a whole number of intervals must not add one
     n = multiple * max(1, int(np.ceil((count[-1] - 1e-6) / multiple)))
     places = np.interp(np.arange(n + 1) * count[-1] / n, count, fine)
+    # exactly, so that neighbouring runs share their line
     places[[0, -1]] = start, end
     return places
 
@@ -115,9 +116,11 @@ def around(surface: Outer, size: MeshSize, symmetry: tuple[bool, bool]) -> Float
 
     first, last = (float(place) for place in np.interp([begin, end], fine, arc))
     x = np.linspace(first, last, SAMPLES)
+    # the short way round the body
     off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
     h = np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
     theta = np.interp(divided(first, last, x, h, 4 >> sum(symmetry)), arc, fine)
+    # exactly, because nodes on planes of symmetry are told by their angle
     theta[[0, -1]] = begin, end
     return theta
 
@@ -258,6 +261,7 @@ def _wall(surface: Outer, thickness: Thickness, base: float | None, s: FloatArra
     if base is not None:
         if surface.flat[0] == 0.0:
             raise ValueError("base_thickness needs a body with a flat bottom; give pairs (z, thickness) instead")
+        # over the rounded rim: a step of the thickness would be a step of the inner face
         part = np.clip((surface.wall[0] - s) / max(surface.wall[0] - surface.flat[0], 1e-12), 0.0, 1.0)
         t = part * base + (1.0 - part) * t
     if not (np.isfinite(t) & (t > 0)).all():

@@ -49,6 +49,7 @@ class LinearShell:
         # any load with a share of every motion will do; the seed keeps a run the same to the bit
         load[self.free] = np.random.default_rng(0).normal(size=len(self.free))
         ratio = stiffest * np.abs(self.solve(load)).max() / np.abs(load).max()
+        # `not <` counts NaN as loose, too
         if not ratio < LOOSE:
             raise ConvergenceError(
                 "the shell can move without force: fix more of it, or give it weak springs (see fem.shell.thin_walled)"
