@@ -21,6 +21,7 @@ def hull_volume(W: ArrayLike) -> float:
     """Volume of the hull of the wrenches ``W (m, 3)`` and their opposites; 0 if they lie in a plane (`NOTHING`)."""
     points = np.asarray(W, float)
     _, values, V = np.linalg.svd(points, full_matrices=False)
+    # Qhull fails on points of a plane instead of finding no volume
     if len(points) < 3 or values[2] <= NOTHING * values[0]:
         return 0.0
     # the volume scales with the lengths, so it loses nothing by making them equal
@@ -43,14 +44,18 @@ def tangent_volume(T: ArrayLike, W: ArrayLike) -> float:
     The hull of the normals over their supports has a corner for every plane and a face for every corner of the
     polytope. With the touching points, the two ends of every edge make tetrahedra that fill it.
     """
+    # normals scale inversely to points: the products that say where planes touch stay as they are
     size = np.abs(W).max(axis=0)
     normals, points = np.asarray(T, float) * size, np.asarray(W, float) / size
     dual = normals / np.einsum("md,md->m", normals, points)[:, None]
     hull, touching = ConvexHull(np.vstack([dual, -dual])), np.vstack([points, -points])
+    # polar duality: the facet n . x = d of the normals' hull is the corner n / d of the polytope
     corners = -hull.equations[:, :3] / hull.equations[:, 3:]
     edges = hull.simplices[:, [[1, 2], [0, 2], [0, 1]]].reshape(-1, 2)
     across = np.cross(np.repeat(corners, 3, axis=0), corners[hull.neighbors.ravel()])
+    # Qhull lists the corners of a facet in either sense: tetrahedra count by size
     parts = np.abs(np.einsum("eid,ed->ei", touching[edges], across))
+    # a sixth for a tetrahedron, and a half because both facets beside an edge list it
     return float(parts.sum()) / 12 * float(size.prod())
 
 
@@ -71,6 +76,7 @@ def body_volume(coarse: ArrayLike, fine: ArrayLike) -> float:
 
 
 def _extrapolated(coarse: float, fine: float, gain: float) -> float:
+    # Richardson: errors in proportion to 1 / m cancel in this combination
     return fine + (fine - coarse) / (gain - 1)
 
 
@@ -103,11 +109,13 @@ class ExactSurface(LimitSurface):
 
     def samples(self, count: int | None = None) -> FloatArray:
         """Wrenches for evenly spread motions of one sense of rotation, ``(count, 3)``."""
+        # omega is divided by rho: the motions are spread evenly in (v, rho omega)
         return np.asarray(self.wrench(directions(3, count or self.count) / [1.0, 1.0, self.rho]), float)
 
     @cached_property
     def rank(self) -> int:
         """Dimension of the body."""
+        # torques by rho: the rank must not depend on the unit of length
         return sample_rank(self._hull_samples / [1.0, 1.0, self.rho])
 
     @cached_property
@@ -133,6 +141,7 @@ class ExactSurface(LimitSurface):
         if self.rank < 3:
             return 0.0
         outer = tangent_volume(directions(3, self.count) / [1.0, 1.0, self.rho], self.samples())
+        # the true volume is between hull and tangents: the farther of both bounds the error
         return max(self.volume - self._inner_volume, outer - self.volume)
 
     @cached_property
@@ -152,6 +161,7 @@ class ExactSurface(LimitSurface):
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``; exact."""
         T = rows(t, 3)
+        # without a motion friction has no direction, yet the support is 0
         moving = T.any(axis=1)
         h = np.zeros(len(T))
         h[moving] = (np.asarray(self.wrench(T[moving])) * T[moving]).sum(axis=1)
@@ -168,7 +178,9 @@ class ExactSurface(LimitSurface):
     def scaled(self, factors: ArrayLike) -> ExactSurface:
         """Image of the body under ``w -> factors * w``, ``(3,)``, factors not zero."""
         f = checked_factors(factors, 3)
+        # rho is a torque over a force; the geometric mean stands for two factors of force
         force = float(np.sqrt(abs(f[0] * f[1])))
+        # the image has the support h(f t), so its wrench for t is f times the one for f t
         return ExactSurface(
             lambda t: f * np.asarray(self.wrench(t * f)), self.rho * abs(float(f[2])) / force, self.count, self.flag
         )
@@ -185,6 +197,7 @@ class ExactSurface(LimitSurface):
     def _facets(self) -> FloatArray:
         """Normals divided by distances, ``(k, 3)``: the hull is where all products with them are at most 1."""
         B = self.span
+        # Qhull needs two dimensions at least
         if self.rank == 1:
             return B.T / np.abs(self._hull_samples @ B).max()
         Y = self._hull_samples @ B
@@ -198,9 +211,11 @@ class ExactSurface(LimitSurface):
         # a product with all facets at once would take gigabytes for thousands of wrenches
         for part in range(0, len(W), 200):
             product = W[part : part + 200] @ self._facets.T
+            # a segment has one normal in the list, which stands for both its ends
             product = np.abs(product) if self.rank == 1 else product
             at[part : part + 200] = product.argmax(axis=1)
             P[part : part + 200] = product.max(axis=1)
+        # facets do not see the part across a flat body
         away = W - W @ self.span @ self.span.T
         P[np.linalg.norm(away, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
         return P, at

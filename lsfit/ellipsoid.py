@@ -75,6 +75,7 @@ class Ellipsoid(LimitSurface):
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, 3) -> (m,)``; infinite for loads along an axis that carries none."""
         w = rows(w, 3)
+        # what rounding leaves along an axis without load must not make the value infinite
         inside = (self.semi_axes == 0) & (np.abs(w) <= OUT_OF_SPAN * np.linalg.norm(w, axis=1, keepdims=True))
         with np.errstate(divide="ignore", invalid="ignore"):
             return (np.where(inside, 0.0, w / self.semi_axes) ** 2).sum(axis=1)
@@ -141,6 +142,7 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     # each component by its own reach: the squares of unequal ones would lose the small ones' digits
     used = reach > FLAT * reach.max()
     X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
+    # coefficients are the floor plus what nnls finds: so no axis is longer than FAR allows
     right = 1 - floor * X.sum(axis=1)
     if B.shape[1] < used.sum() or len(W) < used.sum():  # squares may depend on each other: lean towards equal ones
         X, right = np.vstack([X, 1e-5 * np.eye(X.shape[1])]), np.append(right, np.full(X.shape[1], 1e-5))
@@ -174,6 +176,7 @@ def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
     W = checked_wrenches(W)
     B, Y, flag = principal_frame(W)
     A, more = _quadratic_form(Y)
+    # A = L L' makes the body |L' y| <= 1, the image of the ball under the inverse of L'
     return TiltedEllipsoid.of_ball(B @ np.linalg.inv(np.linalg.cholesky(A)).T, flag | more)
 
 
@@ -182,11 +185,13 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     m, r = Y.shape
     E = exponents(r, 2)
     M = monomials(Y, E)
+    # components of mean square 1: |y|^2 / r is 1 on average
     ball = (E == 2).any(axis=1) / r
     N, b = M.T @ M / m, np.full(m, 1 / m) @ M
     a, flag = nearest_solution(N, b, ball)
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)
+    # this eigenvalue belongs to an axis FAR times as long as the farthest sample
     floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
     # the linear equations give the best form of all; only one that is open or too long needs the programme
     lowest = np.linalg.eigvalsh(A)[0]
@@ -207,6 +212,7 @@ def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[F
     values, V = np.linalg.eigh(N * np.outer(size, size))
     held = values > HELD * values[-1]
     V = size[:, None] * V[:, held]
+    # only the difference from the start is solved for, so what data leave open stays there
     x = start + V @ ((V.T @ (b - N @ start)) / values[held])
     return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED
 
@@ -258,6 +264,7 @@ class TiltedEllipsoid(LimitSurface):
     def of_ball(cls, F: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> TiltedEllipsoid:
         """Image ``{F y : |y| <= 1}`` of the unit ball, ``F (d, r)`` with independent columns; flat if ``r < d``."""
         inverse = _inverse(np.asarray(F, float))
+        # the map is kept: A holds squares of the axes, in which a short one loses twice as many digits
         return cls(inverse.T @ inverse, np.asarray(F, float), flag)
 
     @property
@@ -281,12 +288,14 @@ class TiltedEllipsoid(LimitSurface):
     @property
     def shadow_area(self) -> float:
         """Area of the shadow on the plane of the first two components."""
+        # the shadow of a ball's image is an ellipse, with the singular values of two rows as axes
         s = np.linalg.svd(self.F[:2], compute_uv=False)
         return math.pi * float(s[0] * s[1]) if len(s) > 1 else 0.0
 
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
         W = rows(w, self.dimension)
+        # through the map and not A, as a sum of squares cannot turn negative by rounding
         Y = W @ self.inverse.T
         return mapped_value((Y**2).sum(axis=1), Y, self.F, W)
 

@@ -67,6 +67,7 @@ def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     length = np.linalg.norm(G, axis=1, keepdims=True)
     u = G / np.where(length > 0, length, 1.0)
     across = T - T @ span @ span.T
+    # no normal of a flat body points against the gradient
     ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
     u = across + ahead * u
     size = np.linalg.norm(u, axis=1, keepdims=True)

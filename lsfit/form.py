@@ -25,7 +25,9 @@ def exponents(dimension: int, degree: int) -> IntArray:
     """
     E = np.zeros((math.comb(dimension + degree - 1, degree), dimension), dtype=np.int64)
     for row, variables in zip(E, combinations_with_replacement(range(dimension), degree), strict=True):
+        # a variable may occur several times, which plain indexed addition would count once
         np.add.at(row, list(variables), 1)
+    # cached: whoever wrote to it would change every later result
     E.flags.writeable = False
     return E
 
@@ -37,7 +39,9 @@ def places(dimension: int, degree: int) -> dict[tuple[int, ...], int]:
 
 def monomials(w: ArrayLike, E: IntArray) -> FloatArray:
     """Monomials ``w^E``, ``(m, d), (k, d) -> (m, k)``."""
+    # numba compiles a version of its own for every memory layout
     W = np.ascontiguousarray(np.atleast_2d(np.asarray(w, float)))
+    # one row per monomial, so that the products run along contiguous memory
     out = np.empty((len(E), len(W)))
     fill_monomials(W, E, out)
     return out.T
@@ -82,6 +86,7 @@ def tensor_places(dimension: int) -> tuple[IntArray, FloatArray]:
     place = places(dimension, 4)
     index = np.array(list(np.ndindex((dimension,) * 4)))
     count = (index[:, :, None] == np.arange(dimension)).sum(axis=1).tolist()
+    # Taylor: second derivatives of a quartic are quadratic forms of half its fourth derivatives
     factor = [math.prod(map(math.factorial, row)) / 2 for row in count]
     return np.array([place[tuple(row)] for row in count]), np.array(factor)
 
@@ -98,7 +103,9 @@ def hessian_tensor(coefficients: ArrayLike, dimension: int) -> FloatArray:
 @lru_cache
 def _interpolation(dimension: int, degree: int) -> tuple[FloatArray, FloatArray]:
     E = exponents(dimension, degree)
+    # more points than coefficients keep the system well conditioned; the seed repeats every run
     points = np.random.default_rng(len(E)).normal(size=(3 * len(E), dimension))
+    # a form grows with a power of the length, which would weigh the points unevenly
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     return points, np.linalg.pinv(monomials(points, E))
 

@@ -27,7 +27,9 @@ def directions(dimension: int, count: int) -> FloatArray:
         u = np.column_stack([np.cos(phi), np.sin(phi)])[:, :dimension]
     elif dimension == 3:
         i = np.arange(count)
+        # equal steps of height cut a sphere into rings of equal area (Archimedes)
         z = (i + 0.5) / count
+        # by the golden angle no two turns of the spiral line up
         phi = i * np.pi * (3 - math.sqrt(5))
         u = np.column_stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z])
     else:
@@ -46,10 +48,12 @@ def sphere_rule(dimension: int, n: int) -> tuple[FloatArray, FloatArray]:
     any power of ``n``.
     """
     if dimension == 1:
+        # even functions: one end of the segment stands for both
         return np.ones((1, 1)), np.array([2.0])
     if dimension == 2:
         phi = np.pi * (np.arange(n) + 0.5) / n
         return np.column_stack([np.cos(phi), np.sin(phi)]), np.full(n, 2 * np.pi / n)
+    # slices of a sphere weigh (1 - z^2)^((d - 3) / 2), for which these rules are made
     z, weight = roots_gegenbauer(n, (dimension - 2) / 2)
     u, inner = sphere_rule(dimension - 1, n)
     points = np.concatenate(
@@ -107,6 +111,7 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
     for _ in range(40):
         r = value(u @ L.T) ** (-1 / degree)
         Y = u * r[:, None]
+        # the second moments of a unit sphere are 1 / d: times d they are the identity
         C = np.linalg.cholesky(dimension * (Y.T @ Y) / len(u))
         L = L @ C
         if abs(C - np.eye(dimension)).max() < 0.3:
@@ -137,6 +142,7 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     last = math.nan
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
         floors = _floors(c, _plane_monomials(n))
+        # half a turn stands for the whole, which cancels the half of 1/2 int r^2; r^2 is 1 / sqrt(P)
         area = np.pi / n * float((1.0 / np.sqrt(floors[:, 2])).sum())
         # equal steps converge exponentially for a smooth outline, so two that agree are both right
         if abs(area - last) <= 1e-13 * area:
@@ -155,8 +161,10 @@ def _cornered_area(c: FloatArray, floors: FloatArray) -> float:
 
     n = len(floors)
     p, q = floors[:, 0], np.append(floors[:, 1], -floors[0, 1])  # q is odd: half a turn changes its sign
+    # only with p < 0 are there two valleys to jump between
     ends = np.pi * np.array([[k, k + 1] for k in np.flatnonzero((q[:-1] > 0) != (q[1:] > 0)) if p[k] < 0]) / n
     corners = [brentq(lambda phi: at(phi)[1], *pair) for pair in ends]
+    # starting at a corner leaves none inside a piece
     start, inside = (corners[0], corners[1:]) if corners else (0.0, [])
     area, error = quad(
         lambda phi: at(phi)[2] ** -0.5,
@@ -204,11 +212,14 @@ def fill_floors(c, E, M, out):  # pragma: no cover - compiled
         inner = q**2 / 4.0 + p**3 / 27.0
         s = 0.0
         if inner >= 0.0:
+            # with |q| both terms add and no digits cancel; the sign of the root comes below
             u = (abs(q) / 2.0 + math.sqrt(inner)) ** (1.0 / 3.0)
+            # p = q = 0 is a triple root at 0
             if u > 0.0:
                 s = u - p / (3.0 * u)
         else:
             reach = math.sqrt(-p / 3.0)
+            # rounding carries the cosine beyond 1 at a double root
             s = 2.0 * reach * math.cos(math.acos(min(abs(q) / (2.0 * reach**3), 1.0)) / 3.0)
         tau = -shift - (s if q > 0.0 else -s)
         out[n, 0], out[n, 1] = p, q

@@ -40,10 +40,12 @@ def lies_above(v: FloatArray, dimension: int, level: float) -> bool:
     E = exponents(dimension, 4)
     # a long thin body has a small value along one axis by its shape alone: made as long as wide it is judged fairly
     along = v[E.max(axis=1) == 4]
+    # the values on the axes are values on the sphere: one that is too small settles it
     if not along.min() > level:
         return False
     size = along**-0.25
     even = _bound(v * np.prod(size**E, axis=1), dimension)
+    # a unit vector is at least 1 / max(size) long in even variables, and P grows with the fourth power
     return bool(even > level * size.max() ** 4) or smallest_value(v, dimension)[0] > level
 
 
@@ -51,6 +53,7 @@ def _bound(v: FloatArray, dimension: int) -> float:
     """Lower bound of the form on the unit sphere."""
     P = half_sphere_monomials(dimension, _count(dimension)) @ v
     low = float(P.min())
+    # Bernstein's bound takes the largest magnitude, which may belong to a negative value
     return low - _missed(dimension) * max(float(P.max()), -low)
 
 
@@ -64,11 +67,13 @@ def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
     value, size, trust = monomials(u, E) @ v, np.abs(P).max(), np.full(len(u), 0.3)
     for _ in range(60):
         g = monomials(u, third) @ (D @ v).T
+        # only the slope along the sphere counts; across it Euler's identity fixes it to 4 P
         slope = g - (g * u).sum(axis=1, keepdims=True) * u
         if ((np.abs(slope).max(axis=1) <= SLOPE * size) | (trust < SHORT)).all():
             break
         new = _descended(u, slope, value, Q, trust)
         reached = monomials(new, E) @ v
+        # steps that do not descend are not taken, so no search ends above its start
         lower = reached < value
         u, value = np.where(lower[:, None], new, u), np.where(lower, reached, value)
         # a step that rises is cut hard, one that falls may grow: as trust regions do
@@ -82,9 +87,12 @@ def _descended(u: FloatArray, slope: FloatArray, value: FloatArray, Q: FloatArra
     d = u.shape[1]
     H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
     across = np.eye(d) - u[:, :, None] * u[:, None, :]
+    # curvature along the sphere: that of P less its slope across, 4 P
     curvature, axes = np.linalg.eigh(across @ (H - 4 * value[:, None, None] * np.eye(d)) @ across)
+    # magnitudes make the step descend at saddles too; the floor bounds it where the form is flat
     size = np.maximum(np.abs(curvature), 1e-8 * np.abs(Q).max() + 1e-300)
     step = np.einsum("mij,mj,mkj,mk->mi", axes, 1 / size, axes, -slope)
+    # without curvature across the sphere the rounding of that part is blown up, and has to go
     step -= (step * u).sum(axis=1, keepdims=True) * u
     length = np.linalg.norm(step, axis=1)
     new = u + step * np.minimum(1, longest / np.maximum(length, 1e-300))[:, None]
@@ -130,11 +138,13 @@ def _polished(Q: FloatArray, u: FloatArray, z: FloatArray) -> float:
         mixed = np.einsum("ijkl,j,l->ik", Q, u, z)
         Hu, Hz = np.einsum("ijkl,k,l->ij", Q, u, u), np.einsum("ijkl,k,l->ij", Q, z, z)
         s = float(z @ Hu @ z)
+        # both equations and both lengths at once: the last two rows keep the step tangent to the spheres
         J = np.zeros((2 * d + 2, 2 * d + 2))
         J[:d, :d], J[:d, d:-2], J[d:-2, :d], J[d:-2, d:-2] = Hz, 2 * mixed, 2 * mixed.T, Hu
         J[: 2 * d, : 2 * d] -= s * np.eye(2 * d)
         J[:d, -2] = J[-2, :d] = u
         J[d:-2, -1] = J[-1, d:-2] = z
+        # minima may form a curve, where the matrix is singular: least squares takes the shortest step
         step = np.linalg.lstsq(J, np.concatenate([s * u - Hz @ u, s * z - Hu @ z, [0.0, 0.0]]), rcond=1e-9)[0]
         u, z = u + step[:d], z + step[d:-2]
         u, z = u / np.linalg.norm(u), z / np.linalg.norm(z)
@@ -153,6 +163,7 @@ def lowest_eigenvalues(H: FloatArray) -> FloatArray:
     f, g, h = H[:, 1, 2], H[:, 0, 2], H[:, 0, 1]
     p = np.sqrt((a * a + b * b + c * c + 2 * (f * f + g * g + h * h)) / 6) + 1e-300
     det = (a * (b * c - f * f) - h * (h * c - f * g) + g * (h * f - b * g)) / (2 * p**3)
+    # rounding carries the cosine beyond 1 where two eigenvalues are equal
     return mean + 2 * p * np.cos((np.arccos(np.clip(det, -1, 1)) + 2 * np.pi) / 3)
 
 
@@ -170,6 +181,7 @@ def _lowest(value: FloatArray, dimension: int) -> NDArray[np.bool_]:
 def neighbours(dimension: int, count: int) -> NDArray[np.intp]:
     """Nearest of the other `directions`, opposites being the same, ``(count, k)``."""
     u = directions(dimension, count)
+    # the nearest point is the direction itself
     return cKDTree(np.vstack([u, -u])).query(u, 9 if dimension <= 3 else 11)[1][:, 1:] % count
 
 
@@ -184,6 +196,7 @@ def _missed(dimension: int) -> float:
     # The farthest direction from all samples is a normal of their hull.
     h = math.acos(-ConvexHull(np.vstack([u, -u])).equations[:, -1].max())
     rise = 8 * h**2
+    # the rise is a share of the true magnitude, of which samples may miss as much
     return rise / (1 - rise)
 
 
@@ -274,8 +287,10 @@ def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | N
 
 def _groups(coefficients: FloatArray, E: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
     """Sets of variables, as masks ``(d,)``, that share no monomial with the others."""
+    # a fit with all its monomials is the usual case, and needs no search
     if coefficients.all():
         return [np.ones(E.shape[1], dtype=bool)]
     used = (E[coefficients != 0] > 0).astype(float)
+    # a chain of variables has at most d links, so this power joins all that hang together
     joined = np.linalg.matrix_power(used.T @ used + np.eye(E.shape[1]), E.shape[1]) > 0
     return list(np.unique(joined, axis=0))

@@ -57,9 +57,11 @@ class Quartic(LimitSurface):
                 f"coefficients has shape {c.shape}: expected {len(E)} finite numbers, one for each monomial"
             )
         order = exponents(E.shape[1], 4)
+        # fits pass the cached array itself, which is in order
         if E is not order:
             place = places(E.shape[1], 4)
             sorted_c = np.zeros(len(order))
+            # a monomial may be listed twice; an assignment would keep its last coefficient only
             np.add.at(sorted_c, [place[tuple(row)] for row in E.tolist()], c)
             c = sorted_c
         c.flags.writeable = False
@@ -156,6 +158,7 @@ class Quartic(LimitSurface):
         T = rows(t, self.dimension) @ self.frame
         length = np.linalg.norm(T, axis=1)
         moving = length > 0
+        # unit normals: the tolerances of the search are those of a problem of size one
         T = T[moving] / length[moving, None]
         # of a body with dents the valley next to a start need not hold the farthest point: several are searched
         owner, start = self._starts(T)
@@ -164,6 +167,7 @@ class Quartic(LimitSurface):
         if failed:
             raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
         if len(owner) > len(T):
+            # ordered by height within each owner, the last point is the highest hill
             order = np.lexsort(((points * T[owner]).sum(axis=1), owner))
             points = points[order[np.append(np.diff(owner) > 0, True)]]
         out = np.zeros((len(moving), self.dimension))
@@ -180,9 +184,11 @@ class Quartic(LimitSurface):
         # bounds the memory of the product with all samples
         for part in range(0, len(T), 10_000):
             along = T[part : part + 10_000] @ Y.T
+            # the body is even, so samples of half a sphere do: the sign tells the side
             height = np.abs(along)
             if self._is_indented:
                 tops = height >= height[:, neighbours(d, len(Y))].max(axis=2)
+                # samples rank hills of nearly one height by chance
                 row, column = np.nonzero(tops | (height > 0.9 * height.max(axis=1, keepdims=True)))
             else:
                 row, column = np.arange(len(along)), height.argmax(axis=1)
@@ -244,6 +250,7 @@ def support_points(tensor, T, start, out):  # pragma: no cover - compiled
         t = T[n]
         w = start[n].copy()
         P = _second(tensor, w, H, g)
+        # along a ray P - t . w is least where 4 P s^3 = t . w; the floor keeps starts across t from collapsing to 0
         along = max(np.dot(t, w), 1e-3 * np.sqrt(np.dot(w, w)))
         w *= (along / (4 * P)) ** (1 / 3)
         P = _second(tensor, w, H, g)
@@ -273,12 +280,14 @@ def support_points(tensor, T, start, out):  # pragma: no cover - compiled
                 y[:] = w + length * s
                 P = _second(tensor, y, H, g)
                 new = P - np.dot(t, y)
+                # the last step changes phi by less than its rounding: a test of descent would judge noise
                 if new <= phi - 1e-4 * length * fall or converged:
                     break
                 length *= 0.5
             w[:] = y
         if not converged:
             failed += 1
+        # the minimum lies on the ray through the point wanted, not on the surface
         out[n] = w / P**0.25
     return failed
 
@@ -287,6 +296,7 @@ def support_points(tensor, T, start, out):  # pragma: no cover - compiled
 def _second(tensor, w, H, g):  # pragma: no cover - compiled
     """Second derivative and gradient at ``w``, written to ``H`` and ``g``; the value is returned."""
     d = len(w)
+    # Euler: a form of degree 4 has the gradient H w / 3 and the value g . w / 4
     P = 0.0
     for i in range(d):
         g[i] = 0.0
@@ -306,6 +316,7 @@ def _solve(A, b):  # pragma: no cover - compiled
     """Solve ``A x = b`` in place by Gauss elimination; False where the symmetric matrix is not positive definite."""
     d = len(b)
     for k in range(d):
+        # the pivots of a symmetric matrix are positive just where it is positive definite
         if not A[k, k] > 0.0:
             return False
         for i in range(k + 1, d):

@@ -62,6 +62,7 @@ class Certificate:
         surface = self.surface
         if isinstance(surface, Quartic):
             return max(smallest_eigenvalue(surface.coefficients, surface.dimension), bound)
+        # |B y| = |R y|: in the coordinates R y unit vectors are unit wrenches of the span
         R, inner = np.linalg.qr(surface.B)[1], surface.inner
         assert isinstance(inner, Quartic)
         turned = substitute(inner.coefficients, inner.exponents, np.linalg.inv(R))
@@ -135,6 +136,7 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     r = samples.B.shape[1]
     N, b = normal_equations(samples, beta, gamma)
     v, flag = nearest_solution(N, b, ball_coefficients(r))
+    # free numbers of the ball prove many quartics near it, without a programme
     loose, free, by = bool(flag), ball_freedom(r), "least squares"
     gram = gram_matrix(v, free, r)
     if smallest(gram) < MARGIN:
@@ -144,12 +146,15 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
         gram = gram_matrix(v, free, r)
         if smallest(gram) < MARGIN:
             v, by, gram = bound, "semidefinite programme", gram_matrix(bound, free, r)
+    # P below FAR^-4 on the unit sphere is a reach beyond FAR, which no sample supports
     if not lies_above(v, r, FAR**-4):
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
+        # y' Hess P y = 12 P: a Gram matrix with this least eigenvalue bounds the reach by FAR
         v, free = convex_least_squares(N, b, r, loose, 12 * FAR**-4)
         gram = gram_matrix(v, free, r)
     surface = placed(v, samples, samples.flag | flag)
     low = smallest(gram)
+    # the programme promises half of the margin; the rest is room for rounding on the way
     if low < MARGIN / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
     return QuarticFit(surface, Certificate(low, gram, samples.B, by, surface), surface.flag)
@@ -178,10 +183,13 @@ def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
     if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them
         B = principal_frame(W)[0] * np.sqrt(ball.rank)
         inverse = np.linalg.pinv(B)
+    # across its span a flat body carries nothing: only the part of a motion within has a normal to it
     if T is not None and ball.rank < ball.dimension:
         T = T @ ball.span @ ball.span.T
         length = np.linalg.norm(T, axis=1, keepdims=True)
+        # what rounding leaves of a motion across the span has no direction: zero takes it out of the fit
         T = np.where(length > 1e-9, T / np.maximum(length, 1e-9), 0.0)
+    # whether a quartic is determined is asked of its own equations
     return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.UNDERDETERMINED)
 
 
@@ -201,6 +209,7 @@ def normal_equations(samples: RoundSamples, beta: float, gamma: float) -> tuple[
     arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
     fill_residuals(*arrays, E, float(beta), float(gamma), out)
     R = out.reshape(len(E), -1)
+    # only the residual of P has a target, sqrt(beta); those of the slopes are to vanish
     return R @ R.T / m, R[:, :m] @ np.full(m, math.sqrt(beta) / m)
 
 
@@ -212,9 +221,11 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     if r < d:
         return Image(Quartic(v, E), samples.B, flag)
     reach = np.linalg.norm(samples.B, axis=1)
+    # rows of one length: what is left of the condition is tilt, which no choice of units undoes
     turn = samples.B / reach[:, None]
     if np.linalg.cond(turn) > TILT:
         return Image(Quartic(v, E), samples.B, flag)
+    # turned first and stretched last, as a division by units costs a coefficient no digits
     coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
     return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None, reach)
 
@@ -245,6 +256,7 @@ def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - co
         out[j, 0] = math.sqrt(beta) * power[0, E[j, 0]]
         for i in range(1, r):
             out[j, 0] *= power[i, E[j, i]]
+    # slopes are added up below, and the array comes uninitialised
     out[:, 1:] = 0.0
     if out.shape[1] == 1:
         return
@@ -252,8 +264,10 @@ def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - co
     for c in range(d - 1):
         for n in range(m):
             t = T[n]
+            # the reflection with the sign that adds: the other one cancels near the last axis
             u = t[c] / (1.0 + abs(t[d - 1]))
             end = 1.0 if t[d - 1] >= 0.0 else -1.0
+            # a motion of zeros would be reflected like any other; it must not count
             moving = 0.0
             for a in range(d):
                 moving = math.sqrt(gamma) if t[a] != 0.0 else moving
@@ -266,6 +280,7 @@ def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - co
         for i in range(r):
             if E[j, i] == 0:
                 continue
+            # multiplied out: dividing the monomial by a component fails where that is 0
             slope[:] = E[j, i] * power[i, E[j, i] - 1]
             for a in range(r):
                 if a != i:

@@ -65,6 +65,7 @@ def six_samples(
     if w.shape != t.shape or w.shape[1] != 6:
         raise ValueError(f"wrench has shape {w.shape} and twist {t.shape}: expected (m, 6) for both")
     p = np.asarray(point, float)
+    # torque and velocity change together, so that w . t is the same about either point
     w[:, 3:] -= np.cross(p, w[:, :3])
     t[:, :3] += np.cross(t[:, 3:], p)
     return _normalised(w, t, force, rho)
@@ -75,6 +76,7 @@ def _normalised(w: FloatArray, t: FloatArray, force: float, rho: float) -> tuple
     if not (force > 0 and rho > 0):
         raise ValueError(f"force is {force} and rho is {rho}: samples are normalised by a positive force and length")
     size = np.array([1.0, 1.0, rho] if t.shape[1] == 3 else [1.0, 1.0, 1.0, rho, rho, rho])
+    # a torque is divided by rho and a rotation multiplied by it: powers keep their value
     T = t * size
     length = np.sqrt(np.einsum("md,md->m", T, T))
     if not length.all():
@@ -93,6 +95,7 @@ def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
     for _ in range(60):
         root = (1 + root) ** (1 / (dimension + 1))
     u = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, dimension + 1))) % 1
+    # independent normal numbers have a density that depends on the length alone: no direction is favoured
     x = ndtri(u)
     return x / np.linalg.norm(x, axis=1, keepdims=True)
 
@@ -139,7 +142,9 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
         raise ValueError(f"W has shape {W.shape} and T {T.shape}: every wrench needs its motion")
     wrenches = checked_wrenches(W)
     length = np.sqrt(np.einsum("md,md->m", T, T))
+    # asked this way round, a length that is not a number fails too
     if not abs(length - 1).max() <= UNIT:
+        # nan counts as infinitely wrong, so that the message names it first
         n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
         raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
     return wrenches, T if len(wrenches) == len(T) else T[_pressed(W)]
@@ -164,10 +169,12 @@ def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
     flag : FitFlag
         Whether the samples are flat or thin.
     """
+    # of W itself: the product W'W squares the ratio of long and short directions, and loses the short
     U, values, V = np.linalg.svd(W, full_matrices=False)
     r = int((values > FLAT * values[0]).sum())
     flag = FitFlag.CLEAN if r == W.shape[1] else FitFlag.RANK_DEFICIENT
     flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
+    # columns of U have the length 1: times sqrt(m) their mean square is 1
     size = np.sqrt(len(W))
     V[np.abs(V) < 1e-15] = 0.0  # components that no sample has stay exactly zero
     return V[:r].T * (values[:r] / size), U[:, :r] * size, flag

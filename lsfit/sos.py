@@ -46,8 +46,10 @@ def gram_map(dimension: int) -> csr_array:
     pair = np.zeros((d, d), dtype=int)
     upper = np.triu_indices(d, 1)
     pair[upper] = pair.T[upper] = np.arange(pairs)
+    # z_i w_j z_k w_l = z_i w_l z_k w_j says something only where both indices differ
     row, free = np.arange(d**4), (i != a) & (j != b)
     freedom = (k + pair[i, a] * pairs + pair[j, b])[free]
+    # opposite signs on the two sides of that equation: in the form they cancel
     entries = np.concatenate([value, (np.sign(a - i) * np.sign(b - j))[free]])
     return csr_array((entries, (np.r_[row, row[free]], np.r_[column, freedom])), shape=(d**4, k + pairs**2))
 
@@ -67,6 +69,7 @@ def quadratic_map(dimension: int) -> csr_array:
     d, upper = dimension, np.triu_indices(dimension)
     number = np.zeros((d, d), dtype=int)
     number[upper] = number.T[upper] = np.arange(len(upper[0]))  # the order of `exponents`
+    # two entries of a symmetric matrix share a mixed coefficient
     value = np.where(np.eye(d, dtype=bool), 1.0, 0.5).ravel()
     return csr_array((value, (np.arange(d * d), number.ravel())), shape=(d * d, len(upper[0])))
 
@@ -129,11 +132,13 @@ def convex_least_squares(
         If neither method solves the programme.
     """
     k, ball = len(b), ball_gram(dimension)
+    # an objective of size one: the solvers' tolerances are partly absolute
     size = np.trace(N) / k
     N, b = N / size, b / size
     if loose:
         # as little as decides what the samples do not, and far more than the solver's tolerance
         N, b = N + 1e-8 * np.eye(k), b + 1e-8 * ball[:k]
+    # the free numbers only prove convexity; they cost nothing
     H, g = np.zeros((len(ball),) * 2), np.zeros(len(ball))
     H[:k, :k], g[:k] = N, b
     x = _within(H, g, floor, dimension)
@@ -141,6 +146,7 @@ def convex_least_squares(
     # a mixture of two sos-convex forms is one, and that of the ball lifts every eigenvalue
     if lack > 0:
         most = smallest(gram_matrix(ball[:k], ball[k:], dimension))
+        # the smallest eigenvalue is concave: the mixture has at least the mean of both, by their shares
         share = lack / (most - floor / 2 + lack)
         x = (1 - share) * x + share * ball
     return x[:k], x[k:]
@@ -156,6 +162,7 @@ def _within(H: FloatArray, g: FloatArray, floor: float, dimension: int) -> Float
             pass  # few samples leave Clarabel short of its tolerance
     ball = ball_gram(dimension)
     low = floor / 4 * ball  # a ball of this size has no eigenvalue below the floor
+    # the method's cone has its tip at 0: a shifted origin brings in the floor
     return low + least_quadratic(H, g - H @ low, csr_array(matrix), ball).x
 
 
@@ -184,8 +191,10 @@ def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: floa
         If the programme is not solved.
     """
     size = side(triangle)
+    # the columns of the upper triangle are the rows of the lower one
     column, row = np.tril_indices(size)
     right = np.where(row == column, -floor, 0.0)
+    # Clarabel reads the upper triangle of the objective only
     return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)])[0]
 
 
@@ -208,6 +217,7 @@ def conic_solution(
     settings.verbose = False
     settings.max_threads = 1  # the ranks of a run share the cores
     answer = clarabel.DefaultSolver(P, q, csc_array(A), b, cones, settings).solve()
+    # a gap and two residuals are what Clarabel stops by: the worst tells how far off it is
     short = max(answer.r_prim, answer.r_dual, abs(answer.obj_val - answer.obj_val_dual) / (1 + abs(answer.obj_val)))
     almost = answer.status == clarabel.SolverStatus.AlmostSolved and short < enough
     if not (answer.status == clarabel.SolverStatus.Solved or almost):
@@ -288,6 +298,7 @@ def least_quadratic(
         except np.linalg.LinAlgError:
             break
         x, Z = x + length * dx, Z + length * dZ
+        # from x again: a sum of steps would drift off the affine family
         X = _matrix(A, x)
     if worst <= enough:
         return best
@@ -304,14 +315,17 @@ def _direction(
     n = len(X)
     inverse = cho_solve(cho_factor(X), np.eye(n))
     M = AT @ (AT @ np.kron(inverse, Z)).T
+    # HKM's matrix is symmetric up to rounding, and a Cholesky factor reads one triangle only
     factor = cho_factor(H + (M + M.T) / 2)
     mu = (X * Z).sum() / n
 
     def newton(R: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         dx = cho_solve(factor, AT @ R.ravel() - slope)
         dX = _matrix(A, dx)
+        # HKM: the step of Z is the symmetric part of a product that is not symmetric itself
         return dx, dX, R - _symmetric(inverse @ dX @ Z)
 
+    # the plain step aims at complementarity 0; how far it gets tells how central the iterate is
     _, dX, dZ = newton(-Z)
     length = min(1.0, _reach(X, dX), _reach(Z, dZ))
     ahead = ((X + length * dX) * (Z + length * dZ)).sum() / n
@@ -332,6 +346,7 @@ def _symmetric(M: FloatArray) -> FloatArray:
 def _reach(X: FloatArray, dX: FloatArray) -> float:
     """Largest length of a step along ``dX`` that keeps ``X`` positive semidefinite."""
     L = np.linalg.cholesky(X)
+    # congruence by the Cholesky factor makes the way to the boundary a symmetric eigenvalue problem
     M = solve_triangular(L, solve_triangular(L, dX, lower=True).T, lower=True)
     smallest = float(np.linalg.eigvalsh(_symmetric(M))[0])
     return np.inf if smallest >= 0 else -1 / smallest

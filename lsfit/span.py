@@ -106,6 +106,7 @@ def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float)
         return B, flag
     B[used] = scale[:, None] * V[:r].T
     if scaling == "none":
+        # an orthonormal frame of the span changes no length
         return np.linalg.qr(B)[0], flag
     if scaling == "maxima":
         return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
@@ -166,9 +167,11 @@ def placed(surface: Fitted, samples: SpanSamples) -> Fitted:
     d, r = samples.B.shape
     flag = surface.flag | samples.flag
     if isinstance(surface, TiltedEllipsoid):
+        # maps of the ball compose; the matrix A would be formed and taken apart again
         return TiltedEllipsoid.of_ball(samples.B @ surface.F, flag)
     if isinstance(surface, Image):
         return Image(surface.inner, samples.B @ surface.B, flag)
+    # a diagonal map only scales coefficients; any other mixes them, which costs digits
     if r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
         return replace(surface.scaled(np.diag(samples.B)), flag=flag)
     return Image(surface, samples.B, flag)
@@ -177,6 +180,7 @@ def placed(surface: Fitted, samples: SpanSamples) -> Fitted:
 def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
     """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``, or is nearly endless."""
     with np.errstate(divide="ignore"):
+        # the median, as single bad samples may lie anywhere
         median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
     if median > 2:
         raise CollapsedFitError(
@@ -185,6 +189,7 @@ def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
         )
     if isinstance(surface, TiltedEllipsoid):
         return  # `refuse_endless` was asked before its matrix made an ellipsoid
+    # the bound from samples is cheap and settles most cases; only the others need a search
     if not lies_above(surface.coefficients, surface.dimension, _least(Y, 4)):
         refuse_endless(*smallest_value(surface.coefficients, surface.dimension), Y, 4)
 
@@ -193,6 +198,7 @@ def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
     """Raise `CollapsedFitError` if a surface reaches too far beyond the samples, by its least value ``P`` at ``u``."""
     least = _least(Y, degree)
     if P < least:
+        # a value of zero or less is a reach without end
         reach = FAR * (least / max(P, 1e-300)) ** (1 / degree)
         raise CollapsedFitError(
             f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "

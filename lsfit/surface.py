@@ -102,6 +102,7 @@ class LimitSurface:
 
     def holds(self, w: ArrayLike) -> NDArray[np.bool_]:
         """Whether wrenches lie in the body, surface included, ``(m, d) -> (m,)``."""
+        # a relative error of the wrench is `degree` times as large in P
         return self.value(w) <= 1 + self.degree * ON_THE_SURFACE
 
 
@@ -140,7 +141,9 @@ def shadow_area(support: FloatArray) -> float:
     h = np.asarray(support, float)
     c = np.fft.rfft(h) / len(h)
     order = np.arange(len(c))
+    # the transform leaves out the conjugate half, which order 0 and the last of an even count do not have
     twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
+    # by Parseval h^2 - h'^2 becomes a factor 1 - n^2, without a difference quotient
     return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
 
 
@@ -207,6 +210,7 @@ class Image(LimitSurface):
         if self.rank == 1:
             return 0.0
         if self.rank == 2:
+            # the shadow of a plane body is its linear image
             return abs(float(np.linalg.det(self.B[:2]))) * self.inner.volume
         return supported_shadow(self.support, self.dimension)
 

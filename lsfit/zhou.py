@@ -113,6 +113,7 @@ def zhou_ellipsoid(
     v, rates, objective = _solve(samples, M, G, A, np.sqrt((A.toarray() ** 2).sum(axis=0)), weights, s_min)
     matrix = (A @ v).reshape(r, r)
     values, V = np.linalg.eigh(matrix)
+    # an open form makes no ellipsoid, so it is refused before one is made
     refuse_endless(float(values[0]), V[:, 0], samples.Y, 2)
     return _fit(TiltedEllipsoid(matrix), objective, rates, samples)
 
@@ -144,6 +145,7 @@ def _solve(
     S = upper_triangle(A)
     rows = block_array(
         [
+            # the modulus |P - 1| is not smooth; bounded from both sides it becomes linear
             [M, none, None, -one, None, None],
             [-M, none, None, -one, None, None],
             [None, none, -one, None, None, None],

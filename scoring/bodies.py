@@ -94,6 +94,7 @@ def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     e, pairs = np.diag(1 / scale), [(0, 1), (0, 2), (1, 2)]
     Q = np.diag((reach / scale) ** 2)
     for (i, j), h in zip(pairs, body.support(np.array([e[i] + e[j] for i, j in pairs])), strict=True):
+        # polarisation: the squared support of a sum holds the mixed term twice
         product = (h**2 - Q[i, i] - Q[j, j]) / 2
         Q[i, j] = Q[j, i] = product if abs(product) > ALONG else 0.0
     return reach, scale, Q
@@ -131,6 +132,7 @@ def ellipsoid_inside(body: Body) -> FloatArray:
         return np.sqrt(np.maximum(size, 0))[:, None] * V.T * scale
     ends = body.support(np.vstack([np.eye(3), -np.eye(3)]))
     axes = (ends[:3] + ends[3:]) / 2
+    # a flat body holds no ellipsoid of three axes; a point keeps the bound true
     if (axes <= 0).any():
         return np.zeros((3, 3))
     # between samples a support of the even body falls by no more than the distance times its largest value
@@ -144,6 +146,7 @@ def ellipsoid_near(body: Body) -> FloatArray:
     scale = 1 / np.where(reach > 0, reach, 1.0)
     t = fibonacci_vertices(np.ones(3), 160)
     i, j = np.triu_indices(3)
+    # an ellipsoid about 0 can only fit the even part of a support
     h = (body.support(t * scale) + body.support(-t * scale)) / 2
     fit = np.linalg.lstsq(t[:, i] * t[:, j] / h.max() ** 2, (h / h.max()) ** 2, rcond=None)[0]
     B = np.zeros((3, 3))
@@ -169,6 +172,7 @@ def touching_points(body: Body, t: ArrayLike) -> FloatArray:
         felt = T @ A
         length = np.linalg.norm(felt, axis=1, keepdims=True)
         return felt / np.where(length > 0, length, 1.0) @ A
+    # points by Newton's method are exact to more digits than differences of the support
     if hasattr(body, "support_points"):
         return np.asarray(body.support_points(T))
     reach = body.support(np.eye(3))
@@ -178,6 +182,7 @@ def touching_points(body: Body, t: ArrayLike) -> FloatArray:
     S /= np.where(length > 0, length, 1.0)
     steps = STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
     h = body.support(((S[None] + steps[:, None]) * scale).reshape(-1, 3)).reshape(7, len(S))
+    # the gradient of a support function is the point that touches
     p = (h[:3] - h[3:6]).T / (2 * STEP)
     # along the direction itself the support is known better than its differences are
     along = (p * S).sum(axis=1)
@@ -203,6 +208,7 @@ def joined(h: FloatArray, kind: str) -> FloatArray:
 def fibonacci_vertices(semi_axes: ArrayLike, m: int) -> FloatArray:
     """``m`` points spread evenly over the unit sphere and stretched to the ellipsoid, ``(m, 3)``."""
     i = np.arange(m)
+    # equal steps of height cut a sphere into rings of equal area (Archimedes)
     z = 1 - (2 * i + 1) / m
     phi = i * np.pi * (3 - np.sqrt(5))
     r = np.sqrt(1 - z**2)
@@ -222,6 +228,7 @@ def hull_volume(points: FloatArray) -> float:
     """Volume of the hull of points ``(m, d)``; 0 where they are flat, thinner than `FLAT` of their longest extent."""
     centred = points - points.mean(axis=0)
     _, extent, axes = np.linalg.svd(centred, full_matrices=False)
+    # Qhull fails on flat points, and joggled ones would have a volume of rounding
     if len(points) <= points.shape[1] or extent[-1] <= FLAT * extent[0]:
         return 0.0
     even = centred @ axes.T / extent  # Qhull loses facets of points that are much longer than wide

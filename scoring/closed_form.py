@@ -86,6 +86,7 @@ def epsilon_linf(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> fl
     t1, t2 = contact1[2], contact2[2]
     about = (t1 + t2) / math.sqrt(1 + max(t1, t2) ** 2)
     alone = [n / math.sqrt(1 + other**2 + n**2) for n, other in _borne_alone(contact1, contact2, arm1, arm2)]
+    # a force along the line is met by one normal force: support 1
     return min(1.0, about, *alone)
 
 

@@ -99,6 +99,7 @@ def contact_axes(N: ArrayLike, hint: ArrayLike) -> FloatArray:
         raise ValueError("N is zero: a contact presses in some direction")
     normal = normal / length
     x = towards - (towards @ normal) * normal
+    # a hint along N leaves rounding, whose direction means nothing
     if np.linalg.norm(x) <= 1e-9 * np.linalg.norm(towards):
         raise ValueError(f"hint {towards.tolist()} is parallel to N: take a direction across it")
     x = x / np.linalg.norm(x)
@@ -106,6 +107,7 @@ def contact_axes(N: ArrayLike, hint: ArrayLike) -> FloatArray:
 
 
 def _vector(name: str, value: ArrayLike | Sequence[float]) -> FloatArray:
+    # a copy, as the caller's array is to stay writeable
     vector = np.array(value, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise ValueError(f"{name} is {vector.tolist()}: expected three finite numbers")

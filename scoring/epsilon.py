@@ -101,6 +101,7 @@ def epsilon(
         lower, upper, u = _between(c, D, kind, tolerance)
     else:
         lower, upper, u = 0.0, 0.0, apart
+    # ellipsoids inside the bodies give lower bounds only
     if not exact:
         upper, u = _weakest_of_bodies(C, bodies, u, kind)
     return EpsilonBound(min(lower, upper), upper, u)
@@ -110,11 +111,13 @@ def separating_wrench(c: FloatArray, D: FloatArray) -> FloatArray | None:
     """Unit wrench ``(6,)`` that no contact can resist at all, or None if 0 is an inner point of what they span."""
     n, size = len(c), np.abs(c).max()
     _, spread, V = np.linalg.svd(np.vstack([c, D.reshape(-1, 6)]))
+    # if the wrenches span less than six dimensions, this direction is felt by no contact
     if len(spread) < 6 or spread[-1] <= _SMALLEST * spread[0]:
         return V[-1]
     # least t with c_i u + |D_i u| <= t, force and torque of u of at most one
     G = np.zeros((1, n + 2, 4, 7))
     G[0, :n, 0, :6], G[0, :n, 1:, :6], G[0, :n, 0, 6] = c, -D, -1
+    # force and torque are bounded apart because these cones have three components beside the first
     G[0, n, 1:, :3] = G[0, n + 1, 1:, 3:6] = -np.eye(3)
     h = np.zeros((1, n + 2, 4))
     h[0, :n, 0], h[0, n:, 0] = size, 1
@@ -128,9 +131,11 @@ def _between(c: FloatArray, D: FloatArray, kind: str, tolerance: float) -> tuple
     proofs = [certified_radius(c, D, kind)]
     upper, u = _weakest(c, D, proofs[0].directions, kind, proofs[0].radius * (1 + tolerance / 10))
     for _ in range(_SPLITS):
+        # the bound is the smallest radius of all sides, so only a split of that one can raise it
         first = min(proofs, key=lambda proof: proof.radius)
         if upper <= first.radius * (1 + tolerance) + _ABSOLUTE:
             break
+        # random starts are for the case of a gap, where the directions of the proof may have missed the weakest
         if len(proofs) == 1:
             many = np.random.default_rng(0).normal(size=(_STARTS, 6))
             upper, u = min((upper, u), _weakest(c, D, many, kind, first.radius), key=lambda pair: pair[0])
@@ -146,6 +151,7 @@ def _weakest(c: FloatArray, D: FloatArray, u: FloatArray, kind: str, enough: flo
     """Least support found from the starts ``u``, and its unit wrench."""
     best, at = np.inf, u[0]
     for _ in range(_ROUNDS):
+        # the facet that the ray meets is at most as far from 0 as the ray goes: the support does not rise
         u = gauge(c, D, u, kind).u
         u = u / np.linalg.norm(u, axis=1, keepdims=True)
         h = joined(contact_support(c, D, u).T, kind)
@@ -171,6 +177,7 @@ def _weakest_of_bodies(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kin
 
 
 _LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
+# in Pauli matrices Lorentz vectors are Hermitian ones without negative eigenvalues
 _SIGMA = np.array([[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 _PAIRS = np.einsum("apq,brs->abprqs", _SIGMA, _SIGMA).reshape(16, 4, 4)
 _TRANSPOSED = np.array([1.0, 1.0, -1.0, 1.0])  # transposing a Hermitian matrix turns its second Pauli coordinate
@@ -212,8 +219,11 @@ def certified_radius(
             length *= 0.7
         if length <= 1e-8:
             break
+        # a step cut at the boundary stops short of it, where the next Hessian would be singular
         x = x + (length if length == 1 else 0.9 * length) * step
+        # from this decrement on the iterate is near the central path, and mu may shrink
         if decrement < 0.5:
+            # on the central path the gap is mu times the parameter of the barrier
             if mu * programme.parameter <= tolerance * max(x[0], 1e-9):
                 break
             mu *= 0.2
@@ -248,6 +258,7 @@ class _Programme:
             ),
         ]
         A = -np.concatenate(groups)
+        # a form knows the symmetric part of its matrix only
         self.A: FloatArray = (A + A.swapaxes(1, 2)) / 2
         self.A0 = np.outer(s.sum(axis=0), s.sum(axis=0))
         ends = np.cumsum([len(g) for g in groups])
@@ -255,6 +266,7 @@ class _Programme:
         self.mixed = np.arange(ends[1], ends[1] + k * (k - 1) // 2)
         self.lorentz = np.arange(ends[2], ends[3]).reshape(-1, 4)
         self.matrices = np.arange(ends[3], ends[-1]).reshape(-1, 16)
+        # parameters of barriers: the size of a determinant, 1 for a half-line, 2 for a Lorentz cone
         self.parameter = d + len(self.single) + 2 * len(self.lorentz) + 4 * len(self.matrices)
 
     def start(self) -> FloatArray:
@@ -263,6 +275,7 @@ class _Programme:
         x[np.concatenate([self.single, self.lorentz[:, 0], self.matrices[:, 0]])] = 1e-2 / max(len(self.lorentz), 4)
         x[self.mixed] = 2.0  # the form of the s_i becomes diagonal
         x[0] = -1.0
+        # a square of the radius that is negative enough outweighs all small multipliers
         while not self.inside(x):
             x[0] *= 4
         return x
@@ -270,6 +283,7 @@ class _Programme:
     def inside(self, x: FloatArray) -> bool:
         """Whether the form and all multipliers are inside their cones."""
         a = x[self.lorentz]
+        # signs are cheap; factors are tried only of what passes them
         if (x[self.single] <= 0).any() or (a[:, 0] <= 0).any() or ((a * a) @ _LORENTZ <= 0).any():
             return False
         try:
@@ -297,6 +311,7 @@ class _Programme:
         g[self.matrices] -= np.einsum("pkii->pk", P).real
         flat = P.reshape(-1, 16, 16), P.swapaxes(2, 3).reshape(-1, 16, 16)
         _add(H, self.matrices, (flat[0] @ flat[1].swapaxes(1, 2)).real)
+        # unit diagonal: multipliers near their bounds have curvatures of very different size
         size = 1 / np.sqrt(np.abs(np.diag(H)))
         step = -size * np.linalg.solve(H * size[:, None] * size + 1e-14 * np.eye(m), size * g)
         return step, float(-g @ step)
@@ -310,6 +325,7 @@ class _Programme:
         spread = moments / (total @ moments @ total) - np.outer(mean, mean)
         split: FloatArray = np.zeros(len(total))
         split[:6] = np.linalg.eigh(spread[:6, :6])[1][:, -1]
+        # through the mean of the moments, so that wrenches they mix up fall on either side
         split -= (split @ mean) * total
         split /= np.abs(split).max()
         both: FloatArray = np.vstack([axes, -axes])

@@ -134,9 +134,11 @@ class EllipsoidFibre:
         """Integral of ``2 t^2 / (3 sqrt(1 - |v0 + t e|^2))`` along each ray from v0."""
         n = 128 << level
         turned = np.linalg.solve(self.W, split) if abs(np.linalg.det(self.W)) > 0 else np.array([1.0, 0.0])
+        # steps begin at the line, so that no piece lies on both sides of it
         phi = math.atan2(turned[1], turned[0]) + (np.arange(n) + 0.5) * 2 * math.pi / n
         e = np.column_stack([np.cos(phi), np.sin(phi)])
         t = -e @ self.v0
+        # rounding may take the square below 0 where rho is near 1
         w = np.sqrt(np.maximum(1 - self.rho**2 + t**2, 1e-300))
         q = math.sqrt(1 - self.rho**2)
         f = (t**2 + w**2 / 2) * (math.pi / 2 + np.arcsin(np.clip(t / w, -1, 1))) + 1.5 * t * q
@@ -157,6 +159,7 @@ class EllipsoidFibre:
         xi, rest = np.sin(psi), np.cos(psi) ** 2
         s = np.sqrt(1 - (beta * xi) ** 2)
         along = (2 + beta**2) * xi - beta**2 * xi**3
+        # differences of the curve itself sum to the chord between its ends, however coarse the steps
         return -math.pi / 3 * np.diff(np.outer(along, self.c) + np.outer(s * rest, across), axis=0)
 
     def ridge(self, level: int, away: FloatArray) -> float:
@@ -182,6 +185,7 @@ def _disc(
     axes: FloatArray, vectors: FloatArray, F: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """``P`` as a map W of a plane of the ball, c, v0 in that plane, and the plane's axes with the one across it."""
+    # pairs of axes instead of determinant times inverse, which a flat ellipsoid does not have
     cofactor = (vectors * [axes[1] * axes[2], axes[0] * axes[2], axes[0] * axes[1]]) @ vectors.T
     W, s, sphere = np.linalg.svd(F[:, 1:] @ cofactor)
     s = np.maximum(s, TINY)
@@ -200,6 +204,7 @@ class MeshFibre:
 
     def _mesh(self, level: int) -> tuple[FloatArray, IntArray, FloatArray]:
         """Points, corners of the triangles and the sides they make."""
+        # the faces of a polytope are exact at any level
         level = 0 if self.exact else level + 1
         if level not in self.meshes:
             points, triangles = surface_mesh(self.body, level)
@@ -212,6 +217,7 @@ class MeshFibre:
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone from the triangles, its shadow from the vertices or from the support function."""
         points, _, normals = self._mesh(level)
+        # a cone of four dimensions has a quarter of base times height, and the normal force goes to 1
         volume = -self.span.det * normals[:, 0].sum() / 4
         M = self.span.M
         if self.exact:
@@ -242,6 +248,7 @@ class MeshFibre:
         n = self.sides(level, away)
         x, y = n @ away, n @ np.array([-away[1], away[0]])
         edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        # an edge of a closed mesh has two triangles, which follow each other once sorted
         order = np.lexsort((edges[:, 1], edges[:, 0]))
         one, two = order[0::2] % len(triangles), order[1::2] % len(triangles)
         between = ((y[one] < 0) != (y[two] < 0)) & ((x[one] * y[two] - x[two] * y[one]) * (y[two] - y[one]) > 0)
@@ -277,6 +284,7 @@ def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
         return _hull_mesh(vertices)
     points, triangles = sphere_mesh(level)
     reach = body.support(np.eye(3))
+    # where the radius is known no search for a point with a given normal is needed
     if hasattr(body, "radius") and (reach > 0).all():
         u = points * reach
         return u * np.asarray(body.radius(u))[:, None], triangles
@@ -287,6 +295,7 @@ def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
     """Faces of the hull; a flat one is given a thickness of 1e-9, so that its rim has normals."""
     centre = vertices.mean(axis=0)
     _, extent, axes = np.linalg.svd(vertices - centre)
+    # fewer points than dimensions have fewer singular values
     extent = np.append(extent, np.zeros(3 - len(extent)))
     if extent[0] == 0:
         return vertices, np.zeros((0, 3), dtype=np.intp)
@@ -301,6 +310,7 @@ def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
         hull = ConvexHull(round_points, qhull_options="QJ")
     triangles = hull.simplices.astype(np.intp)
     a, b, c = (round_points[triangles[:, i]] for i in range(3))
+    # a frame that mirrors turns the sense of all triangles
     outward = hull.equations[:, :3] * np.sign(np.linalg.det(axes))
     inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), outward) < 0
     triangles[inward] = triangles[inward][:, ::-1]
@@ -342,6 +352,7 @@ def fan_area(support: FloatArray) -> float:
     c = np.fft.rfft(support)
     order = np.arange(len(c))
     if k % 2 == 0:
+        # the last order of an even count stands for two, which part once the series is padded
         c[-1] *= 0.5
     h, bent = (np.fft.irfft(factor * c, fine * k) * fine for factor in (np.ones(len(c)), 1.0 - order**2))
     if (h >= 0).all():

@@ -56,7 +56,9 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     """
     u, z = facing(c, D, w, kind, tolerance)
     upper = joined(contact_support(c, D, u).T, kind)
+    # stationarity reads w ~ sum z_0 c - D' z_1: the multipliers are the loads, friction with the other sign
     lower = _reach(c, D, w, z * [1, -1, -1, -1], kind)
+    # rounding may put the lower bound above the upper one where both are the same
     return Gauge(np.minimum(lower, upper), upper, u)
 
 
@@ -98,18 +100,21 @@ def facing(
     if centre is not None:
         v0 = np.hstack([v0, size - (u0 @ centre)[:, None]])
     B = np.zeros((len(w), r + k + more, r - 1 + k + more))  # steps that keep u . w = 1
+    # steps in units of |u0| keep the unknowns of one size, whatever the length of w
     B[:, :r, : r - 1] = _across(w) * np.linalg.norm(u0, axis=1)[:, None, None]
     B[:, r:, r - 1 :] = np.eye(k + more)
     cost = np.concatenate([np.zeros(r - 1), np.ones(k + more)])
     G, inside = -np.einsum("iad,mde->miae", L, B), np.einsum("iad,md->mia", L, v0)
     x, z = cone_programme(cost, G, inside, tolerance * size[:, 0])
     u = u0 + np.einsum("mde,me->md", B, x)[:, :r]
+    # u is an upper bound only with u . w = 1, which rounding has moved
     return u / (u * w).sum(axis=1, keepdims=True), z[:, :n]
 
 
 def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str) -> FloatArray:
     """Reach along ``w`` of the loads ``x = (lam, f)``, ``(m, n, 4)``, once they are made to be in their cones."""
     lam, f = x[..., :1], x[..., 1:]
+    # loads are pulled back into their cones, so that the bound holds however far the programme came
     lam = np.ones_like(lam) if kind == "fixed" else np.maximum(lam, 0)
     length = np.linalg.norm(f, axis=2, keepdims=True)
     f = f * np.minimum(1, lam / np.maximum(length, 1e-300))
@@ -117,8 +122,10 @@ def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str
     s = (wrench * w).sum(axis=1) / (w * w).sum(axis=1)
     missing = np.linalg.norm(wrench - s[:, None] * w, axis=1)
     size = (lam[..., 0] * (np.linalg.norm(c, axis=1) + np.linalg.norm(D, axis=(1, 2)))).sum(axis=1)
+    # forces beyond their limit shrink together, which keeps their wrench along w
     total = {"linf": lam.max(axis=(1, 2)), "l1": lam.sum(axis=(1, 2)), "fixed": np.ones(len(w))}[kind]
     failed = -np.inf if kind == "fixed" else 0.0
+    # loads off the line of w prove only s = 0, where none are needed; with fixed forces not even that
     return np.where(missing <= _ROUNDING * size, s / np.maximum(total, 1), failed)
 
 
@@ -158,17 +165,20 @@ def cone_programme(
     m, n, _, d = G.shape
     x, y = np.zeros((m, d)), h.copy()
     z = np.zeros_like(h)
+    # multipliers start on the axes of their cones, far from the boundary
     z[..., 0] = np.abs(cost).sum() / n
     active = np.arange(m)
     for _ in range(_STEPS):
         gap = (y[active] * z[active]).sum(axis=(1, 2))
         off = np.abs(cost + np.einsum("miad,mia->md", G[active], z[active])).max(axis=1)
         far = np.abs(x[active]).max(axis=1) > _FAR
+        # programmes that are done drop out, or all would go on with the slowest
         active = active[((gap > tolerance[active]) | (off > 1e-10)) & ~far]
         if not len(active):
             break
         a = active
         step = _step(cost, G[a], h[a] - np.einsum("miad,md->mia", G[a], x[a]) - y[a], y[a], z[a])
+        # where a step fails the last good iterate stays
         active = active[step[3]]
         for old, new in zip((x, y, z), step[:3], strict=True):
             old[active] += new[step[3]]
@@ -179,6 +189,7 @@ def _step(
     cost: FloatArray, G: FloatArray, missing: FloatArray, y: FloatArray, z: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Steps of x, y and z, and which programmes they are good for."""
+    # some programmes of a stack may break down; `good` sorts them out below
     with np.errstate(all="ignore"):
         v, beta = _scaling(y, z)
         lam = _apply(v, beta, z)
@@ -188,6 +199,7 @@ def _step(
         # orthogonal columns keep the digits that the normal equations would lose near the end
         Q, R = np.linalg.qr(np.where(good[:, None, None], scaled.reshape(m, 4 * n, -1), np.eye(4 * n, len(cost))))
         good &= np.abs(np.einsum("mdd->md", R)).min(axis=1) > 0
+        # one singular factor would stop the solution of the whole stack
         R[~good] = np.eye(len(cost))
         Q = Q.reshape(m, n, 4, -1)
         off = -(cost + np.einsum("miad,mia->md", G, z))
@@ -200,16 +212,20 @@ def _step(
             dz = np.einsum("miad,md->mia", Q, right) + q - missing
             return np.linalg.solve(R, right[..., None])[..., 0], q - dz, dz
 
+        # Mehrotra: how far the plain step gets tells how much to centre
         dx, dy, dz = solve(-lam)
         alpha = np.minimum(1, _longest(lam, dy, dz))
         mu = (lam * lam).sum(axis=(1, 2)) / n
         centre = (1 - alpha) ** 3 * mu
+        # the product of the plain steps is what the linear equations leave out
         right = -_product(lam, lam) - _product(dy, dz)
         right[..., 0] += centre[:, None]
         dx, dy, dz = solve(_quotient(lam, right))
+        # short of the boundary, where the scaling has no inverse
         alpha = np.minimum(1, 0.99 * _longest(lam, dy, dz))[:, None, None]
         change = alpha[..., 0] * dx, alpha * _apply(v, beta, dy), alpha * _apply_inverse(v, beta, dz)
         good &= np.isfinite(change[0]).all(axis=1) & np.isfinite(change[2]).all(axis=(1, 2)) & (alpha[:, 0, 0] > 1e-9)
+        # rounding may carry a bounded step out of the cones all the same
         good &= _inside(y + change[1]) & _inside(z + change[2])
     return *change, good
 
@@ -253,9 +269,11 @@ def _longest(lam: FloatArray, *steps: FloatArray) -> FloatArray:
     unit = lam / size
     outward = []
     for d in steps:
+        # a Lorentz boost takes lam to the axis of the cone, where the way to the boundary is plain
         along = (unit * _J * d).sum(axis=2, keepdims=True)
         across = d[..., 1:] - (along + d[..., :1]) / (unit[..., :1] + 1) * unit[..., 1:]
         outward.append((np.linalg.norm(across, axis=2) - along[..., 0]) / size[..., 0])
+    # a step that never leaves the cones has no longest length
     return 1 / np.maximum(np.max(outward, axis=(0, 2)), 1e-12)
 
 

@@ -101,12 +101,14 @@ def graspit_score(
         vertices = vertices_of(contact.body)
         assert vertices is not None  # the smooth ones were replaced above
         loads = np.hstack([np.ones((len(vertices), 1)), vertices])
+        # 0 is the contact that does not press
         cones.append(np.vstack([np.zeros(6), loads @ C.T]))
     count = int(np.prod([len(cone) for cone in cones]))
     if count > MOST_POINTS:
         raise ValueError(f"{count} sums of wrenches are too many for a hull in six dimensions; take a smaller m")
     points = np.array([np.sum(choice, axis=0) for choice in itertools.product(*cones)])
     size = np.linalg.svd(points, compute_uv=False)
+    # Qhull would joggle flat points into a volume
     if size[-1] <= 1e-10 * size[0]:
         return LinearisedScore(0.0, 0.0, 0, False)
     try:

@@ -121,6 +121,7 @@ def cone_volume(
     a1, a2 = (np.linalg.lstsq(span.C, span.T, rcond=None)[0][0] for span in spans)
     # the direction along which a contact's share of the normal force changes
     delta = a1 - a2
+    # where no division of a wrench costs less than another, any direction will do
     if math.hypot(*delta) <= 1e-9 * (math.hypot(*a1) + math.hypot(*a2)):
         delta = np.array([1.0, 0.0])
     delta = delta + TURN * np.array([-delta[1], delta[0]])
@@ -132,10 +133,12 @@ def cone_volume(
         fine = _volumes(fibres, delta, level, with_l1)
         # Errors go with the square of the size of the pieces.
         better = fine + (fine - coarse) / 3
+        # nan stands for an L1 volume that was not asked for
         error = float(np.nanmax(np.abs(better - before) / np.maximum(np.abs(better), 1e-300)))
         if error <= relative_error:
             break
         coarse, before = fine, better
+    # an extrapolation may undershoot a volume near 0
     linf, l1 = J * np.maximum(better, 0)
     return PoseVolume(float(linf), float(l1), max(error, ROUNDING))
 
@@ -183,6 +186,7 @@ def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Sp
     if values[5] <= 1e-13 * values[0]:
         return None
     T = np.linalg.qr(scaled[0] @ vectors[6:, :4].T)[0]
+    # a second QR takes out what rounding left of U along T
     U1, U2 = (np.linalg.qr(np.hstack([T, np.linalg.svd(D - T @ (T.T @ D))[0][:, :2]]))[0][:, 2:] for D in scaled)
     return Span(C1, T, U1), Span(C2, T, U2)
 
@@ -198,6 +202,7 @@ def mixed_area(sides1: FloatArray, sides2: FloatArray) -> float:
     first, second = np.arctan2(sides1[:, 1], sides1[:, 0]), np.arctan2(sides2[:, 1], sides2[:, 0])
     order = np.argsort(first)
     n = sides1[order]
+    # a side is its normal turned by a quarter; in order of angle sides close the polygon
     corners = np.cumsum(np.column_stack([-n[:, 1], n[:, 0]]), axis=0)
     # The corner after the last side before the angle is the farthest point in that direction.
     corner = corners[np.searchsorted(first[order], second) - 1]
@@ -217,6 +222,7 @@ def joint_pairs(normals1: FloatArray, normals2: FloatArray, direction: FloatArra
     x, y = direction / np.linalg.norm(direction)
     turn = np.array([[x, -y], [y, x]])
     a, b = -normals1 @ turn, normals2 @ turn
+    # pairs on the other side of the direction are those of the mirror image
     mirror = np.array([1.0, -1.0])
     return _pairs(a, b) + _pairs(a * mirror, b * mirror)
 
@@ -226,6 +232,7 @@ def _pairs(a: FloatArray, b: FloatArray) -> float:
     a, b = a[a[:, 1] < 0], b[b[:, 1] > 0]
     angle = np.arctan2(b[:, 1], b[:, 0])
     order = np.argsort(angle)
+    # running sums over sorted angles spare the loop over all pairs
     total = np.vstack([np.zeros(2), np.cumsum(b[order], axis=0)])
     reached = total[np.searchsorted(angle[order], np.arctan2(a[:, 1], a[:, 0]) + np.pi)]
     return float((a[:, 0] * reached[:, 1] - a[:, 1] * reached[:, 0]).sum())

@@ -90,6 +90,7 @@ def ray_volume(
     D = np.array([A @ Ci[:, 1:].T for A, Ci in zip(near, C, strict=True)])
     length = np.linalg.norm(ends, axis=1)
     u = facing(C[:, :, 0], D, ends / length[:, None], kind, GAP, p)[0]
+    # the polytope lies inside, so a reach short of its end is rounding
     gain = (np.maximum((joint_support(C, bodies, u, kind) - u @ p) / length, 1)) ** 6
     mean = float(gain.mean())
     error = float(gain.std()) / mean / math.sqrt(rays)
@@ -117,8 +118,10 @@ def _polytope(C: FloatArray, bodies: Sequence[Body], kind: str, corners: int) ->
 
 def _filling(facets: FloatArray, rays: int) -> FloatArray:
     """Rays to the facets that fill the polytope evenly, ``(m, 6)``."""
+    # facets count by volume, so that equal shares of rays fill equal volumes
     share = np.cumsum(np.abs(np.linalg.det(facets)))
     facet = np.searchsorted(share, (np.arange(rays) + 0.5) / rays * share[-1])
+    # normalised exponential numbers are spread evenly over a simplex
     weight = -np.log(_even(rays))
     return np.einsum("mk,mkd->md", weight / weight.sum(axis=1, keepdims=True), facets[facet])
 
@@ -140,7 +143,9 @@ def _extreme(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) ->
         [Ci[:, 0] + touching_points(body, u @ Ci[:, 1:]) @ Ci[:, 1:].T for Ci, body in zip(C, bodies, strict=True)]
     )
     h = np.einsum("nmi,mi->nm", w, u)
+    # a contact that would resist the direction is let go
     chosen = h > 0
+    # where contacts share one normal force the best takes all of it
     if kind == "l1":
         chosen &= np.arange(len(C))[:, None] == h.argmax(axis=0)
     return np.where(chosen[:, :, None], w, 0.0).sum(axis=0)
@@ -152,6 +157,7 @@ def _rounded(C: FloatArray, bodies: Sequence[Body], kind: str) -> tuple[FloatArr
     size = np.linalg.norm(loads, axis=1)
     if (size <= FLAT * size.max()).any():
         return C, 0.0
+    # rows of one size: the rank must not depend on the lengths
     axes, s, _ = np.linalg.svd(loads / size[:, None])
     if len(s) < 6 or s[5] <= FLAT * s[0]:
         return C, 0.0

@@ -68,6 +68,7 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
         upper = programme.support(u)
         if upper < best.upper:
             best = Reach(best.lower, upper, u)
+        # the tolerance of the solver may put its value above a proved bound
         best = best._replace(lower=max(best.lower, min(lower, best.upper)))
         if best.upper - best.lower <= tolerance * abs(best.upper):
             break
@@ -87,6 +88,7 @@ class _CuttingPlanes:
         self.rows = np.zeros((0, self.r + self.k))
         for i, body in enumerate(bodies):
             axes = body.support(np.eye(3))
+            # without points all over a body the first programmes would run to their bounds
             self._add(i, touching_points(body, fibonacci_vertices(np.ones(3), 40) / np.where(axes > 0, axes, 1.0)))
 
     def cut(self, u: FloatArray) -> None:
@@ -108,6 +110,7 @@ class _CuttingPlanes:
             bounds=[(-self.far, self.far)] * self.r + [s] * self.k,
             method="highs-ds",
         )
+        # the solver meets u . w = 1 up to its tolerance only, and the bound needs it exactly
         u = optimum.x[: self.r] / (optimum.x[: self.r] @ self.w)
         inner = np.abs(u).max() < 0.99 * self.far  # otherwise the bounds of u took part, and the value proves nothing
         return (float(optimum.fun) if inner else -np.inf), u

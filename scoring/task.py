@@ -95,6 +95,7 @@ def weight_wrench(
         raise ValueError(f"mass is {mass}: it must be a positive number of kilograms")
     if not down.any():
         raise ValueError("direction is zero: give the direction in which gravity pulls")
+    # in the gripper's frame inertia pulls against the acceleration
     force = mass * (GRAVITY * down / np.linalg.norm(down) - _vector("acceleration", acceleration, 3))
     return np.concatenate([force, np.cross(_vector("centre_of_mass", centre_of_mass, 3), force)])
 
@@ -129,13 +130,16 @@ def hold_task(
     middle = np.mean([contact.position for contact in contacts], axis=0)
     spread = max(float(np.linalg.norm(contact.position - middle)) for contact in contacts)
     grip = max(float(np.max(contact.body.support(np.diag([0.0, 0.0, 1.0])))) for contact in contacts)
+    # a single contact without torque has no length, and needs none
     length = max(spread, grip) or 1.0
     C: FloatArray = F[:, None, None] * np.array([contact.wrench_map(length, length, middle) for contact in contacts])
     w: FloatArray = -np.concatenate([load[:3], (load[3:] - np.cross(middle, load[:3])) / length])
     # both are exact up to the gap of a programme: a bisection over factors would leave more
     lowest, bounds = (_range_fixed if normal == "fixed" else _range_up_to)(C, contacts, w)
     strength = np.linalg.norm([Ci * np.append(1.0, _axes(k)) for Ci, k in zip(C, contacts, strict=True)])
+    # a programme seldom ends at 0 exactly, and a grip force from a tiny factor would be huge instead of infinite
     factor = bounds.lower if bounds.lower > _NOTHING * strength / np.linalg.norm(w) else 0.0
+    # back from the middle and its unit of length: a motion is given by the velocity of the origin
     u = np.concatenate([bounds.u[:3] - np.cross(bounds.u[3:] / length, middle), bounds.u[3:] / length])
     gap = max(bounds.upper - factor, 0.0)
     holds = bool(factor >= 1 - _LIMIT and lowest <= 1 + _LIMIT)
@@ -174,10 +178,13 @@ def least_grip_force(
 
 def _range_up_to(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
     """Multiples of ``w`` in the sum of the contacts' cones: from 0 to the reach."""
+    # loads at full size: the rank must not depend on units of force and torque
     U = _span([Ci @ np.diag([1.0, *_axes(contact)]) for Ci, contact in zip(C, contacts, strict=True)])
     off = w - U @ (U.T @ w)
+    # no contact can answer a part across the span, so a motion along it meets no resistance
     if np.linalg.norm(off) > _NOTHING * np.linalg.norm(w):
         return 0.0, Reach(0.0, 0.0, off / (off @ w))
+    # the programmes need contacts that fill their space, so they are posed within the span
     bounds = reach(U.T @ C, [contact.body for contact in contacts], U.T @ w, "linf")
     return 0.0, bounds._replace(u=U @ bounds.u)
 
@@ -185,6 +192,7 @@ def _range_up_to(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
 def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) -> tuple[float, Reach]:
     """Multiples of ``w`` among the wrenches of contacts with given normal forces."""
     bodies = [contact.body for contact in contacts]
+    # normal forces are given here: only friction is free to answer
     U = _span([Ci[:, 1:] * _axes(contact) for Ci, contact in zip(C, contacts, strict=True)])
     b, nothing = C[:, :, 0].sum(axis=0), _NOTHING * float(np.abs(C[:, :3, 0]).sum())
     off_w, off_b = (a - U @ (U.T @ a) for a in (w, b))
@@ -193,6 +201,7 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
         C, w = U.T @ C, U.T @ w
         # with fixed normal forces the held multiples are an interval that need not begin at 0
         forth, back = reach(C, bodies, w, "fixed"), reach(C, bodies, -w, "fixed")
+        # the reach along -w is minus the smallest multiple; where 0 is among the multiples no load is needed
         lowest = max(-back.lower, 0.0) if np.isfinite(back.lower) else 0.0
         return lowest, forth._replace(u=U @ forth.u)
     # Friction has no part off its span: there the normal forces alone have to balance one multiple of the load.
@@ -200,6 +209,7 @@ def _range_fixed(C: FloatArray, contacts: Sequence[SoftContact], w: FloatArray) 
     rest = s * w - b
     balanced = bool(np.linalg.norm(s * off_w - off_b) <= nothing)
     if balanced and s >= 0 and np.linalg.norm(rest) > nothing:
+        # the normal forces are in `rest` already, so friction alone has to make it
         friction = U.T @ C * [0.0, 1.0, 1.0, 1.0]
         balanced = reach(friction, bodies, U.T @ rest, "fixed").lower >= 1 - _LIMIT
     s = s if balanced and s >= 0 else 0.0
@@ -218,6 +228,7 @@ def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tu
     for part, friction in zip(felt, np.linalg.norm(felt[:, 1:], axis=1), strict=True):
         if np.linalg.norm(part) <= _STILL * size.max():
             said.append("stays in place")
+        # where the support is not positive the contact does best without any normal force
         elif part[0] + friction <= _STILL * size.max():
             said.append("lets go")
         elif friction <= _STILL * size.max():
@@ -230,6 +241,7 @@ def _limits(contacts: Sequence[SoftContact], C: FloatArray, u: FloatArray) -> tu
 
 def _axes(contact: SoftContact) -> FloatArray:
     """Loads that the contact can carry one by one, ``(3,)``."""
+    # a polytope need not be symmetric
     ends = contact.body.support(np.vstack([np.eye(3), -np.eye(3)]))
     return np.maximum(ends[:3], ends[3:])
 
