@@ -146,8 +146,10 @@ class Reference:
 
         Infinite where a case failed, or carries a flag that the reference does not.
         """
+        # The reference's own error is added: a small distance from a doubtful limit proves nothing.
         error = np.abs(e_n(found) - self.value) / np.abs(self.value) + self.estimate
         bad = np.isnan(error) | flagged(flags_of(found), self.flags)
+        # Where even the reference is flagged no error is known; `choose` says so instead.
         return float(np.where(bad, np.inf, error)[~unsure(self.flags)].max(initial=0.0))
 
 
@@ -162,6 +164,7 @@ def reference(study: CostStudy, tables: Sequence[ParameterErrors]) -> Reference:
     value, estimate, flags = base.copy(), np.zeros(base.shape), np.full(base.shape, -1)
     for family in families(tables):
         best = best_known(tables, family)
+        # Relative moves multiply, as far as parameters do not act on each other.
         value = value * best.limits[0].value / base
         estimate = estimate + best.estimates
         flags &= best.levels[-1].flags
@@ -182,6 +185,7 @@ def choose(
     most accurate combination.
     """
     tables, own, base_seconds = error_tables(costs, study), study.of(study.base), study.base_seconds
+    # Without the scene's own values there is nothing that errors could be measured from.
     if failed := [m.message for m in own if not np.isfinite(m.values).all()]:
         note = f"a probe has no solution with the scene as it is, so errors are not known: {failed[0]}"
         return unchanged(target, note, base_seconds)
@@ -198,11 +202,13 @@ def choose(
         return study.completed(setting, cases, lambda probe: replace(solve(setting, probe, level), what=level.name))
 
     tried: list[Choice] = []
+    # Predictions only order the trials; a measured error has the last word.
     for combination in _hopeful(made, target):
         if not (found := solved(combination, probes)):
             continue
         error, rest = goal.error(found), math.nan
         if error <= target and others:
+            # The other cases have no refinement series, so the most accurate combination stands for the limit.
             finest = _most_accurate(combinations(tables, base_seconds, {}))
             best = solved(finest, others)
             value = e_n(best)
@@ -210,6 +216,7 @@ def choose(
             rest = against.error(solved(combination, others))
             doubtful += _unsure_places(best, flags_of(best))
         seconds = float(np.mean([m.seconds for m in found]))
+        # `not rest > target` also holds for NaN, where there are no other cases.
         made_of = _predicted(combination, target, "", error <= target and not rest > target)
         tried.append(replace(made_of, measured=error, held_out=rest, seconds=seconds))
         if tried[-1].met:
@@ -218,6 +225,7 @@ def choose(
     if not doubtful:
         return choice
     note = f"{choice.note}; even the finest levels are flagged at {doubtful[0]}, so the error is not known there"
+    # A met target does not cover cases whose error nobody knows.
     return replace(choice, met=False, note=note)
 
 
@@ -233,6 +241,7 @@ def _hopeful(made: Sequence[Combination], target: float) -> list[Combination]:
 
 
 def _most_accurate(made: Sequence[Combination]) -> Combination:
+    # Rounded, so that the last digits of a machine do not choose among equals.
     return min(made, key=lambda c: float(f"{c.error:.6g}"))
 
 
@@ -242,6 +251,7 @@ def _best(tried: Sequence[Choice], made: Sequence[Combination], target: float, m
         where = "the probes" if math.isnan(tried[-1].held_out) else "the probes and on cases that it was not chosen by"
         return replace(tried[-1], note=f"the cheapest that meets the target on {where}")
     known = [choice.values for choice in tried]
+    # What was tried and missed its target must not come back as a prediction.
     within = next((c for c in made if c.error <= target and dict(c.level.values) not in known), None)
     if within is not None and not measured:
         return _predicted(within, target, "predicted from one parameter at a time", True)
@@ -250,6 +260,7 @@ def _best(tried: Sequence[Choice], made: Sequence[Combination], target: float, m
     finite = [choice for choice in tried if math.isfinite(choice.measured)]
     if not finite:
         return _predicted(_most_accurate(made), target, note, False)
+    # The worse of both counts; NaN, where nothing was held out, counts as none.
     return replace(min(finite, key=lambda c: max(c.measured, np.nan_to_num(c.held_out))), note=note)
 
 

@@ -28,6 +28,7 @@ def explicit(scene: Scene) -> dict[str, Any]:
     for name in ("object", "gripper", "effects", "accuracy"):
         section = getattr(scene, name)
         given |= {f"{name}.{key}": getattr(section, key) for key in section.model_fields_set}
+    # A swept key varies from case to case, so a choice must not touch it either.
     return {key: value for key, value in given.items() if value != "auto"} | dict.fromkeys(scene.sweep)
 
 
@@ -74,10 +75,12 @@ def combinations(tables: Sequence[ParameterErrors], base_seconds: float, given: 
             choices.append(options)
     made = []
     for chosen in product(*choices):
+        # The largest sum over cases, not the sum of the largest: errors of one case add up.
         error = np.atleast_1d(sum((c[2] for c in chosen), estimate))[sure].max(initial=0.0) if np.any(sure) else np.inf
         seconds = base_seconds * math.prod(c[1] for c in chosen)
         work = math.prod(c[0].work for c in chosen)
         made.append(Combination(tuple(c[0] for c in chosen), seconds, float(error), work))
+    # Rounded, with the name as the last word: the order must not depend on the machine.
     return sorted(made, key=lambda c: (float(f"{c.work:.6g}"), float(f"{c.error:.6g}"), c.level.name))
 
 
@@ -113,6 +116,7 @@ def best_of(made: Sequence[Combination]) -> list[Combination]:
     """Those that no other beats in both work and predicted error, the cheapest first, by more than a tenth."""
     kept: list[Combination] = []
     for i in pareto_front([c.work for c in made], [c.error for c in made]):
+        # Little gain is not worth another trial.
         if not kept or made[i].error < 0.9 * kept[-1].error:
             kept.append(made[i])
     return kept

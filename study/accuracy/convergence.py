@@ -74,16 +74,20 @@ def extrapolate(size: ArrayLike, values: ArrayLike, formal: float = np.nan) -> E
     h, f = np.asarray(size, float), np.asarray(values, float)
     finest = f[-1].copy()
     step = np.abs(f[-1] - f[-2]) if len(f) > 1 else np.full(finest.shape, np.nan)
+    # Discrete levels: the last one is exact by definition, so it has no error of its own.
     if not np.isfinite(h).all():
         return Extrapolation(finest, step, np.zeros(finest.shape), np.nan, "no order is expected")
     order, note = observed_order(h[-3:], f[-3:]) if len(h) > 2 else (np.nan, "fewer than three levels")
+    # An order above the formal one is luck, and would promise too small an error.
     used = ASSUMED if note else order if np.isnan(formal) else min(order, formal)
     correction, before = (_correction(h[k - 2 : k or None], f[k - 2 : k or None], used) for k in (0, -1))
     if note:
+        # The last step may be small by chance; the one before, shrunk once more, guards against that.
         shrunk = np.abs(before) * (h[-1] / h[-2]) ** used if len(h) > 1 else before
         return Extrapolation(finest, step, np.fmax(np.abs(correction), shrunk), np.nan, note)
     known = np.isfinite(correction)
     value = np.where(known, finest + np.where(known, correction, 0.0), finest)
+    # Also by how much the limit moved with the last level: a series that still wanders is not known well.
     estimate = np.fmax(SAFETY * np.abs(correction), np.abs(value - (f[-2] + before)))
     return Extrapolation(value, np.where(known, np.abs(value - finest), step), estimate, order, "")
 
@@ -104,16 +108,19 @@ def observed_order(h: FloatArray, f: FloatArray) -> tuple[float, str]:
         Falling sizes, in any ratio.
     f : (3, cases) array
     """
+    # A value of 0 has no relative change.
     f = f[:, np.isfinite(f).all(axis=0) & (np.abs(f[-1]) > 0)]
     if not f.size:
         return np.nan, "no case was solved on the three finest levels"
     coarse, fine = (f[0] - f[1]) / f[-1], (f[1] - f[2]) / f[-1]
+    # The order of rounding errors would be noise.
     if np.abs(coarse).max() < NOISE or np.abs(fine).max() < NOISE:
         return np.nan, "the finest levels do not differ"
     change = np.abs(coarse) + np.abs(fine)
     alike = change[coarse * fine > 0].sum() / change.sum()
     if alike < SAME_WAY:
         return np.nan, f"the last two steps go the same way for only {alike:.0%} of the change"
+    # One order for all cases, because that of a single one is noisy.
     ratio = float(np.linalg.norm(coarse) / np.linalg.norm(fine))
 
     def excess(p: float) -> float:
@@ -136,6 +143,7 @@ def pareto_front(cost: ArrayLike, error: ArrayLike) -> list[int]:
     """
     t, e = np.asarray(cost, float), np.asarray(error, float)
     kept: list[int] = []
+    # By cost and then error: of equally dear ones only the best can be kept.
     for i in np.lexsort((e, t)).tolist():
         if np.isfinite([t[i], e[i]]).all() and (not kept or e[i] < e[kept[-1]]):
             kept.append(i)
@@ -243,6 +251,7 @@ class ParameterErrors:
 def best_known(tables: Sequence[ParameterErrors], family: str) -> ParameterErrors:
     """The parameter of a family whose limit is known best."""
     own = [t for t in tables if t.family == family]
+    # The worst case decides, because the target is one of the largest error.
     return min([t for t in own if t.series] or own, key=lambda t: float(t.estimates.max()))
 
 
@@ -252,6 +261,7 @@ def error_tables(costs: Costs, study: CostStudy) -> list[ParameterErrors]:
     for parameter in costs.parameters:
         known = [(level, costs.setting(parameter, level)) for level in parameter.levels]
         known = [(level, setting) for level, setting in known if study.has(setting)]
+        # A level that fails everywhere says nothing of its error.
         pairs = [(v, setting) for v, setting in known if parameter.evaluation or _any_value(study.of(setting))]
         if len(pairs) > 1:
             levels, settings = zip(*pairs, strict=True)

@@ -183,6 +183,7 @@ def plain(scene: Scene) -> Scene:
 def same(one: Any, other: Any) -> bool:
     """Whether two values of a key are the same; lists and tuples are alike."""
     first, second = (tuple(v) if isinstance(v, list | tuple) else v for v in (one, other))
+    # A scene gives tuples where JSON and TOML give lists.
     return bool(first == second)
 
 
@@ -190,6 +191,7 @@ def setting_of(scene: Scene, level: Level) -> str:
     """What identifies a level's setting: the values by which it differs from the scene."""
     changed = {key: value for key, value in level.values if not same(value, value_of(scene, key))}
     between = {"between": level.between} if level.between else {}
+    # Sorted, so that the same setting has the same text in every study.
     return json.dumps(changed | between, sort_keys=True)
 
 
@@ -221,6 +223,7 @@ class Costs:
     @cached_property
     def tasks(self) -> list[Planned]:
         """Everything to be measured, each setting once, the scene's own first."""
+        # The scene's own first: every expected time is scaled from it.
         found = {BASE: Planned("", Level("as in the scene"), BASE)}
         for parameter in self.parameters:
             for level in parameter.levels:
@@ -273,6 +276,7 @@ def load(path: Path) -> CostStudy:
         finally:
             file.close()
 
+    # Nothing to walk through: reading the study has read all of the file.
     return opened(path, "cost study", make, lambda study: None)
 
 
@@ -285,6 +289,7 @@ def _read(path: Path, file: GuardedFile) -> CostStudy:
     skipped = (file.texts(f"skipped/{column.name}") for column in fields(Skipped))
     study.skipped = [Skipped(*texts) for texts in zip(*skipped, strict=True)]
     read = {name: _column(file, f"measurements/{name}", units is None) for name, (units, _) in COLUMNS.items()}
+    # Columns of a damaged file would be paired wrongly without a word.
     if len({len(values) for values in read.values()}) != 1:
         raise ValueError("its columns are not equally long")
     rows: dict[tuple[str, str], list[int]] = {}
@@ -305,6 +310,7 @@ def _column(file: GuardedFile, path: str, texts: bool) -> Any:
     if texts:
         return file.texts(path)
     found = file.plain(path)
+    # A file of unknown origin: what is no list of numbers must not reach the arithmetic.
     if found.ndim != 1 or found.dtype.kind != "f":
         raise ValueError(f"{path} is no list of numbers")
     return file.values(found)

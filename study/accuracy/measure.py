@@ -34,7 +34,9 @@ CALIBRATION = 24  # points along a side of the cube whose Laplacian is factorise
 def timed(work: Callable[[], T], repeats: int = REPEATS) -> tuple[float, T, int]:
     """The least CPU time of some repeats of a cheap piece of work [s], what it gave, and how many there were."""
     best, spent, times = np.inf, 0.0, 0
+    # The least of some repeats, because other programs only ever add time; dear work is not repeated.
     while times < repeats and (spent < ENOUGH or not times):
+        # CPU time: a busy machine stretches the wall clock only.
         start = time.process_time()
         found = work()
         seconds = time.process_time() - start
@@ -57,6 +59,7 @@ def measure(setting: str, probe: Probe, level: Level, repeats: int = REPEATS) ->
         return found, next(filter(None, messages), "")
 
     seconds, (found, message), times = timed(solve, repeats)
+    # A force that failed keeps its row, so that cases stay comparable between settings.
     nothing = np.full(len(QUANTITIES), np.nan), 0
     values, flags = zip(*(found.get(force, nothing) for force in probe.forces), strict=True)
     return Measured(
@@ -88,6 +91,7 @@ def _solve_path(unit: Any, forces: Sequence[float]) -> tuple[dict[float, Case], 
     try:
         for k, result in pipeline.solve_unit(unit):
             if isinstance(result, CaseFailure):
+                # The first message counts: what fails above follows from it.
                 message = message or result.message
             else:
                 found[forces[k]] = as_quantities(result.values), int(result.values["maps/flags"])
@@ -151,10 +155,12 @@ class Measuring:
         todo = [task for task in self.costs.tasks if not self.study.has(task.setting)]
         self.study.skipped = list(self.costs.skipped)
         if todo:
+            # Or the first setting would be charged with compiling.
             warm_up(self.probes[0])
         if np.isnan(self.study.calibration):
             self.study.calibration = calibration_seconds()
         while todo:
+            # The scene as it is comes first whatever it takes: all else is judged by it.
             base = [task for task in todo if task.setting == self.study.base]
             task = base[0] if base else min(todo, key=self.expected)
             if not base and self.study.spent + self.expected(task) > seconds:
@@ -176,6 +182,7 @@ class Measuring:
             return expected_seconds(task.name, task.level.name) * cases
         known = [t for t in self.costs.tasks if not t.evaluation and self.study.has(t.setting)]
         alike = [t for t in known if t.name == task.name] or [t for t in known if t.setting == self.study.base]
+        # Nearest by ratio: the time is scaled by the ratio of works.
         near = min(alike, key=lambda t: abs(np.log(t.level.work / task.level.work)))
         measured = np.mean([m.seconds for m in self.study.of(near.setting)])
         return float(measured * task.level.work / near.level.work * cases)
@@ -200,6 +207,7 @@ class Measuring:
         if self._solved is None:
             try:
                 self._solved = {probe.label: solved(probe) for probe in self.probes}
+            # Discretisation can still be compared without the contacts of the scene's own settings.
             except (ConvergenceError, CheckError) as error:
                 self._solved = {}
                 self.say(f"friction, limit surfaces and scores are not measured: {error}")

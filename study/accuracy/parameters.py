@@ -108,7 +108,9 @@ def contact_parameters(scene: Scene) -> tuple[list[Parameter], list[Skipped]]:
             else:
                 paths = {0: 1.0, EACH_ALONE: 1.5}.get(level.between, float(level.between))
                 good.append(replace(level, work=paths * weight(with_level(scene, level)) / weight(scene)))
+        # By digest: a level may spell out what the scene has by default.
         own = (i for i, g in enumerate(good) if not g.between and with_level(scene, g).digest == scene.digest)
+        # A single level leaves nothing to compare.
         if len(good) > 1:
             parameters.append(replace(parameter, levels=tuple(good), own=next(own, -1)))
     return parameters, skipped
@@ -144,6 +146,7 @@ def weight(scene: Scene) -> float:
 
 
 def _even(value: float) -> int:
+    # Even, so that planes of symmetry can halve the mesh.
     return max(2, 2 * math.floor(value / 2 + 0.5))
 
 
@@ -153,6 +156,7 @@ def elements(count: Sequence[int], factor: float) -> tuple[int, int, int]:
     >>> elements((20, 10, 6), 0.5), elements((20, 10, 6), 1.0)
     ((10, 6, 3), (20, 10, 6))
     """
+    # The scene's own mesh stays as it is, also where it is not even.
     if factor == 1.0:
         return count[0], count[1], count[2]
     return (_even(factor * count[0]), _even(factor * count[1]), max(2, math.floor(factor * count[2] + 0.5)))
@@ -167,6 +171,7 @@ def _pad_meshes(scene: Scene) -> Iterable[Parameter]:
 
 
 def _pad_mesh(kind: str, degree: str, own: Sequence[int], factors: Sequence[float], formal: float) -> Parameter:
+    # A set, because factors near each other round to the same mesh.
     counts = sorted({elements(own, f) for f in factors}, key=math.prod)
     levels = tuple(
         Level(" x ".join(map(str, n)), (("gripper.elements", list(n)), ("gripper.element", kind)),

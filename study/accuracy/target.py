@@ -63,11 +63,13 @@ def _from_meshes(scene: Scene, output: Path, say: Callable[[str], None]) -> Choi
     found, others, cases = quick_probes(scene)
     study = new_study(scene, found, getattr(scene.object, "name", None) or output.stem, "")
     if path.exists():
+        # A study of another scene, or of other probes, would choose for the wrong cases.
         old = load(path)
         if old.digest == study.digest and old.candidates == study.candidates:
             study = old
     if not study.measured:
         say(f"accuracy.e_n = {scene.accuracy.e_n:g}: choosing the mesh on {'; '.join(study.candidates)}")
+        # Times of a cold start would enter the choice's price per case.
         warm_up(found[0])
     return quick_choice(scene, study, found, others, cases, lambda: save(path, study))
 
@@ -76,6 +78,7 @@ def _from_file(scene: Scene) -> Choice:
     study, measured = stored_costs(scene)
     named = [label for label in study.candidates if label in measured.scene.candidates.labels]
     found, others = [], []
+    # Probes that are no candidates by name cannot be solved again, so the prediction has to do.
     if len(named) == len(study.candidates):
         found = probes(measured.scene, named)
         others = held_out(measured.scene, found)
@@ -94,11 +97,13 @@ def refinement_series(scene: Scene) -> list[Level]:
     parameters = {p.name: p for p in contact_parameters(own)[0]}
     pads = _open(parameters.get(f"pad mesh, {own.gripper.element}"), given)
     walls = _open(parameters.get("wall mesh"), given) or _open(parameters.get("object grid"), given)
+    # Coarse first, like the pads, so that the pairs refine together.
     walls.sort(key=lambda level: -level.size)
     made = pads or walls
     if pads and walls:
         pairs = zip(pads, walls, strict=False)
         made = [Level(f"{p.name}; wall {w.name}", p.values + w.values, p.size) for p, w in pairs]
+    # A mesh much heavier than the scene's own would cost more than the run that it is chosen for.
     most = MOST_WEIGHT * weight(own)
     return [level for level in made if weight(with_level(own, level)) <= most]
 
@@ -162,9 +167,11 @@ def mesh_errors(levels: Sequence[Level], found: Sequence[Sequence[Measured]], ta
     values, flags = np.array([e_n(own) for own in found]), np.array([flags_of(own) for own in found])
     names = places(found[0])
     alive = np.isfinite(values).any(axis=0)
+    # A mesh that fails where another does not gives no values to extrapolate.
     sound = np.isfinite(values[:, alive]).all(axis=1)
     kept = [level for level, own in zip(levels, sound, strict=True) if own]
     last = flags[sound][-1] if kept else np.zeros(len(names), np.int64)
+    # A limit that is flagged itself is none to measure errors from.
     sure = alive & ~unsure(last)
     notes = [f"{level.name} failed on a probe" for level, own in zip(levels, sound, strict=True) if not own]
     notes += [f"no mesh solves {name}" for name, own in zip(names, alive, strict=True) if not own]
@@ -179,6 +186,7 @@ def mesh_errors(levels: Sequence[Level], found: Sequence[Sequence[Measured]], ta
     error[:, sure] = _no_luck((np.abs(own - end.value) + end.error_estimate) / np.abs(end.value))
     carried = flagged(flags[sound], last)[:, sure].any(axis=1)
     notes += [f"{kept[i].name} is flagged where the finest mesh is not" for i in np.flatnonzero(carried)]
+    # A flag on a finer mesh also spoils the coarser ones: these were unflagged by chance.
     good = (np.nanmax(error, axis=1) <= target) & ~_no_luck(carried)
     notes.insert(0, f"no order seen: {end.note}" if end.note else f"observed order {end.order:.1f}")
     return MeshErrors(kept, names, error, good, carried, bool((sure | ~alive).all()), "; ".join(notes))
@@ -212,6 +220,7 @@ def quick_choice(
         if errors.chosen is not None and len(tried) == len(found):
             tried += others
             errors = mesh_errors(levels[:count], [solved(level) for level in levels[:count]], target)
+        # Not the finest tried: with nothing finer beyond it, it would be judged by its own limit.
         if errors.known and errors.chosen is not None and errors.chosen < len(errors.levels) - 1:
             break
     return _choice(study, own, errors, sum(len(p.forces) for p in found), target, cases)

@@ -107,6 +107,7 @@ def check_object(scene: Scene) -> None:
             return
         try:
             build_object(shape)
+            # An outline may be a good solid and still no wall.
             if shape.wall is not None:
                 outer_surface(shape)
         except ValueError as error:

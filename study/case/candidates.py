@@ -101,6 +101,7 @@ def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:
     A shift along the approach does not count: the press closes the fingers.
     """
     turn = other.rotation @ one.rotation.T
+    # Only turns about z take the object to itself, so all else is no image.
     if abs(turn[2, 2] - 1) > ALIKE or np.abs(turn[2, :2]).max() > ALIKE:
         return None
     angle = math.atan2(turn[1, 0], turn[0, 0])
@@ -128,6 +129,7 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
     one, two = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
     if one is None or two is None or abs(math.remainder(one - two, 2 * math.pi)) > ALIKE:
         return None
+    # A turn just below 0 by rounding would otherwise become a whole one.
     return 0.0 if abs(one) <= ALIKE else one % (2 * math.pi)
 
 
@@ -141,6 +143,7 @@ def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[i
                 break
         else:
             alike.append([(number, 0.0)])
+    # By the first member, so that the units do not depend on how they were found.
     return sorted((group for alike in found.values() for group in alike), key=lambda group: group[0][0])
 
 
@@ -148,6 +151,7 @@ def _invariants(place: Candidate) -> tuple[float, ...]:
     """What no turn about z and no shift along the approach changes: only candidates alike in it need be compared."""
     pose = place.poses[0]
     height = pose.origin[2] - (pose.origin @ pose.rotation[:, 2]) * pose.rotation[2, 2]
+    # Adding 0 turns -0 into 0, which would be another key.
     return tuple(round(float(v), 6) + 0.0 for v in (*pose.rotation[2], height))
 
 
@@ -216,6 +220,7 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
     taken = ["station", "angle", "normal_force", *(stem for stem, _ in stems)]
     made = []
     for (key, values), (stem, unit) in zip(sweep.items(), stems, strict=True):
+        # Keys of two sections with one stem keep their section in the name.
         name = stem if taken.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
         if any(isinstance(v, str) for v in values):
             made.append(Axis(name, np.arange(len(values), dtype=float), "", key, tuple(map(str, values))))
@@ -252,11 +257,13 @@ def narrowness(scene: Scene, place: Candidate) -> float:
     if scene.object.shape != "revolution" or scene.candidates.poses:
         return 1.0
     z, r = np.transpose(scene.object.profile)
+    # A tip of no width must not make a candidate infinitely dear.
     return float(r.max() / max(np.interp(place.station, z, r), 0.1 * r.max()))
 
 
 def path_cost(scene: Scene) -> float:
     """Work of one load path in element solves: forces x elements x nodes per element, and the coarse mesh's share."""
+    # A triquadratic element has eight times the nodes that it does not share.
     nodes = {"hex8": 1, "hex27": 8}[scene.gripper.element]
     coarse = 1 + (scene.accuracy.meshes - 1) / 8
     return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * coarse

@@ -116,6 +116,7 @@ class Contact:
 
     def at(self, pose: Pose) -> Self:
         """The same contact elsewhere on the object."""
+        # A shallow copy keeps what was computed already, none of which depends on the place.
         other = copy(self)
         other.pose = pose
         return other
@@ -138,6 +139,7 @@ def angles(one: Contact, two: Contact) -> tuple[float, float]:
 
 def slips(lean: float, mu: float) -> bool:
     """Whether the line of the contacts, which leans by so much [rad], leaves a friction cone."""
+    # Just below a right angle, beyond which the tangent would change its sign.
     return bool(np.tan(min(lean, 1.57)) > mu + ALIKE)
 
 

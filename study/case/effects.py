@@ -39,6 +39,7 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 def pad_material(gripper: Gripper) -> Material:
     """Foam of the pads."""
+    # The Blatz-Ko law has this ratio by its form, whatever the scene says.
     nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
     return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
 
@@ -90,6 +91,7 @@ def neglected_traction(state: Any, mu: float) -> float:
     moved = points.position - start
     along = moved - np.einsum("fqi,fqi->fq", moved, points.normal)[..., None] * points.normal
     stick = pad.modulus_per_thickness * pad.face_area * np.linalg.norm(along, axis=-1)
+    # A point that is pulled has no pressure that friction could act on.
     load = np.maximum(points.load, 0.0)
     return float(np.minimum(mu * load, stick).sum() / load.sum())
 

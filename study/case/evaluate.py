@@ -180,6 +180,7 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
     for name, _ in LIMITS:
         for planar, suffix in PLANAR:
             pairs = [(getattr(c.limits["ccm"], name), getattr(c.limits[planar], name)) for c in contacts]
+            # NaN where the planar model carries nothing: there is no claim to compare with.
             shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)
     return shares
 
@@ -265,6 +266,7 @@ def _graspit(contacts: Sequence[Contact], model: str, settings: EvaluationSettin
     """Volume with GraspIt!'s 20 points on each ellipsoid; torques over their length decide where the points lie."""
     scale = np.array([1.0, 1.0, settings.torques])
     axes = [c.ellipsoids[model].semi_axes / scale for c in contacts]
+    # Points on an axis of length 0 span no volume.
     if any((a == 0).any() for a in axes):
         return 0.0
     points = [graspit_vertices(a) for a in axes]
@@ -288,6 +290,7 @@ def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], settings:
 
 def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
     """Volume of the grasp wrench space in any pose; 0 for a contact that carries no load in some direction."""
+    # A flat body would fail in the volume's integration, and its result is known.
     if any(body.rank < 3 for body in bodies):
         return 0.0
     return volume_in_pose(soft(contacts, bodies), settings.arms, settings.torques)
@@ -330,6 +333,7 @@ def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: A
     Each finger presses with at most the normal force of this case. Its friction is the hull of the sampled wrenches,
     which lies inside the exact limit surface: the factor errs on the safe side, by about 1 % with 500 samples.
     """
+    # Without friction, or with flat surfaces, the hulls are degenerate.
     if contacts[0].mu == 0 or any(fit.surface.rank < 3 for own in fits for fit in own.values()):
         return [np.nan] * len(MODELS)
     grip = [c.limits[MODELS[0]].F_N for c in contacts]
@@ -337,6 +341,7 @@ def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: A
     for m in MODELS:
         # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
         wrenches = [c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]] for c, own in zip(contacts, fits, strict=True)]
+        # A motion the other way gives the opposite wrench, which costs no further sample.
         hulls = [PolytopeBody(np.vstack([wrench, -wrench])) for wrench in wrenches]
         factors.append(hold_task(soft(contacts, hulls), grip, weight).safety_factor)
     return factors

@@ -106,6 +106,7 @@ def fit_surfaces(
 @lru_cache(maxsize=8)
 def _motions(fitted_to: int) -> FloatArray:
     """Motions of the fit and those, evenly spread too, that it is judged by, for a contact of length 1."""
+    # As many motions as the fit has would be the same ones, and it would judge itself.
     judging = INDEPENDENT + (fitted_to == INDEPENDENT)
     return np.vstack([fibonacci_twists(fitted_to, 1.0), fibonacci_twists(judging, 1.0)])
 
@@ -126,6 +127,7 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
                 fit = convex_quartic(W, T)
                 return fit.surface, AS_FITTED if fit.certificate.by == "least squares" else PROGRAMME
         return zhou_quartic(W, T, ZHOU).surface, PROGRAMME
+    # A surface that stands in keeps the case valid; the certificate and a flag tell.
     except (FitError, CollapsedFitError):
         return ellipsoid, STANDS_IN
 
@@ -152,6 +154,7 @@ def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors
     with np.errstate(divide="ignore", invalid="ignore"):
         E1, radius, angle = fit_error(surface, W, T)
     found = (E1, radius, np.radians(angle))
+    # All or nothing: an angle without a radius would be read as a good fit.
     return FitErrors(*found) if np.isfinite(found).all() else FitErrors(np.nan, np.nan, np.nan)
 
 

@@ -73,6 +73,7 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
     element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
     surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
     if abs(surface.gap(touch.to_object(_contact_face(size)))[0].min()) > OFF:  # smoothed: met earlier or later
+        # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
         back = Pose(touch.rotation, touch.origin - BACK * size[2] * touch.rotation[:, 2])
         distance = first_touch(surface, back, _contact_face(size), 2 * BACK * size[2])
         touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
@@ -82,6 +83,7 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
 def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:
     """Pose at first touch; see `approach`."""
     lower, upper = obj.bounds
+    # From outside of the object wherever the pose stands; the pad's size covers its corners.
     reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
     ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
     start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
@@ -91,12 +93,14 @@ def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Po
 
 def _contact_face(size: tuple[float, float, float]) -> FloatArray:
     """Points spread over the undeformed contact face, independent of the mesh, the planes of symmetry among them."""
+    # Odd numbers of points put one on each plane of symmetry, where most objects are met first.
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
     return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
 
 
 def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, bool]:
     """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
+    # Off the planes, where both sides are the same point, and a little beyond the rim.
     u = np.linspace(0.03, 0.55, 12)
     x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, DEEP, 7) * size[2], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
@@ -179,6 +183,7 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
     places = candidates(scene)[: MOST_TRIED // 2]
     missed: dict[int, str] = {}
     tried = 0
+    # Only object and pad decide whether a pad passes, so points that share both are tried once.
     for shape, size in dict.fromkeys((point.object, point.gripper.pad_size) for point in points):
         obj = build_object(shape)
         for number, place in enumerate(places):

@@ -47,6 +47,7 @@ def probes(scene: Scene, named: Sequence[str] = (), count: int = 3) -> list[Prob
         Where there is no such candidate.
     """
     forces = scene.load.normal_force
+    # A scene of one or two forces has fewer different ones.
     few = tuple(dict.fromkeys((forces[0], forces[(len(forces) - 1) // 2], forces[-1])))
     units = grasps.units(scene, lambda point: point.axis_symmetry)
     chosen = [_named(units, scene.candidates.labels, name) for name in dict.fromkeys(named)] or spread(units, count)
@@ -119,6 +120,7 @@ class _Seen:
 
 
 def _looked_at(units: Sequence[Any]) -> list[_Seen]:
+    # Rounded up, so that no more than so many are looked at.
     seen = [found for unit in units[:: -(-len(units) // MOST_LOOKED_AT)] if (found := _seen(unit))]
     if not seen:
         raise StudyError(USAGE, "candidates: no pad meets the object; move the stations or poses onto it")
@@ -126,6 +128,7 @@ def _looked_at(units: Sequence[Any]) -> list[_Seen]:
 
 
 def _quantiles(seen: Sequence[_Seen], count: int) -> list[Any]:
+    # Rounded before it is ranked: rounding errors must not choose other probes on another machine.
     return [s.unit for s in _evenly(sorted(seen, key=lambda s: (round(s.arm / DIGIT), s.unit.index)), count)]
 
 
@@ -136,6 +139,7 @@ def _seen(unit: Any) -> _Seen | None:
         finger = model.approach(build_object(unit.scene.object), unit.candidate.poses[0], gripper)
         arm = _arm(winkler_pad(gripper, finger, FINGER_POINTS), forces[-1])
         fine, *coarse = (_arm(winkler_pad(gripper, finger, points), forces[0]) for points in (POINTS, *COARSE_POINTS))
+    # A candidate that cannot be looked at here fails as a case, with a message of its own.
     except (ValueError, RuntimeError, NoContactError):
         return None
     return _Seen(unit, arm, max(abs(own / fine - 1.0) for own in coarse) if fine > 0 else 0.0)
@@ -188,6 +192,7 @@ class WinklerPad:
         """Closing displacement that carries a normal force [m]; the force is piecewise linear in it."""
         h = np.sort(self.height[np.isfinite(self.height)])
         count = np.arange(1, len(h) + 1)
+        # For the k lowest cells in contact the closing is known; the largest k that touches is right.
         wanted = (force / (self.stiffness * self.area) + np.cumsum(h)) / count
         return float(wanted[np.flatnonzero(wanted >= h)[-1]])
 
@@ -215,6 +220,8 @@ def _heights(finger: model.Finger, place: FloatArray, thickness: float) -> Float
     x = np.column_stack([place, np.zeros(len(place))])
     for _ in range(STEPS):
         gap, normal, _ = finger.gap(x)
+        # Divided by a cosine that is not too small, or a steep flank would throw the point far away.
         x[:, 2] = np.clip(x[:, 2] + gap / np.maximum(-normal[:, 2], FLAT), 0.0, thickness)
     gap = finger.gap(x)[0]
+    # A point that has not come to the surface looks past the object.
     return np.where(np.abs(gap) < 1e-3 * thickness, x[:, 2], np.inf)

@@ -43,6 +43,7 @@ class Probing:
         try:
             for i in range(len(self._paths)):
                 found[:, i] = self._next(i)
+        # Not an Exception, so it needs a branch of its own: the case itself is complete and stays so.
         except TimeLimitError:
             self.failures.append("probe: run.time_limit_s passed")
             self.close()
@@ -50,6 +51,7 @@ class Probing:
 
     def _next(self, i: int) -> tuple[float, float]:
         try:
+            # A path that has ended by a failure gives NaN from then on.
             return next(self._paths[i], (np.nan, np.nan))
         except (ArithmeticError, MemoryError, RuntimeError, ValueError, StudyError) as error:
             self.failures.append(f"probe, {self._solves[i].name}: {error}")
@@ -92,6 +94,7 @@ def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
         key = semi_axes[place].tobytes() + quality[place].tobytes()
         if key not in known:
             frames = {name: values[place] for name, values in read.items()}
+            # Both sides, because the volume is far from linear in mu.
             more, less = (_volume(frames, times * semi_axes[place], arms, torques) for times in (1 + share, 1 - share))
             known[key] = (more - less) / (2 * quality[place])
         change[place] = known[key]

@@ -53,6 +53,7 @@ class PressedContact(Contact):
 
     def of(self, finger: Finger) -> PressedContact:
         """The same contact of another finger, which stands where the object looks the same."""
+        # Touched here, because cached properties are copied only when they have been computed.
         _ = self.ellipsoids, self.tau_pure  # computed once for both
         other = self.at(finger.pose)
         other.finger = finger
@@ -67,6 +68,7 @@ class PressedContact(Contact):
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
         overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
+        # Trilinear elements alone lock when the foam is nearly incompressible.
         return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
 
     @property
@@ -152,6 +154,7 @@ class OnRigid:
         """See `Solver`."""
         paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
         for states in zip(*paths, strict=True):
+            # Of two fingers that are images only the first has states, so the lengths differ.
             pairs = zip(self.fingers, states, strict=False)
             contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
             if self.shared:  # an image finger has its partner's states; only its place differs
@@ -229,6 +232,7 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     wanted = scene.effects.model_size
     body, poses = thin_body(scene.object), (fingers[0].pose, fingers[1].pose)
     held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
+    # One plane was asked for where both exist: that between the fingers is given up.
     if wanted == "half" and all(held.mirrors):
         held = grasp(body, poses, (False, True))
     # a coarser mesh for error estimates takes what it can use
@@ -262,6 +266,7 @@ def _gap(finger: Finger, turned: bool):
     """Gap function in the frame of the pad as it is solved."""
     if not turned:
         return finger.gap
+    # Half a turn about the approach flips x and y, and with them normals and mixed derivatives.
     sign = [-1.0, -1.0, 1.0]
 
     def gap(x):

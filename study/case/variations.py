@@ -78,6 +78,7 @@ def variations(scene: Scene) -> tuple[Variation, ...]:
 
 
 def _coarser(scene: Scene) -> dict[str, Any]:
+    # Clipped, or a coarse mesh would be halved to one that scenes refuse.
     elements = [max(n, FEWEST) for n in pad_shape(scene.gripper, coarser=True).elements]
     # an odd number of elements has no symmetric halves
     found: dict[str, Any] = {"gripper.elements": elements, "effects.model_size": "full"}
@@ -151,6 +152,7 @@ def probe_candidates(scene: Scene, units: Sequence[Any]) -> tuple[int, ...]:
     if isinstance(own.probes, int):
         return tuple(sorted(first[unit.index] for unit in spread(units, own.probes)))
     named = () if isinstance(own.probes, int) else scene.candidates.numbers(own.probes)
+    # A named candidate may be an image: the unit that serves it is the probe.
     serving = {rows[0] // forces: first[unit.index] for unit in units for rows in unit.rows}
     return tuple(sorted({serving[number] for number in named}))
 
@@ -164,6 +166,7 @@ def with_probes(scene: Scene, units: Sequence[Any], chosen: Sequence[int]) -> tu
     """The units of work, those of the probes marked, and as much more expensive as they are."""
     if not chosen:
         return tuple(units)
+    # The cost tells the schedule to begin with probes, which take several times as long.
     forces, times = len(scene.load.normal_force), 1 + len(changes(scene))
     return tuple(
         replace(unit, probe=True, cost=times * unit.cost) if unit.rows[0][0] // forces in chosen else unit

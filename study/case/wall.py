@@ -70,6 +70,7 @@ def choose_level(scene: Scene, held: Grasp, closing: float) -> WallLevel:
     indentation, ratio = estimated_indentation(body, held, scene, closing)
     if scene.effects.object != "auto":
         return WallLevel(names[scene.effects.object], ratio, indentation / closing, forced=True)
+    # What is undecided takes the costlier level, which is right in both cases.
     soft = NONLINEAR if not surely_below(ratio, SMALL_INDENTATION) else LINEAR
     number = RIGID if surely_below(indentation, STIFF * closing) else soft
     return WallLevel(number, ratio, indentation / closing, forced=False)
@@ -82,6 +83,7 @@ def estimated_indentation(body: ThinWalled, held: Grasp, scene: Scene, closing: 
     factors that all candidates share.
     """
     length, width, _ = scene.gripper.pad_size
+    # A round object is the same at every angle, so all candidates share its factors.
     linear = object_factors(body, 0.0 if body.round else held.angle, held.mirrors, ESTIMATE, 0.6 * width)
     mesh, area = linear.shell.mesh, linear.shell.node_area
     load = np.zeros((linear.shell.nodes, 6))
@@ -95,6 +97,7 @@ def estimated_indentation(body: ThinWalled, held: Grasp, scene: Scene, closing: 
             depth = np.where(under, area, 0.0)
         if not depth.sum() > 0:
             raise CheckError("a pad stands beside the wall of the object: move the candidate onto its wall")
+        # Of a pad that a plane of symmetry cuts in half only half of the force counts.
         force = scene.load.normal_force[-1] * (0.5 if held.mirrors[1] else 1.0)
         load[:, :3] += (force * depth / depth.sum())[:, None] * pose.rotation[:, 2]
         pressed |= depth > 0

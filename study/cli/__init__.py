@@ -23,9 +23,11 @@ SOLVING = ("run", "cost", "figure")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code is the same on every rank."""
+    # Before numpy is imported: its libraries read the number of threads only once.
     pin_threads()
     keep_compiled_loops()
     words = list(sys.argv[1:] if arguments is None else arguments)
+    # What follows "--" belongs to PETSc, whose options argparse would take for its own.
     cut = words.index("--") if "--" in words else len(words)
     parser = program()
     if not words:
@@ -33,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return USAGE
     try:
         options = parser.parse_args(words[:cut])
+    # argparse ends the process itself; callers and tests want a code.
     except SystemExit as leave:
         return int(leave.code or 0)
     options.petsc = words[cut + 1 :]
@@ -40,11 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.petsc and options.command != "run":
             raise StudyError(USAGE, "only 'run' takes PETSc options after '--'")
         code = command(options)
+        # Flushed here, while an error of the output can still become an exit code.
         sys.stdout.flush()
         return code
     except StudyError as error:
         return complain(error)
     except OSError as error:
+        # An error with a file name is about that file and not about standard output.
         if error.errno not in UNWRITABLE or error.filename:
             return _unforeseen(options, error)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tries again as it ends
@@ -58,6 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def command(options: Namespace) -> int:
     """Import the module of a command and run it; a text that it returns is printed."""
     if options.command in SOLVING:
+        # Before the solvers load, which may hang instead of failing where memory is short.
         require_room()
     if options.command in ("run", "figure"):
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
@@ -88,15 +94,18 @@ def _unforeseen(options: Namespace, error: Exception) -> int:
     if is_out_of_memory(error):
         print(f"error: {no_room(str(error) or type(error).__name__)}", file=sys.stderr, flush=True)
         return _ended(STOPPED if options.command == "run" else USAGE)
+    # Damage is asked last, because the answer means reading every file again.
     if options.command != "run" and (damage := _module("cli.results").damage(options, error)):
         return complain(damage)
     traceback.print_exc()
+    # Abort does not flush what still waits.
     sys.stderr.flush()
     return _ended(BUG)
 
 
 def _ended(code: int) -> int:
     """The exit code; of several ranks the others are ended, because they wait for this one."""
+    # Looked up, not imported: a command without MPI must not start it to end.
     mpi: Any = sys.modules.get("mpi4py.MPI")
     if mpi and mpi.COMM_WORLD.size > 1:
         mpi.COMM_WORLD.Abort(code)

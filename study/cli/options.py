@@ -63,6 +63,7 @@ class Parser(argparse.ArgumentParser):
     """Speaks on the first rank only, whatever started the ranks, and suggests what an unknown word may have meant."""
 
     def _print_message(self, message: str, file: Any = None) -> None:
+        # Ranks that parse the same wrong words would all print the same help.
         if first_rank():
             super()._print_message(message, file)
 
@@ -79,6 +80,7 @@ class Parser(argparse.ArgumentParser):
         """Refuse what is left over here, where the options that exist are known."""
         found, rest = super().parse_known_args(args, namespace)
         if rest:
+            # A mistyped option leaves its value over as well: the option is the one to name.
             slip = next((word for word in rest if word.startswith("-")), rest[0])
             name = slip.partition("=")[0]
             kind = "option" if slip.startswith("-") else "word"
@@ -102,6 +104,7 @@ class Program(Parser):
 
     def format_help(self) -> str:
         """Commands by group, an example, exit codes."""
+        # Lines beyond 100 characters are hard to read on wide terminals.
         width = min(shutil.get_terminal_size().columns, 100) - 2
         lines = [f"usage: {self.prog} COMMAND ...", "", *textwrap.wrap(self.description or "", width)]
         for title, listed in COMMANDS.items():

@@ -25,6 +25,7 @@ def init(options: Namespace) -> str:
 
 def _mesh_size(options: Namespace) -> list[float]:
     """Extents across and along the axis [mm] of a mesh that a study can take."""
+    # Absolute, because the scene that is written may lie in another folder.
     mesh = str(Path(options.mesh).absolute())
     shape = Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": options.axis})
     try:
@@ -92,6 +93,7 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
     for word in words:
         if word.startswith("-contact_"):
             found.append([word[1:], "true"])
+        # A number with a sign is a value; any other word with a dash is an option of somebody else.
         elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
             text = f"PETSc option '{word}' after '--': softjaw takes only options of the contact solver, -contact_..."
             raise StudyError(USAGE, f"{text}; others go into the environment variable PETSC_OPTIONS")

@@ -73,6 +73,7 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
         if torn:
             text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
             return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
+        # A scene that was valid when it was stored is not the user's mistake.
         if isinstance(error, SceneError):
             text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
             return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")

@@ -30,6 +30,7 @@ from softjaw.study.show.report.verdict import plain_report
 def run(options: Namespace) -> int:
     """Solve a scene; the same exit code on every rank."""
     comm, path = MPI.COMM_WORLD, target(options, options.scene_read)
+    # A run in a pipe whose reader leaves must go on solving.
     sys.stdout = Unbreakable(sys.stdout)
     scene, choice = on_rank0(comm, with_target_met, options.scene_read, path)
     plan = on_rank0(comm, prepare, scene, options, choice)
@@ -51,6 +52,7 @@ def with_target_met(scene: Scene, path: Path) -> tuple[Scene, Any]:
 
 def prepare(scene: Scene, options: Namespace, choice: Any = None) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
+    # A wrong option would fail every case alike, after hours of a large study.
     _check_petsc(dict(scene.petsc))
     given = [*options.overrides, *petsc_overrides(options.petsc), *(choice.overrides() if choice else [])]
     plan = make_plan(scene, options.scene, given)

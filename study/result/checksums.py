@@ -42,11 +42,13 @@ def of_parts(layout: Layout, row: int, values: Sequence[Any]) -> dict[str, int]:
 def sums_of(file: GuardedFile, layout: Layout, part: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Those of the ``rows`` that have a part, and the checksums of the values that stand there."""
     columns = [layout.columns[i] for i in layout.parts[part]]
+    # Some parts are stored for few candidates only: other rows have nothing to compare.
     if columns[0].among:
         rows = rows[_lines(layout, columns[0], rows) >= 0]
     if not rows.size:
         return rows, np.empty(0, np.uint32)
     views = [(_bytes(file, layout, c), c) for c in columns]
+    # In blocks, because all rows of a wide part side by side may not fit into memory.
     step = max(BLOCK // max(sum(view.shape[1] for view, _ in views), 1), 1)
     found: list[int] = []
     for some in (rows[start : start + step] for start in range(0, len(rows), step)):
@@ -67,8 +69,10 @@ def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_wa
     Where a run is ``under_way``, or was killed, a row may be stored and not yet marked; nowhere else.
     """
     stored = _sums(file, layout, STATE)
+    # A damaged state may be any byte: those that mean nothing get 0 and count as wrong.
     wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
     if under_way and wrong.any():
+        # A kill between checksum and state leaves exactly this: begun, not computed, and the sum of an end.
         begun = file.values(file.checked(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"))).ravel() > 0
         wrong &= ~(begun & (codes == MISSING) & np.isin(stored, [OF_STATE[DONE], OF_STATE[FAILED]]))
     return np.flatnonzero(wrong)
@@ -83,6 +87,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     """Checksum of what is written once, when the file is made: axes, options, scene, definitions, labels."""
     axes = [f"axes/{name}" for name in layout.names]
     study = file.attributes(ROOT)
+    # Lists of texts: the repr of an array is shortened and depends on the version of numpy.
     parts = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
@@ -124,5 +129,6 @@ def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
     slots[list(chosen)] = np.arange(len(chosen))
     slot = slots[index[-3] * layout.shape[-2] + index[-2]]
     lead = (*layout.shape[:-3], len(chosen), layout.shape[-1])
+    # -1 cannot be ravelled; such rows are marked again below.
     lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)
     return np.where(slot < 0, -1, lines)

@@ -62,6 +62,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
     """All columns of a row of a layout."""
     for q in layout.quantities:
         shape = tuple(layout.counters[dim] for dim in q.dims)
+        # Integers have no NaN: codes use -1 for none.
         dtype, fill = ("i1", -1) if q.meanings else ("<f8", np.nan)
         if q.group == "maps" and q.by_model:
             for model in MODELS:
@@ -70,6 +71,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", shape, np.dtype(dtype), fill)
         elif q.group != "status":
             yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.group == "patch", q.among)
+    # The message stays last: `blank` and `record` address it as the last column.
     yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
 
 
@@ -84,6 +86,7 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, _describe(q, c.key), scales + q.dims * bool(c.shape))
     for name in ("code", "attempts"):
         about = _describe(BY_KEY[f"status/{name}"], f"status/{name}")
+        # The fill value means not computed, so a new file needs no state written.
         yield Dataset(f"{ROOT}/status/{name}", layout.shape, np.dtype("u1"), MISSING, about, layout.names)
     yield from _checksums(layout)
     for name in FIRST:
@@ -112,6 +115,7 @@ def _checksums(layout: Any) -> Iterator[Dataset]:
         about = {"long_name": f"crc32 of the case's {part}", "units": ""}
         yield Dataset(f"{SUMS}/{part}", layout.shape, u4, 0, about, layout.names)
     about = {"long_name": "crc32 of the state of the case", "units": ""}
+    # Filled with the sum of "not computed": a lost state then differs from a case that was never solved.
     yield Dataset(f"{SUMS}/{STATE}", layout.shape, u4, zlib.crc32(bytes([MISSING])), about, layout.names)
     about = {"long_name": f"crc32 of {', '.join(layout.closing)}", "units": ""}
     yield Dataset(f"{SUMS}/{CLOSING}", (len(layout.closing),), u4, 0, about, (CLOSING,))

@@ -63,6 +63,7 @@ def _of_sweep(scene: Scene) -> list[Derived]:
     """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
     if scene.object.shape != "elliptic_cylinder" or not SWEPT & set(scene.sweep):
         return []
+    # Curvature belongs to the object alone: station, angle and normal force are left out.
     over = tuple(axis.name for axis in axes(scene)[:-3])
     return [
         Derived("b_over_a", "", "b / a", "Semi-axis across the contact over that along its normal.", over),
@@ -123,6 +124,7 @@ def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
 
 def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
+    # Imported here: it brings the shell solver along, which objects without a wall do not need.
     from softjaw.study.case.wall import thin_body
 
     dent: float | None = getattr(scene.object, "allowed_dent", None)
@@ -131,6 +133,7 @@ def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArr
     known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
     crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
+    # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
     return np.fmin.reduce([solved, *crossings])
 
 
@@ -155,10 +158,12 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     x = np.concatenate([[0.0], np.asarray(forces, float)])
     values = np.asarray(values, float)
     y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
+    # Nothing beyond the first gap is used: the true crossing may lie inside it.
     known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
     above = known & (y >= limit * (1.0 - MARGIN))
     k = np.maximum(above.argmax(axis=-1), 1)[..., None]
     low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
+    # Equal neighbours would divide by 0; the clip then gives an end of their interval.
     share = np.clip((limit - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
     found = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
     return np.where(above.any(axis=-1), found, np.nan)

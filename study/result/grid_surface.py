@@ -37,13 +37,16 @@ def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> S
     body = build_object(here.object)
     points, triangles = body.surface()
     corners = np.asarray(points, float)[triangles]
+    # Triangles without area show nothing and would only be cut further.
     corners = corners[areas(corners) > 0]
     cell = np.full(len(corners), NOBODY)
+    # Explicit poses have no unit on the station axis, and no cells.
     if axes[-3].units:
         corners, cell = coloured(corners, cells_of(here, axes, body.axis_symmetry))
         if has_wall(here.object):
             kept = ~_lid(here.object, corners)
             corners, cell = corners[kept], cell[kept]
+    # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
     points, inverse = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)
     return Surface(points, inverse.reshape(-1, 3), cell)
 
@@ -115,6 +118,7 @@ class Cells:
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """Candidate ``(n,)`` (station times number of angles plus angle) of points ``(n, 3)`` between the borders."""
+        # A scene may list its stations in any order; the search wants rising ones.
         order = np.argsort(self.stations)
         i = np.searchsorted(edges(self.stations[order], self.along), x[:, 2]) - 1
         inside = (i >= 0) & (i < len(order))
@@ -123,6 +127,7 @@ class Cells:
         apart = np.abs((phi[:, None] - known + 0.5 * self.period) % self.period - 0.5 * self.period)
         j = first[apart.argmin(axis=1)]
         if self._narrow:
+            # Beyond a quarter turn the sine falls again, which would bring the far side back in.
             beside = np.hypot(x[:, 0], x[:, 1]) * np.sin(np.minimum(apart[:, 0], 0.5 * math.pi))
             inside &= beside <= 0.5 * self.across
         return np.where(inside, order[np.clip(i, 0, len(order) - 1)] * len(self.angles) + j, NOBODY)
@@ -133,6 +138,7 @@ class Cells:
 
     def _different(self) -> tuple[np.ndarray, np.ndarray]:
         """Rising angles within one period that are no images of others, and the first candidate angle of each."""
+        # A share just below 1 is rounded to 1, which is 0 again.
         share, first = np.unique(np.round(self.angles / self.period % 1.0, 9) % 1.0, return_index=True)
         return share * self.period, first
 
@@ -154,12 +160,14 @@ def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]
 def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
     """Triangles ``(m, 3, 3)`` cut along the plane ``x . normal = offset``."""
     d = corners @ normal - offset
+    # A corner that lies on the plane but for rounding would leave a sliver.
     d[np.abs(d) < ON_PLANE] = 0.0
     through = (d.min(axis=1) < 0) & (d.max(axis=1) > 0)
     if not through.any():
         return corners
     sign = np.sign(d[through])
     alone = np.where(sign.sum(axis=1) > 0, sign.argmin(axis=1), sign.argmax(axis=1))
+    # A cyclic turn brings the lone corner to the front and keeps the orientation.
     order = (alone[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(corners[through], order[..., None], axis=1).swapaxes(0, 1)
     da, db, dc = np.take_along_axis(d[through], order, axis=1).T[..., None]
@@ -201,6 +209,7 @@ def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarr
 
 def wall_of(shape: Any, points: np.ndarray) -> Wall | None:
     """Where points ``(n, 3)`` of the surface [m] lie on the wall of a shape; None for shapes without one."""
+    # Imported here: it is slow to load, and only views of walls need it.
     from scipy.spatial import cKDTree
 
     grid = undeformed(shape, 0.0)
@@ -236,4 +245,5 @@ def _lid(shape: Any, corners: np.ndarray) -> np.ndarray:
     if wall is None:
         return np.zeros(len(corners), bool)
     z = corners[..., 2]
+    # The upper half only: a bottom belongs to the object, a lid does not.
     return np.isnan(wall.around).reshape(-1, 3).any(axis=1) & (z.mean(axis=1) > 0.5 * (z.min() + z.max()))

@@ -58,6 +58,7 @@ class GuardedFile:
             plist = found.id.get_create_plist()
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = found.size * max(found.dtype.itemsize, 1) if found.shape is not None else 0
+            # A header can claim any size, and a reader allocates it before it misses the data.
             too_large = nbytes > self._bytes * (DEFLATE if found.chunks else 1)
             if virtual or plist.get_external_count() or too_large:
                 raise StudyError(OTHER_FILE, f"{self.path}: {path} is not stored in this file; do not trust it")
@@ -80,6 +81,7 @@ class GuardedFile:
 
     def _node(self, path: str) -> Any:
         node: Any = self._file
+        # Link by link: HDF5 by itself would follow soft and external links out of the file.
         for part in filter(None, path.split("/")):
             link = node.get(part, getlink=True) if isinstance(node, h5py.Group) else None
             if not isinstance(link, h5py.HardLink):
@@ -105,6 +107,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
     StudyError
         The file cannot be read as a file of this ``kind``, another program holds it, or HDF5 does not survive it.
     """
+    # Opening a pipe or a device could block for ever.
     if path.exists() and not path.is_file():
         raise StudyError(OTHER_FILE, f"{path}: is not a regular file; name a {kind}")
 
@@ -120,6 +123,7 @@ def opened(path: Path, kind: str, make: Callable[[GuardedFile], Any], walk: Call
     except FileNotFoundError as error:
         raise StudyError(OTHER_FILE, f"{path}: no such file") from error
     except BROKEN as error:
+        # h5py has no class for this: only the text tells a lock from damage.
         if "unable to lock file" in str(error):
             text = f"{path}: another program holds it open for writing; close it there"
             raise StudyError(IN_USE, text) from error
@@ -149,6 +153,7 @@ def reason(error: Exception) -> str:
     if getattr(error, "strerror", None):
         return str(error.strerror)  # type: ignore[attr-defined]
     text = str(error) or type(error).__name__
+    # h5py puts what HDF5 says in parentheses behind its own sentence.
     if isinstance(error, OSError | RuntimeError):
         text = text.partition("(")[2].rstrip(")") or text
     return printable(" ".join(text.split()))[:200]
@@ -177,11 +182,14 @@ def trouble(attempt: Callable[[], object]) -> str:
         except MemoryError:
             pass
         except BaseException as error:  # reported by the parent, which meets it too
+            # Missing memory also comes as other errors, whose text alone says so.
             code = NO_MEMORY if "alloc" in str(error).lower() else 0
         finally:
+            # No exit handlers, and no flush of buffers that the parent will write as well.
             os._exit(code)
     status = os.waitpid(child, 0)[1]
     if os.WIFSIGNALED(status):
+        # At a hard limit the kernel kills instead of sending SIGXCPU.
         slow = os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
         return f"reading it does not end within {SECONDS} s" if slow else "the library that reads it crashes on it"
     return f"reading it takes more than {ROOM >> 30} GiB" if os.WEXITSTATUS(status) == NO_MEMORY else ""
@@ -189,13 +197,17 @@ def trouble(attempt: Callable[[], object]) -> str:
 
 def _limit() -> None:
     """Let this process be quiet, short and small."""
+    # A crash is expected here: its traceback belongs on no terminal.
     faulthandler.disable()
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     os.dup2(silent, 2)
+    # Handlers of a run are inherited: a signal must end this child and not stop the run from inside it.
     for wanted in (signal.SIGINT, signal.SIGTERM):
         signal.signal(wanted, signal.SIG_DFL)
+    # No core file of a mere trial.
     limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: SECONDS}
+    # Elsewhere there is no /proc that tells the present size, which a bound has to be added to.
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         limits[resource.RLIMIT_AS] = pages * resource.getpagesize() + ROOM

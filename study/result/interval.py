@@ -94,6 +94,7 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
         total = np.zeros(values.shape)
         for of in own.parts:
             share = _share(writer, scene, name, values, of, known)
+            # A failed case has no interval, whatever the probes say.
             share = np.where(np.isfinite(values), share, np.nan)
             writer.write_derived(part(name, of, of in SIGNED and of in known), share)
             total += share**2
@@ -130,6 +131,7 @@ def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArr
     mine = [i for i, v in enumerate(solves) if v.part == of]
     flat = values.reshape(-1, values.shape[-1])
     at = list(layout.probes)
+    # Probes that failed divide by NaN or 0; the mean below leaves them out.
     with np.errstate(divide="ignore", invalid="ignore"):
         changes = (
             writer.read(f"probes/{name}").reshape(len(at), flat.shape[-1], -1)[..., mine] / flat[at][..., None] - 1
@@ -142,6 +144,7 @@ def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArr
     else:
         share = carried_by_force(sound, flat.shape)
     if of == "pose":
+        # fmax: where one of the two is not known, the other still counts.
         share = np.fmax(share, _slope(scene, values).reshape(flat.shape))
     return at_least_own(share, change, layout.probes, flat).reshape(values.shape)
 
@@ -149,6 +152,7 @@ def _from_probes(writer: ResultWriter, scene: Scene, name: str, values: FloatArr
 def _slope(scene: Scene, values: FloatArray) -> FloatArray:
     """Change by the shift that neighbouring stations show; 0 where there are none in the direction of the shift."""
     where = scene.candidates
+    # Poses have no order to take a slope along, and a rolled pad does not lie along the stations.
     if where.poses or where.roll or len(where.station_values) < 2:
         return np.zeros(values.shape)
     return change_along(np.array(where.station_values), values, scene.uncertainty.pose)
@@ -156,6 +160,7 @@ def _slope(scene: Scene, values: FloatArray) -> FloatArray:
 
 def _sound(writer: ResultWriter, at: list[int], change: FloatArray) -> FloatArray:
     """Changes of the probes but of those that fail in the hand, unless all do."""
+    # Flags are stored as floats, NaN where a case has none.
     flags: Any = np.nan_to_num(writer.read("flags/flags").reshape(-1, change.shape[-1])[at]).astype(int)
     sound = np.where(flags & LOST, np.nan, change)
     return sound if np.isfinite(sound).any() else change
@@ -211,6 +216,7 @@ def _rms(values: FloatArray, axis: int | None) -> FloatArray:
     known = np.isfinite(values)
     count = known.sum(axis=axis)
     mean = np.where(known, values, 0.0) ** 2
+    # A force at which no probe was solved has no mean: it stays NaN, without a warning.
     return np.sqrt(np.divide(mean.sum(axis=axis), count, out=np.full(np.shape(count), np.nan), where=count > 0))
 
 
@@ -221,6 +227,7 @@ def at_least_own(share: FloatArray, change: FloatArray, probes: tuple[int, ...],
     """
     found = share.copy()
     for own, number in zip(np.abs(change), probes, strict=True):
+        # Images of a probe by symmetry have its values but for rounding.
         alike = np.isclose(values, values[number], rtol=TIE, atol=0.0, equal_nan=True).all(axis=-1)
         found[alike] = np.fmax(found[alike], own)
     return found

@@ -35,6 +35,7 @@ from softjaw.study.result.vtkhdf import grid_datasets
 
 PROGRAM, VERSION = "softjaw", 5
 LABEL, SESSIONS, REPORT = 80, 256, 8192
+# Fixed lengths: a run writes to space that is there already, and text of any length would need more.
 SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
      ("failed", "<i8"), ("host", "S64"), ("program", "S64"), ("git", "S64"), ("versions", "S400"), ("cpu", "S80"),
@@ -230,6 +231,7 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
             Derived(**{**d, "axes": tuple(d["axes"]), "shape": tuple(map(int, d["shape"]))}) for d in options["derived"]
         )
         faces, meshes = int(options["faces"]), int(options["meshes"])
+        # No real study reaches these bounds: a damaged text must not make a reader allocate without end.
         if not 0 <= faces < 10**7:
             raise ValueError(f"{faces} faces")
         cor_grid, planar = int(options["cor_grid"]), options["planar"]

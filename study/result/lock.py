@@ -12,7 +12,9 @@ from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, IN_USE, StudyError
 
+# Some network file systems have no locks: a run there is warned, not refused.
 NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
+# A file system may emulate flock by record locks, which may refuse with EACCES.
 BUSY = {errno.EWOULDBLOCK, errno.EACCES}
 
 
@@ -32,14 +34,17 @@ class Lock:
         """On rank 0: raise `StudyError` if a rank of another run is alive."""
         for attempt in range(6):  # 'status' takes the lock for an instant to see whether a run is alive
             self._fd = self._opened()
+            # A run that ends unlinks the file: a lock on a file without a name would keep nobody out.
             if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB) and self._still_named():
                 break
+            # The name of the holder lets the message say whom to wait for.
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
             self.release()
             if attempt == 5:
                 who = holder or "name unknown"
                 raise StudyError(IN_USE, f"{self.result}: in use by another run ({who}); wait for it")
             time.sleep(0.1)
+        # A shorter name must not keep the end of a longer one that a killed run left.
         os.ftruncate(self._fd, 0)
         os.pwrite(self._fd, self.owner.encode(), 0)
         self._flock(fcntl.LOCK_SH)
@@ -65,12 +70,14 @@ class Lock:
 
     def remove(self) -> None:
         """On rank 0, at the end of the run, while all ranks still hold the lock: take the file away."""
+        # A user may have removed it by hand: the end of a run does not fail by that.
         self.path.unlink(missing_ok=True)
 
     def release(self) -> None:
         """Let go; a process that dies does so as well."""
         if self._fd >= 0:
             os.close(self._fd)
+            # The number is soon given to another file, which a second release must not close.
             self._fd = -1
 
     def _still_named(self) -> bool:
@@ -98,6 +105,7 @@ def holder(result: Path) -> str:
     except OSError:
         return ""
     try:
+        # Only an attempt to lock tells a live run from a file that a killed one left behind.
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return ""
     except OSError as error:
@@ -142,5 +150,6 @@ class OpenedFile:
         return StudyError(CANNOT_WRITE, f"{self.path}: cannot be written any more ({reason}); {safe}")
 
     def _now(self) -> tuple[int, int]:
+        # Device and inode, because a copy under the same name is another file.
         status = self.path.stat()
         return status.st_dev, status.st_ino

@@ -35,9 +35,11 @@ def program() -> str:
 
 def git_state(folder: Path) -> str:
     """Commit of the sources, with ``-dirty`` if they were changed; empty where there is no repository."""
+    # Asked first, because git would also find a repository that merely contains the installed package.
     if not (folder / ".git").exists():
         return ""
     command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12"]
+    # A missing git or a slow disk must not keep a study from starting.
     try:
         return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
     except (OSError, subprocess.SubprocessError):
@@ -50,14 +52,17 @@ def cpu() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
+    # Not every architecture tells the name of its model.
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.machine()
 
 
 def versions(mpi_library: str) -> str:
     """Versions of the libraries that had a part in the numbers, as far as they are loaded."""
+    # Some MPI libraries give several lines and zero bytes at the end.
     known = [f"python {platform.python_version()}", mpi_library.split(",")[0].splitlines()[0].strip("\0 ")]
     for name in ("numpy", "scipy", "numba", "skfem", "clarabel", "mpi4py", "petsc4py", "h5py"):
+        # Importing a library only to name it would slow the start.
         if name in sys.modules:
             known.append(f"{name} {getattr(sys.modules[name], '__version__', '?')}")
     if "petsc4py.PETSc" in sys.modules:

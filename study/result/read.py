@@ -80,6 +80,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
         found = {}
         for name in faces[0] if faces else ():
             values = np.stack([one[name] for one in faces]).reshape(rows.shape + faces[0][name].shape)
+            # Rows that are not complete may hold what a killed run began to write.
             values[(result.status.ravel()[rows.values] != DONE)] = np.nan
             q = BY_KEY[f"patch/{name}"]
             found[name] = xr.Variable((*rows.dims, *q.dims), values, _about(q))
@@ -126,6 +127,7 @@ def dataset(result: Result) -> xr.Dataset:
     for variable in variables.values():
         if variable.dims[: len(layout.names)] == layout.names and variable.dtype.kind == "f":
             variable.values[status != DONE] = np.nan
+    # Flags are stored as floats, which can be NaN; masks need integers.
     flags = np.nan_to_num(variables["flags"].values).astype(np.int64)
     known = [flag for flag in Flag if flag & OF_FILE]
     marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": tuple(flag.word for flag in known)}
@@ -167,6 +169,7 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
     else:
         values = result.read(f"{q.name}/{q.name}" if q.group == "maps" else q.key)
     lead = (*names[:-3], q.among, names[-1]) if q.among else names
+    # What few candidates have alone has other axes than the states.
     if not q.among and values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
     return xr.Variable((*lead, *q.dims), values, _about(q))

@@ -50,28 +50,35 @@ UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF 
 
 def create(path: Path, layout: Layout, header: Header) -> None:
     """Write the skeleton beside ``path`` and rename it into place; raise `StudyError` if there is no room for it."""
+    # Space first: a study must not find out after hours that the disk is full.
     _reserve(path, layout.nbytes)
     part = path.with_name(path.name + ".part")
     try:
         with h5py.File(part, "w", libver=LIBVER) as file:
             _write_skeleton(file, layout, header)
+        # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=LIBVER) as file:
             _write_checksums(file, GuardedFile(part, file), layout)
         with part.open("r+b") as handle:
+            # Blocks that exist now cannot be missing when a rank writes.
             os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
+            # On disk before it has its name: a power cut leaves no file or a whole one.
             os.fsync(handle.fileno())
     except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
         remove(part)
+        # A wrong layout is a bug and must not look like a full disk.
         if not isinstance(error, OSError) and "write" not in str(error):
             raise
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
     part.replace(path)
+    # The new name is on disk only when the folder is.
     folder = os.open(path.parent, os.O_RDONLY)
     os.fsync(folder)
     os.close(folder)
 
 
 def _reserve(path: Path, need: int) -> None:
+    # Asked before the trial, because it can tell how much is missing.
     free = shutil.disk_usage(path.parent).free
     if free < need:
         sizes = f"needs {need / 1e6:.1f} MB, only {free / 1e6:.1f} MB are free there"
@@ -135,6 +142,7 @@ def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
     for name, text in texts.items():
+        # HDF5 has no fixed-length strings of length 0.
         data = text.encode() or b" "
         study.create_dataset(name, data=np.array(data, h5py.string_dtype("utf-8", len(data))))
     study.create_dataset("report", data=report_bytes(UNFINISHED))
@@ -171,8 +179,10 @@ def report_bytes(text: str) -> np.ndarray:
 
 def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    # Contiguous and allocated at once: only so can ranks write independently of each other.
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    # Filled now: a case that is never written reads as not computed, not as what the disk held.
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     strings = dataset.dtype.kind == "S"
     if not strings:  # text is filled with zero bytes anyway

@@ -59,8 +59,10 @@ class Result:
     def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
         self.path, self.file = path, file
         root, study = file.attributes(), file.attributes(ROOT)
+        # Asked first: a file of another program is told so, and not called damaged.
         if root.get("program") != PROGRAM:
             raise ValueError("it does not name its program")
+        # Before the layout: an older one need not have what is read below.
         self.version = root.get("layout_version", "")
         if self.version != str(VERSION):
             raise StudyError(OTHER_FILE, _other_version(path, self.version))
@@ -74,6 +76,7 @@ class Result:
         self._part = {column.path: column.part for column in self.layout.columns}
         self._trusted: set[str] = set(self.layout.parts) if unchecked else set()
         self._unchecked = unchecked
+        # With a wrong header, the sums of the rows would be looked for in the wrong places.
         if not unchecked and str(checksums.of_header(file, self.layout)) != study.get("checksum"):
             raise self._damaged("axes, scene or definitions do not match their checksum")
 
@@ -105,6 +108,7 @@ class Result:
         if not self._unchecked and self.status.flat[row] != MISSING:
             index = np.unravel_index(row, self.layout.shape)
             stored = self.file.values(self._checked("checksums/patch"), index)
+            # Joined in the order of the columns, as the writer summed them.
             if checksums.of_array(b"".join(values.tobytes() for values in found.values())) != stored:
                 raise self._damaged(f"the patch of case {row} does not match its checksum")
         return found
@@ -169,6 +173,7 @@ class Result:
     def sessions(self) -> list[dict[str, Any]]:
         """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
         rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION))
+        # A session that lost its start still has its sum: it counts as damage, not as none.
         used = [row for row in rows if row["crc"] or row["start"]]
         if not self._unchecked and any(row["crc"] != checksums.of_session(row) for row in used):
             raise self._damaged("a session does not match its checksum")
@@ -197,6 +202,7 @@ class Result:
     def _still(self, wrong: np.ndarray, codes: np.ndarray) -> np.ndarray:
         """Those of some rows that a run has not begun anew since their states were read; of the others, now missing."""
         begun = wrong[self.codes.flat[wrong] != codes.flat[wrong]] if wrong.size else wrong
+        # In place, so that whoever holds the states sees that these rows have no values any more.
         codes.flat[begun] = MISSING
         return np.setdiff1d(wrong, begun)
 
@@ -238,6 +244,7 @@ class Result:
             raise ValueError(f"axis '{name}' is no list of numbers")
         units = str(attributes.get("units", ""))
         values = self.file.values(found)
+        # Put this way round so that NaN is refused as well.
         if not (np.abs(values) < BEYOND).all():
             raise ValueError(f"axis '{name}' has values that are no numbers")
         label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
@@ -293,6 +300,7 @@ def open_result(path: str | Path, unchecked: bool = False) -> Result:
 def _go_through(result: Result) -> None:
     """Touch whatever readers of a result may read, however much of it is broken."""
     for dataset in (*result.layout.datasets, *result.layout.grid):
+        # One broken dataset must not hide the next one from the trial.
         with suppress(StudyError):
             found = result.file.plain(dataset.path)
             if found.chunks:  # data that have to be unpacked
@@ -304,9 +312,12 @@ def _go_through(result: Result) -> None:
 
 def torn_rows(path: Path, layout: Layout) -> list[int]:
     """Rows that are marked done or failed but do not match their checksums."""
+    # Unchecked, because a checking reader refuses the file at its first torn row.
     with open_result(path, unchecked=True) as result:
         codes = result.codes.ravel()
         marked = np.flatnonzero(codes != MISSING)
         torn = [checksums.broken_rows(result.file, layout, part, marked) for part in layout.parts]
+        # The caller holds the lock, so no run is under way.
         states = checksums.broken_states(result.file, layout, codes, under_way=False)
+    # What is not marked is solved anyway.
     return sorted({*np.concatenate(torn).tolist(), *(set(states.tolist()) & set(marked.tolist()))})

@@ -20,6 +20,7 @@ from softjaw.study.messages import beside
 from softjaw.study.quantities import DONE, FINGERS, MISSING, ON_OBJECT, STATES
 from softjaw.study.result.datasets import Dataset
 
+# Newer formats would lock out readers that bring an older HDF5 of their own, as ParaView does.
 LIBVER = ("earliest", "v110")
 Arrays = Mapping[str, np.ndarray]
 PATH = "/VTKHDF"
@@ -71,6 +72,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
 
     for name in ("Points", "Cells", "ConnectivityIds"):
         yield made(f"NumberOf{name}", (1,), "<i8", 0)
+    # Single precision is enough for a picture; the exact values stand in the maps.
     yield made("Points", (steps * points, 3), "<f4", 0.0, "m", "points in the object's frame, force by force")
     yield made("Connectivity", (corners,), "<i8", 0)
     yield made("Offsets", (cells + 1,), "<i8", 0)
@@ -100,6 +102,7 @@ def skeleton(layout: Any, surface: Surface) -> dict[str, np.ndarray]:
     counts, (n, m) = layout.pad_faces, surface.counts
     pads = FINGERS * int(np.prod(layout.shape[-3:-1])) * bool(counts[0])
     quads = quads_of(counts, n, pads) if pads else np.empty((0, 4), int)
+    # Points at NaN or 0 would spoil a viewer's bounding box; a point of the object does not.
     corner = surface.points[:1] if n else np.zeros((1, 3))
     one = np.concatenate([surface.points, np.broadcast_to(corner, (points - n, 3))])
     number = np.repeat(np.arange(pads), counts[0] * counts[1])
@@ -124,6 +127,7 @@ def fill_grid(writer: Any) -> None:
     states = writer.read("status/code")[first].reshape(-1, layout.shape[-1])
     for k in range(layout.shape[-1]):
         start, state = k * cells, states[:, k]
+        # Index -1 picks the last candidate's state, which the where hides again.
         writer.fill(f"{PATH}/CellData/status", start, np.where(candidate == NOBODY, -1, state[candidate].astype(int)))
         for name, q in maps_of(layout).items():
             path = f"{name}/ccm" if q.by_model else f"{name}/{name}"
@@ -145,6 +149,7 @@ def _fill_pads(writer: Any, layout: Any, k: int, state: np.ndarray) -> None:
         centroid, pressure = (writer.read(f"patch/{name}", row) for name in ("centroid", "pressure"))
         R, o = (writer.read(f"fingers/pose_{name}", index) for name in ("rotation", "origin"))
         if not all(np.isfinite(v).all() for v in (centroid, pressure, R, o)):
+            # Such a pad stays in its corner, without area.
             continue
         face = np.stack([corners_of(x.reshape(i, j, 3)).reshape(-1, 3) for x in centroid])
         placed = np.einsum("fab,fnb->fna", R, face) + o[:, None]
@@ -157,9 +162,11 @@ def corners_of(centres: np.ndarray) -> np.ndarray:
     for axis in (0, 1):
         c = np.moveaxis(centres, axis, 0)
         if len(c) > 1:
+            # Continued by a line and averaged: the outermost corners lie half a face beyond the centres.
             c = np.concatenate([2 * c[:1] - c[1:2], c, 2 * c[-1:] - c[-2:-1]])
             c = 0.5 * (c[1:] + c[:-1])
         else:
+            # A single face has no neighbour to take the pitch from.
             c = np.concatenate([c, c])
         centres = np.moveaxis(c, 0, axis)
     return centres
@@ -241,6 +248,7 @@ def _write(
     for group, arrays in (("CellData", on_cells), ("PointData", on_points)):
         made = root.create_group(group)
         for name, values in arrays.items():
+            # h5py stores bool as an enum; readers of VTKHDF expect plain numbers.
             flat = np.asarray(values).reshape(-1, *np.shape(values)[2 if len(steps) else 1 :])
             made[name] = flat.astype("<i8" if flat.dtype.kind in "iub" else "<f8")
     if len(steps):
@@ -251,7 +259,9 @@ def _write(
 
 def head(root: h5py.Group, steps: int) -> None:
     """Attributes of a grid, over so many steps or over none."""
+    # No newer version than needed: readers refuse files that are newer than they are.
     root.attrs.create("Version", np.array([2, 0] if steps else [1, 0], "<i8"))
+    # VTKHDF demands a fixed-length string here.
     root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
     if steps:
         root.require_group("Steps").attrs.create("NSteps", steps, dtype="<i8")

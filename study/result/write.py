@@ -35,6 +35,7 @@ class ResultWriter:
         self.path, self.layout = path, layout
         shared = {} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
+        # Opened once: finding an object by its path takes longer than a small write.
         self._columns = [self._file[c.path] for c in layout.columns]
         keys = [c.key for c in layout.columns]
         self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST}
@@ -54,10 +55,12 @@ class ResultWriter:
     def count_attempt(self, row: int, change: int = 1) -> None:
         """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
         index = self._index(row)
+        # One byte holds it, which must neither wrap round nor fall below 0.
         self._attempts[index] = min(max(int(self._attempts[index]) + change, 0), 255)
 
     def forget(self, row: int) -> None:
         """Make a failed or torn row a missing one that was never tried."""
+        # State first, attempts last: a kill in between leaves a begun row, which the next run tidies.
         self._code[self._index(row)] = MISSING
         self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
         self._attempts[self._index(row)] = 0
@@ -76,11 +79,13 @@ class ResultWriter:
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
+        # A complete case is final: readers that look on must not see it change.
         if self._code[index] == DONE:
             raise ValueError(f"row {row} is done already and must not be written again")
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
         places = self.layout.places(row)
+        # Values, sums, state: a kill in between leaves a row that reads as not computed.
         for column, dataset, value, place in zip(self.layout.columns, self._columns, values, places, strict=True):
             if place is None:
                 continue
@@ -88,6 +93,7 @@ class ResultWriter:
                 dataset[index] = value.astype(dataset.dtype)  # with its encoding
             elif value.size:
                 _write_block(dataset, place, value)
+        # Turned copies for viewers; they have no checksum.
         for position, dataset in self._maps.items():
             dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
         sums = {**checksums.of_parts(self.layout, row, values), STATE: checksums.OF_STATE[state]}
@@ -113,6 +119,7 @@ class ResultWriter:
     def write_report(self, text: str) -> None:
         """Write the report, cut where it is too long; by one rank, after all rows."""
         self._file[f"{ROOT}/report"][()] = found = report_bytes(text)
+        # The sum follows the values: a reader that comes in between looks again.
         self._close("report", found)
 
     def write_derived(self, name: str, values: Any) -> None:
@@ -127,6 +134,7 @@ class ResultWriter:
     def begin_session(self, **fields: Any) -> None:
         """Add a row to the provenance; by one rank."""
         used = self._sessions[()]["start"] != b""
+        # When all rows are used the last one is written over: provenance must not stop a run.
         self.session = min(int(used.sum()), len(used) - 1)
         self._sessions[self.session] = np.zeros((), SESSION)
         self.update_session(**fields)
@@ -177,6 +185,7 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
         if value.shape != column.shape:
             raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.shape}")
         row[i] = value
+    # A key that nobody stores would be lost without a word.
     if given:
         raise ValueError(f"a case gives {', '.join(sorted(given))}, which study.quantities does not list")
     return row
@@ -201,6 +210,7 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
 
 def verify(path: Path, layout: Layout, header: Header) -> None:
     """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
+    # Tried, not asked: mode bits know nothing of read-only mounts.
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:
         if result.digest != header.digest:
@@ -220,6 +230,7 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
                 raise StudyError(OTHER_FILE, text)
         codes = result.codes.ravel()
         wrong = checksums.broken_states(result.file, layout, codes, result.killed)
+        # Solving them again would write over results that may be right.
         if lost := int(np.sum(codes[wrong] == MISSING)):
             text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
             raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")

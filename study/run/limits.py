@@ -87,6 +87,7 @@ class Stopper:
         try:
             yield
         finally:
+            # First of all: an alarm that comes from here on belongs to no case.
             self._solving, self._case_ends = False, math.inf
             self._set_alarm()
             if self._last_resort is not None:
@@ -94,6 +95,7 @@ class Stopper:
 
     def _stop(self, number: int, _frame: Any) -> None:
         if self.name:
+            # A second signal does not wait for the grace that the first one gave.
             self._raise(AbandonedError)
             return
         self.name = signal.Signals(number).name
@@ -103,6 +105,7 @@ class Stopper:
 
     def _set_alarm(self) -> None:
         left = min(self._leave, self._case_ends) - time.monotonic()
+        # A timer of 0 would be off, so a moment that has passed already gets a millisecond.
         signal.setitimer(signal.ITIMER_REAL, 0 if left == math.inf else max(left, 1e-3), AGAIN)
 
     def _alarm(self, *_: Any) -> None:
@@ -113,6 +116,7 @@ class Stopper:
             self._raise(TimeLimitError)
 
     def _raise(self, error: type[BaseException]) -> None:
+        # Outside of a solve, as amid a write, an exception would leave half a row.
         if self._solving:
             raise error
 
@@ -138,7 +142,9 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     if setting != "none":
+        # With almost nothing free a case still gets a chance; the system has the last word.
         share = max(KEPT * available() / ranks, LEAST) if setting == "auto" else 1e9 * float(setting)
+        # A huge setting must not overflow what the system takes.
         wanted = _own_addresses() + int(min(share, 2.0**60))
         resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
     try:
@@ -156,6 +162,7 @@ def require_room() -> None:
         With the limit, what is needed, and what to do.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    # With less than this some libraries hang instead of failing, so the run is refused before.
     if limit != resource.RLIM_INFINITY and limit < ITSELF:
         raise StudyError(USAGE, no_room(f"softjaw with its libraries takes {ITSELF / 1e9:g} GB for small cases"))
 
@@ -172,6 +179,7 @@ def no_room(reason: str) -> str:
 
 def is_out_of_memory(error: BaseException) -> bool:
     """Whether an error says that memory was missing, whatever its type."""
+    # Libraries report missing memory by errors of other types, whose text tells.
     return isinstance(error, MemoryError) or any(sign in str(error) for sign in SIGNS)
 
 
@@ -191,6 +199,7 @@ def _groups_free() -> Iterator[float]:
                 ("memory.limit_in_bytes", "memory.usage_in_bytes") if controllers else ("memory.max", "memory.current")
             )
             group = root / path.strip().lstrip("/")
+            # A limit may be set on any group above; the tightest one counts.
             for folder in (group, *(f for f in group.parents if f.is_relative_to(root))):
                 numbers = [_lines(folder / name)[:1] for name in names]
                 if all(n and n[0].strip().isdigit() for n in numbers):
@@ -200,6 +209,7 @@ def _groups_free() -> Iterator[float]:
 def _file_pages(group: Path) -> float:
     words = [line.split() for line in _lines(group / "memory.stat")]
     found = {name: float(value) for name, value in words}
+    # Version 1 counts pages of groups below under total_ only.
     return sum(found.get(f"total_{name}", found.get(name, 0.0)) for name in ("inactive_file", "active_file"))
 
 

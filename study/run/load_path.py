@@ -39,11 +39,13 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
     for row in again:
         writer.forget(int(row))
         codes[row], attempts[row] = MISSING, 0
+    # Begun and not ended: a kill may have come between the checksum and the state.
     for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):
         writer.tidy(int(row))
     for unit in units:
         for rows in unit.rows:
             deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]
+            # Forces above are given up as well, because the load path would lead through the deadly one again.
             for k in range(deadly[0], len(rows)) if deadly else ():
                 if codes[rows[k]] == MISSING:
                     what = "this case" if k == deadly[0] else "a lower force of this candidate"
@@ -85,23 +87,28 @@ class PathSolver:
         cases = self._cases(unit)
         clock = time.perf_counter()
         while pending and not self._claims.stopped:
+            # A file that was moved away would be filled where nobody finds it.
             self._state.check()
+            # Counted before the solve: a process that is killed cannot count afterwards.
             self._count(pending)
             self._lost.begin(unit.index)
             try:
                 with stopper.case():
                     k, result = next(cases)
             except AbandonedError:
+                # What was given up for a signal stays not computed, so that resume solves it.
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
                 self._fail(pending, _sentence(error, stopper.limit))
                 break
             finally:
+                # Also after a failure, or this rank would be taken for one that hangs.
                 self._lost.end()
             now = time.perf_counter()
             self._store(unit, pending.pop(k, []), result, now - clock)
             clock = now
             look()
+        # An orderly end, so what was begun has killed nobody.
         self._uncount()
         _close(cases)
 
@@ -110,6 +117,7 @@ class PathSolver:
 
     def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
         rows = {row for _, row in served}
+        # No longer begun before it is stored: a stop amid the writes must not count it back.
         self._begun = [row for row in self._begun if row not in rows]
         for c, row in served:
             if isinstance(result, CaseFailure):
@@ -129,6 +137,7 @@ class PathSolver:
 
     def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
         rows = [row for _, row in pending[min(pending)]]
+        # Complete forces are solved again on the way and leave the rows as they were: these are counted once.
         if rows != self._begun:
             self._uncount()
             with self._state.writing():
@@ -137,6 +146,7 @@ class PathSolver:
             self._begun = rows
 
     def _uncount(self) -> None:
+        # Taken away first: a signal that calls this again meanwhile must not count twice.
         rows, self._begun = self._begun, []
         with self._state.writing():
             for row in rows:
@@ -163,6 +173,7 @@ def _pending(unit: Any, codes: np.ndarray) -> dict[int, list[tuple[int, int]]]:
         for k, row in enumerate(rows):
             if codes[row] == MISSING:
                 pending.setdefault(k, []).append((c, row))
+    # By force: a load path is solved upward, whichever candidate lacks which force.
     return dict(sorted(pending.items()))
 
 
@@ -181,6 +192,7 @@ def _sentence(error: BaseException, limit: float) -> str:
     if is_out_of_memory(error):
         return NO_MEMORY.format(text=str(error) or "no more could be had")
     text = f"{type(error).__name__}: {error}"
+    # A builtin error is most likely a bug, and only its place tells which.
     if type(error).__module__ == "builtins" and error.__traceback__:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         text += f" ({Path(frame.filename).name}:{frame.lineno})"

@@ -53,6 +53,7 @@ class Plan:
 
 def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
     """The plan of a scene; builds its objects, so a mesh is read here."""
+    # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
@@ -126,6 +127,7 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
     10
     """
     total = sum(costs)
+    # Beyond the number of load paths no further rank finds work; the other bound keeps this quick.
     good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= efficiency * n * makespan(costs, n)]
     return max(good, default=1)
 
@@ -156,7 +158,9 @@ def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
 
 
 def _measured(unit: Any, seconds: np.ndarray) -> float | None:
+    # Candidates served by symmetry have no times, so the solved one speaks for the unit.
     times = seconds[list(unit.rows[0])]
+    # A load path that is measured in part would be taken for a cheap one.
     return None if np.isnan(times).any() else float(times.sum())
 
 
@@ -213,10 +217,12 @@ def measured_seconds(layout: Layout, path: Path) -> Any:
     if not path.is_file():
         return None
     with open_result(path) as result:
+        # A file of another shape has other cases in the same places.
         return result.read("work/seconds_total").ravel() if result.layout.shape == layout.shape else None
 
 
 def _free(path: Path) -> int:
+    # The folder of the result is made later: the nearest one that exists tells the disk.
     for folder in path.absolute().parents:
         if folder.is_dir():
             return shutil.disk_usage(folder).free

@@ -69,6 +69,7 @@ class Progress:
 
     def due(self) -> bool:
         """Whether it is time to look at the states again; cheap, to be asked often."""
+        # Reading the states costs the file system something, so it is done seldom.
         if self._clock() - self._looked < (0.2 if self._live else 1.0):
             return False
         self._looked = self._clock()
@@ -77,11 +78,13 @@ class Progress:
     def update(self, codes: np.ndarray) -> None:
         """Print a line if the last one is ten seconds or five percent old, on a terminal always."""
         share = float(np.mean(codes != MISSING))
+        # A log that is kept must not grow with every case.
         if not self._live and self._clock() - self._printed < 10 and share - self._share < 0.05:
             return
         self._share, self._printed = share, self._clock()
         text = self.line(codes)
         stamp = time.strftime("%H:%M:%S")
+        # Cleared to the end of the line: a shorter text must not keep the tail of a longer one.
         self._stream.write(f"\r\x1b[K{text}" if self._live else f"[{stamp}] {text}\n")
         self._stream.flush()
 
@@ -94,8 +97,10 @@ class Progress:
         if self._first is None and count:
             self._first = now, count, gone
         since, cases, weight = (b - a for a, b in zip(self._first or (now, 0, 0.0), (now, count, gone), strict=True))
+        # A few cases of one load path tell little of the others; too many would keep the reader waiting.
         enough = min(max(FEWEST, 0.03 * int(self._todo.sum())), MOST_WAITED)
         if cases >= enough and since >= SHORTEST and weight > 0:
+            # By cost, not by number: the most expensive load paths come first.
             left = since * float(self._weights[self._todo & ~solved].sum()) / weight
             text += f", {since / cases:.3g} s/case, {duration(left)} left"
         return text
@@ -129,6 +134,7 @@ class Unbreakable:
         try:
             return act()
         except BrokenPipeError:
+            # Into nowhere from now on: the interpreter's last flush would complain too.
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self._stream.fileno())
             return None

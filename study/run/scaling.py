@@ -64,6 +64,7 @@ def replayed(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> float:
     3.0
     """
     order = by_cost([own.cost for own in paths])
+    # Rounded up: a node that is not full is a node too.
     nodes = -(-ranks // machine.per_node)
     taken, counter, disk, last = [0] * nodes, [0.0] * nodes, 0.0, 0.0
     # moment, rank, the load path's cases that are still to be solved (none: take another)
@@ -77,6 +78,7 @@ def replayed(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> float:
             now = max(now + served * machine.write, disk) if machine.service else now + served * machine.write
             last = max(last, now)
         if current < 0 or k == len(paths[current].seconds):
+            # The counter serves one rank at a time, so a claim waits for the one before.
             now = counter[node] = max(now, counter[node]) + machine.claim
             position = node + taken[node] * nodes
             taken[node] += 1
@@ -97,6 +99,7 @@ def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
     shares = {
         "file system": time - unwritten,
         "counter": unwritten - free,
+        # Against an even share: only what is longer than that holds up the end.
         "longest load path": max(longest - whole / ranks, 0.0),
         "division of load paths": free - max(longest, whole / ranks),
     }

@@ -16,6 +16,7 @@ IDLE = -1
 
 def _shared(node: Any, count: int, kind: type) -> tuple[Any, np.ndarray]:
     """A window and ``count`` numbers of eight bytes in it, which all ranks of the node see."""
+    # All of it at one rank, so that it is one block, which `Shared_query(0)` finds.
     window = MPI.Win.Allocate_shared(8 * count if node.rank == 0 else 0, 8, comm=node)
     memory: Any = window.Shared_query(0)[0]
     return window, np.frombuffer(memory, kind)
@@ -41,12 +42,15 @@ class Claims:
     def __init__(self, comm: Any, count: int, node: Any = None) -> None:
         self._own = node is None
         self.node = comm.Split_type(MPI.COMM_TYPE_SHARED) if node is None else node
+        # Sorted, because all ranks have to number the nodes alike.
         leaders = sorted(set(comm.allgather(self.node.bcast(comm.rank))))
         self._first, self._step, self._count = leaders.index(self.node.bcast(comm.rank)), len(leaders), count
         self._window, self._shared = _shared(self.node, 3, np.int64)
         if self.node.rank == 0:
             self._shared[:] = 0
+        # Nobody may count before the counters are 0.
         self.node.Barrier()
+        # Locked once for all, so that a claim is a single operation.
         self._window.Lock_all()
 
     def __iter__(self) -> Iterator[int]:
@@ -61,11 +65,13 @@ class Claims:
         """What a counter had before this rank added one."""
         before = np.zeros(1, np.int64)
         self._window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
+        # Only after this the answer has arrived.
         self._window.Flush(0)
         return int(before[0])
 
     def stop(self) -> None:
         """Ask all ranks of this node to begin nothing new."""
+        # A plain store: all ranks write the same 1, so it needs no turn of its own.
         self._shared[STOP] = 1
 
     @property
@@ -81,6 +87,7 @@ class Claims:
         """Give the counter back."""
         stopped = self.stopped
         self._window.Unlock_all()
+        # Memory of the window is gone after this; whoever still asks reads a copy.
         self._shared = np.array([0, stopped, 0], np.int64)
         self._window.Free()
         if self._own:
@@ -111,6 +118,7 @@ class LostRanks:
 
     def begin(self, unit: int) -> None:
         """Note that this rank begins a case of the unit with this index."""
+        # Time before unit: between the two a look must not pair the new unit with an old time.
         self._since[self._node.rank] = time.monotonic()  # one clock for all processes of a node
         self._unit[self._node.rank] = unit
 
@@ -125,5 +133,6 @@ class LostRanks:
 
     def free(self) -> None:
         """Give the memory back."""
+        # No view may outlive the window that it looks into.
         self._unit = self._since = np.empty(0)
         self._window.Free()

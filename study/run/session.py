@@ -87,16 +87,19 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
     StudyError
         On every rank: the file is in use, belongs to another scene or cannot be written.
     """
+    # Host and process: two runs on one file system must not have the same name.
     owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
     lock = Lock(path, owner)
     try:
         on_rank0(comm, _take, lock, path)
         if comm.rank:
             lock.join()
+        # Only when all ranks hold the lock does nobody slip in between.
         comm.Barrier()
         on_rank0(comm, lock.confirm)
         created, torn = on_rank0(comm, _prepare, path, plan)
         writer = ResultWriter(path, plan.layout, comm)
+        # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
         codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
         session = Session(plan, work, writer, comm, codes)
         if comm.rank == 0:
@@ -104,9 +107,12 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         code = session.solve()
         if comm.rank == 0:
             print_summary(work, path)
+            # Removed while it is held: without it another run could take a file that is about to vanish.
             lock.remove()
+        # Nobody lets go before the file of the lock is gone.
         comm.Barrier()
     finally:
+        # Whatever happened: a process that lives on must not keep others out.
         lock.release()
     return code
 
@@ -122,6 +128,7 @@ def _take(lock: Lock, path: Path) -> None:
 
 def _prepare(path: Path, plan: Plan) -> tuple[bool, list[int]]:
     if not path.exists():
+        # By one process: ranks that make datasets together would have to do it in step.
         create(path, plan.layout, plan.header)
         return True, []
     verify(path, plan.layout, plan.header)
@@ -144,10 +151,12 @@ class Session:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
         todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
+        # The costliest first, so that no rank is alone with a long load path at the end.
         self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
         if comm.rank == 0:
             writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
+        # Every rank needs it: the one that ends a hanging run writes how the session ended.
         writer.session = comm.bcast(writer.session)
         self._progress = _progress(plan, codes, comm.size) if comm.rank == 0 else None
 
@@ -172,6 +181,7 @@ class Session:
             self._finish(self._writer, name)
             print_summary(self._work, self._writer.path)
             self._comm.Abort(self._code())
+        # A signal may reach some ranks only; any name is larger than no name.
         name = max(self._comm.allgather(name))
         lost.free()
         claims.free()
@@ -185,6 +195,7 @@ class Session:
     def _solve_share(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
         """Solve this rank's share and wait for the others; whether all of them came, and the signal that came."""
         solver = PathSolver(self._writer, self._work.solve_unit, self._work.image, claims, lost, self._state)
+        # A rank that is alone on its node has nobody beside it to see that it hangs.
         unseen = claims.node.size == 1 and self._work.time_limit < math.inf
         stopper = Stopper(solver.on_stop, self._work.time_limit, lost.patience if unseen else None)
         with stopper, limited_memory(self._work.memory, claims.node.size):
@@ -195,6 +206,7 @@ class Session:
                 self._look()
                 if self._only_lost_are_left(lost, stopper):
                     return False, stopper.name
+                # Sleeping leaves the core to ranks that still solve.
                 time.sleep(0.02)
         return True, stopper.name
 
@@ -204,6 +216,7 @@ class Session:
         for unit in self._todo if units else ():
             if unit.index in units:
                 give_up(self._writer, unit, lost.patience)
+        # After a signal nobody begins anything new, so what is missing then stays missing.
         return bool(units) and (stopper.overdue > max(GRACE.values()) or not np.any(self._writer.codes() == MISSING))
 
     def _look(self) -> None:
@@ -225,11 +238,13 @@ class Session:
         """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
         codes = writer.codes()
         missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
+        # Derived values of half a study would look like those of a whole one.
         if self._work.finalise is not None and not missing:
             self._work.finalise(writer)
         writer.update_session(
             stop=provenance.timestamp(),
             reason=f"stopped by {name or 'another rank'}" if missing else "complete",
+            # Once more: libraries that were loaded for the solves are known only now.
             versions=provenance.versions(MPI.Get_library_version()),
             done=codes.size - missing - failed,
             failed=failed,
@@ -256,6 +271,7 @@ def _progress(plan: Plan, codes: np.ndarray, ranks: int) -> Progress:
     weights = np.ones(codes.size)
     for unit in plan.units:
         for rows in unit.rows:
+            # A unit costs the same however many candidates it serves, so they share its weight.
             weights[list(rows)] = unit.cost / max(len(rows) * len(unit.rows), 1) or 1.0
     # Under mpirun every rank's output claims to be a terminal, also when it goes to a file.
     launched = ranks > 1 or any(name.startswith(("OMPI_", "PMIX_", "PMI_")) for name in os.environ)

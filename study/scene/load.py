@@ -73,12 +73,14 @@ def parse_scene(
     if isinstance(data.get("sweep"), dict):
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     problems = _put_overrides(data, overrides, given)
+    # Before the checks, which want to see what depends on the file's name and on the sweep.
     _fill_in(data, path)
     sections, wrong = checked_sections(data)
     if isinstance(sections.get("object"), Mesh) and check_files:
         wrong += [f.below("object") for f in sections["object"].file_findings()]
     wrong += _sweep_findings(data, wrong)
     scene = None
+    # Only a scene without problems can be built and its cases be counted.
     if not problems and not wrong:
         scene = Scene(**{**sections, "sweep": {key: _axis(values) for key, values in sections["sweep"].items()}})
         if scene.cases > MOST_CASES:
@@ -87,6 +89,7 @@ def parse_scene(
     if wrong:
         problems += _located(wrong, text, str(path), given)
     if scene is None or problems:
+        # Problems of the file first and from top to bottom, as an editor goes through them.
         raise SceneError(sorted(problems, key=lambda p: (p.file != str(path), p.line or 0)))
     return scene
 
@@ -104,6 +107,7 @@ def _located(wrong: Sequence[Finding], text: str, file: str, given: Mapping[KeyP
             lines.setdefault(path[:n], place)
     for found in wrong:
         above = [found.path[:n] for n in range(len(found.path), 0, -1)]
+        # The longest path that has a place, and an override before the file: its value is the one in effect.
         where, number = next((places[p] for places in (given, lines) for p in above if p in places), (file, None))
         yield found.at(where, number)
 
@@ -112,11 +116,13 @@ def _fill_in(data: dict[str, Any], path: Path) -> None:
     """Fill in what depends on the scene file or on the sweep: result file, place of the mesh, values that are swept."""
     output, shape, sweep = data.setdefault("output", {}), data.get("object"), data.get("sweep")
     effects, surface = data.get("effects"), data.setdefault("limit_surface", {})
+    # A level of the effect and the model name the same choice; what the scene gives itself stays.
     if isinstance(effects, dict) and isinstance(surface, dict) and (level := effects.get("limit_surface")) in LEVELS:
         surface.setdefault("model", LEVELS[level][0])
     if isinstance(output, dict):
         output.setdefault("file", f"results/{path.stem}.hdf")
     if isinstance(shape, dict) and isinstance(shape.get("mesh"), str) and shape["mesh"]:
+        # Relative to the scene, so that a run from any folder finds the mesh.
         shape["mesh"] = str((path.parent / shape["mesh"]).resolve())
     for key, values in sweep.items() if isinstance(sweep, dict) else ():
         section, _, name = key.partition(".")
@@ -124,6 +130,7 @@ def _fill_in(data: dict[str, Any], path: Path) -> None:
         if not isinstance(table, dict) or not isinstance(values, list) or not values or key in NOT_SWEPT:
             continue
         if (model := section_model(section, table)) and name in model.model_fields:
+            # A swept key needs a value at which the sections can be checked.
             table.setdefault(name, values[0])
 
 
@@ -155,6 +162,7 @@ def _override(text: str) -> dict[str, Any]:
     # shells take the quotes of a text away
     for written in (value, json.dumps(value)) if value[:1] not in tuple("[{\"'") else (value,):
         with suppress(ValueError, RecursionError):
+            # What a terminal would obey has no place in a scene, nor in the messages about it.
             if equals and text.isprintable():
                 return tomllib.loads(f"{key} = {written}")
     remedy = "write the key, `=`, and a value as in TOML: 0.8, [1, 2], true or '\"text\"'"
@@ -195,6 +203,7 @@ def _sweep_findings(data: Mapping[str, Any], base: Sequence[Finding]) -> Iterato
         if not found:
             good[key] = values
     points = math.prod(map(len, good.values()))
+    # Counted before any point is tried: checking too many would take minutes.
     if points > MOST_GRID_POINTS:
         expected = f"at most {MOST_GRID_POINTS:,}"
         yield Finding(("sweep",), f"{points:,} combinations", expected, "sweep fewer keys or values")
@@ -208,8 +217,10 @@ def _point_findings(
     """What is wrong at the points of a sweep that is not wrong without it; single values before combinations."""
     seen, failed = set(base), set[tuple[str, int]]()
     points = product(*(range(len(values)) for values in axes.values()))
+    # Points with fewer moved keys first, so that a single bad value is named before its combinations.
     for point in sorted(points, key=lambda p: sum(map(bool, p))):
         at = dict(zip(axes, point, strict=True))
+        # A value that is wrong by itself would be reported again with every other value.
         if not failed.isdisjoint(at.items()):
             continue
         moved = [key for key, i in at.items() if i]
@@ -245,6 +256,7 @@ def _axis_findings(key: str, values: Any, data: Mapping[str, Any]) -> Iterator[F
         yield Finding(path, "kinds of elements beside stored patches", expected, 'write output.patches = "none"')
     elif not isinstance(values, list | tuple) or not values:
         yield Finding(path, shown(values), "a list of values", f'write `"{key}" = [...]`')
+    # Exact types, because True is an int and would be swept as 1.
     elif {type(v) for v in values} not in ({str}, {int}, {float}, {int, float}):
         yield Finding(path, shown(values), "single values of one kind", "write a list of numbers, or a list of texts")
     elif len(set(values)) < len(values):

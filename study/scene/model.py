@@ -123,6 +123,7 @@ class Scene(SceneSection):
         if self.object.mass is None:
             return self.object.axis_symmetry
         sideways = (*self.task.weight_direction[:2], *(self.task.centre_of_mass or (0.0, 0.0))[:2])
+        # A weight off the axis makes angles differ that are alike for the object.
         return 1 if any(abs(v) > 1e-9 for v in sideways) else self.object.axis_symmetry
 
     @property
@@ -133,6 +134,7 @@ class Scene(SceneSection):
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""
         data = self.model_dump(exclude_none=True)
+        # Only the way that was chosen: a scene that gives both would be refused.
         if self.candidates.poses:
             data["candidates"] = {"poses": data["candidates"]["poses"]}
         elif self.candidates.sampler:
@@ -154,12 +156,14 @@ class Scene(SceneSection):
         if not self.uncertainty.parts:  # files of scenes without it keep their digest
             del data["uncertainty"]
         if isinstance(self.object, Mesh):
+            # By content: a mesh that was moved or copied is the same one.
             data["object"]["mesh"] = _file_digest(self.object.mesh)
         if self.candidates.poses:
             data["candidates"] = [(p.point_mm, p.approach, p.long_side) for p in self.candidates.poses]
         else:
             where = self.candidates
             data["candidates"] = [where.station_values_mm, where.angles_deg, where.roll_deg]
+        # Options that only watch the solver change no result.
         data["petsc"] = {k: v for k, v in self.petsc.items() if not any(word in k for word in WATCHING)}
         data["sweep"] = list(self.sweep.items())  # the order of the axes counts
         return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()

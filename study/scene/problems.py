@@ -55,6 +55,7 @@ class SceneError(ValueError):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
+        # A file that is no scene at all must not fill the terminal.
         lines, more = [str(p) for p in self.problems[:MOST_LISTED]], len(self.problems) - MOST_LISTED
         super().__init__("\n".join([*lines, *([f"{problems[0].file}: and {more} more problems"] if more > 0 else [])]))
 
@@ -85,6 +86,7 @@ def shown(value: Any, width: int = 60) -> str:
     else:
         text = json.dumps(value, ensure_ascii=False, default=str)
         text = text if isinstance(value, str) else text.replace("Infinity", "inf").replace("NaN", "nan")
+    # A value may hold what a terminal would obey.
     text = printable(text)
     return text if len(text) <= width else text[: width - 4] + " ..."
 
@@ -103,6 +105,7 @@ def unknown_key(path: KeyPath, value: Any, keys: Sequence[str], elsewhere: Mappi
     expected = f"a key of [{key_text(path[:-1])}]"
     if same:
         target = split_unit(same[0])[1]
+        # Units of one kind only: a length must not be offered as an angle.
         converts = is_number(value) and unit and target and UNITS[unit].si == UNITS[target].si
         right = f" = {converted(value, unit, target):.10g}" if converts else ""
         remedy = f"the unit is part of the key, so write `{same[0]}{right}`"

@@ -30,18 +30,21 @@ def read_text(path: Path) -> str:
     toml = "a scene, which is a text file in TOML"
     try:
         with path.open("rb") as file:
+            # Never more than that: the name may lead to a huge file, or to one without an end.
             content = file.read(LARGEST + 1)
     except OSError as error:
         scenes = [p.name for p in path.parent.glob("*.toml") if p != path and p.name != "pyproject.toml"]
         near = closest(path.name, scenes)
         remedy = f"did you mean `{path.with_name(near)}`?" if near else "check the path and its permissions"
         raise refuse(f"a file that cannot be read ({error.strerror})", toml, remedy) from None
+    # A result file is the likeliest mix-up, so it is recognised.
     if b"\0" in content:
         hint = "use `softjaw show` for results" if content.startswith(b"\x89HDF") else "name the scene's .toml file"
         raise refuse("binary data", toml, hint)
     if len(content) > LARGEST:
         raise refuse(f"more than {LARGEST / 1e6:.0f} MB", "a scene of a few kB", "name the scene's .toml file")
     try:
+        # Some editors begin a file with a byte order mark, and end lines with two characters.
         return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
@@ -60,6 +63,7 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         reason, _, place = str(error).partition(" (at ")
         lines = text.rstrip("\n").split("\n")
         number = place.removeprefix("line ").partition(",")[0]  # tomllib gives it as text only
+        # A place behind the text, as of a bracket that is never closed, becomes the last line.
         line = min(int(number), len(lines)) if number.isdigit() else len(lines)
         found = f"{shown(lines[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
         raise SceneError([Problem(file, line, "", found, "TOML", REMEDY)]) from None
@@ -104,6 +108,7 @@ def _names(tokens: list[tuple[str, int]], end: str) -> KeyPath:
     parts: list[str] = []
     while tokens and (token := tokens.pop()[0]) != end:
         if token not in ".[":
+            # The parser itself takes quotes and escapes of a key away.
             parts.append(next(iter(tomllib.loads(f"{token}=0"))))
     return tuple(parts)
 
@@ -155,6 +160,7 @@ def _value(value: Any) -> str:
         return "[\n  " + ",\n  ".join(members) + ",\n]" if nested else f"[{', '.join(members)}]"
     if isinstance(value, str):  # JSON's escapes are TOML's, but for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    # repr of a float comes back as the same float, so that the digest does.
     return repr(value) if isinstance(value, float) else json.dumps(value)
 
 
@@ -192,6 +198,7 @@ def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
         One of them is not TOML.
     """
     one, other = (_values(text) for text in (theirs, ours))
+    # In the order of our scene, which is the one that the reader knows.
     keys = [key for key in dict.fromkeys([*other, *one]) if one.get(key) != other.get(key)]
     return [(key, one.get(key), other.get(key)) for key in keys]
 
@@ -204,6 +211,7 @@ def _values(text: str) -> dict[str, Any]:
         raise ValueError("nested too deeply") from error
     values = flat({name: table for name, table in tables.items() if name not in ("output", "run")})
     for pose in values.get("candidates.poses", ()):
+        # Labels name candidates and change no result.
         pose.pop("label", None)
     return {key: value for key, value in values.items() if key != "object.name"}
 

@@ -60,6 +60,7 @@ def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
     flags, status = judged(ds), ds.status.values
     found = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
     level = borne_level(status, flags) if (flags & BORNE).any() else None
+    # Where every force is too weak or too strong, the highest solved one is shown.
     if level is None:
         solved = np.flatnonzero((status == DONE).reshape(-1, status.shape[-1]).any(axis=0))
         level = int(solved[-1]) if solved.size else status.shape[-1] - 1
@@ -82,6 +83,7 @@ def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
     if values.dtype.kind != "f":  # codes have integers also where nothing is done
         done = ds.variables["status"].values == DONE
         values = np.where(done.reshape(done.shape + (1,) * (values.ndim - done.ndim)), values.astype(float), np.nan)
+    # A map without any value is left out instead of being drawn empty.
     return values if np.isfinite(values).any() else None
 
 
@@ -130,6 +132,7 @@ def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
         return str(options[i])
     unit, factor = unit_of(about["units"])
     text = number(ds.variables[axis].values[i] * factor, 4)
+    # A space that does not break keeps number and unit on one line.
     return text + (unit if unit == "°" else f"\u00a0{unit}" if unit else "")
 
 
@@ -208,6 +211,7 @@ def check(ds: xr.Dataset, name: str, index: Index) -> float:
     name = f"check_{name}"
     found = ds.variables[name].values[index] if name in ds.variables else np.array([np.nan])
     worst = np.min if name.removeprefix("check_") in ABOVE else np.max
+    # A finger without a check must not hide that of the other.
     return float(worst(found[np.isfinite(found)])) if np.isfinite(found).any() else float("nan")
 
 
@@ -229,6 +233,7 @@ def grouped(ds: xr.Dataset, state: int) -> list[tuple[int, str, list[Index]]]:
         index = tuple(int(i) for i in row)
         text = str(messages[index])
         if text or state == FAILED:
+            # Messages carry values of their case: without the numbers the kinds can be counted.
             kind = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
             kinds.setdefault(kind, (text or "no reason was given", []))[1].append(index)
     return sorted(((len(where), text, where) for text, where in kinds.values()), key=lambda g: -g[0])

@@ -83,6 +83,7 @@ def shadow_outline(surface: LimitSurface, i: int, j: int, count: int = 360) -> n
     """
     t = circle(i, j, count)[:, [i, j]]
     h = surface.support(circle(i, j, count))
+    # The support function is periodic, so its derivative by Fourier series is as exact as its values.
     slope = np.fft.irfft(1j * np.arange(count // 2 + 1) * np.fft.rfft(h), count)
     return h[:, None] * t + slope[:, None] * np.column_stack([-t[:, 1], t[:, 0]])
 
@@ -97,6 +98,7 @@ def body(surface: StoredSurface) -> np.ndarray | None:
 def weaker(ds: xr.Dataset, index: Index) -> int:
     """The finger that carries the smaller torque."""
     found = field(ds, "finger_tau_z_max")
+    # Where the torques tie, the same finger is shown on every machine.
     return 0 if found is None else largest(-np.nan_to_num(found[index][:, 0]))
 
 
@@ -114,8 +116,10 @@ def stored_surface(
         return None
     semi_axes, rho, S, f_x = (f[index][finger] for f in found)
     planar = f_x[MODELS.index("pcm")]
+    # A contact without friction or load has nothing to be divided by.
     if not (S > 0 and rho > 0 and planar > 0 and semi_axes[m].min() >= 0):
         return None
+    # From the file itself: a sweep may change mu from case to case.
     mu = float(planar / S)
     ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
     unit = planar * np.array([1.0, 1.0, rho]) * SHOWN

@@ -51,6 +51,7 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
     """
     file, out = Path(file), Path(out)
     picture_path = out.with_suffix(".png")
+    # A report must never write over the result that it is made from.
     if file.resolve() in (out.resolve(), picture_path.resolve()) or out == picture_path:
         raise StudyError(CANNOT_WRITE, f"{out}: choose a name that ends in .html for the report, with -o")
     html, png = build(open(file), candidate, place)
@@ -62,6 +63,7 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     ds, scene = judge(ds), read_scene(ds)
     if candidate is not None or place != (None, None):
         ds = judge(ds, view_of(ds, candidate, place, None)[1])
+    # A study without a solved case still gets its page, with states and scene.
     best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
     view = View(ds, best[:-3])
     sections: list[Section] = [
@@ -126,6 +128,7 @@ def cases(view: View, scene: Any) -> list[Section]:
     roles = {"Best case": best}
     if chosen is not None and compared(ds)[0] == chosen:
         roles["Chosen candidate"] = chosen
+    # The other case may belong to another point of the sweep, and so to another object.
     views = {index: view if index[:-3] == view.point else View(ds, index[:-3]) for index in roles.values()}
     which = "of the best case" if len(roles) == 1 else "of both cases"
 
@@ -176,6 +179,7 @@ def _maps(ds: xr.Dataset, index: Index) -> Any:
     x, y, angle = maps.main_axis(ds), len(index) - 1, len(index) - 2
     rows, axis = maps.some(maps.different_angles(ds), index[angle]), str(ds.status.dims[maps.main_axis(ds)])
     drawn, axes = pictures.figure(10, 2.4 * len(rows) + 0.6, len(rows), 2, sharex=True, sharey=True)
+    # Forces by number: their steps may grow by decades, and each needs a row to be seen.
     borders = edges(axis_values(ds, axis)), np.arange(len(forces(ds)) + 1) - 0.5
     for column, name in enumerate(FIRST):
         found = field(ds, name)

@@ -26,6 +26,7 @@ def wrapped(text: str, width: int, indent: str = "", more: str = "") -> str:
 
     Words are never broken, so that file names can be copied.
     """
+    # A terminal of a few characters would get one word per line.
     return textwrap.fill(
         text, max(width, 40), initial_indent=indent, subsequent_indent=indent + more,
         break_long_words=False, break_on_hyphens=False,
@@ -49,6 +50,7 @@ def aligned(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Collectio
         grid.add_column(head, justify="left" if i in left else "right", no_wrap=True)
     for row in rows:
         grid.add_row(*row)
+    # Much wider than any table, so that nothing is cut; who prints it decides on the width.
     wide = Console(file=io.StringIO(), width=10_000, markup=False, emoji=False, highlight=False, color_system=None)
     with wide.capture() as drawn:
         wide.print(grid)

@@ -118,6 +118,7 @@ def _line(case: dict[str, Any], maps: tuple[str, ...]) -> list[Any]:
     flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
     numbers = [*(float(case["maps"][name]) for name in maps), *flat]
     lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"]]
+    # repr loses no digit, so what is read back is what was stored.
     return [*lead, *(None if np.isnan(v) else repr(v) for v in numbers)]
 
 
@@ -131,5 +132,6 @@ def _plain(value: Any) -> Any:
         return value
     numbers = np.asarray(value, float)
     if not numbers.ndim:
+        # JSON has no NaN.
         return float(numbers) if np.isfinite(numbers) else None
     return [_plain(v) for v in numbers] if np.isfinite(numbers).any() else None

@@ -46,15 +46,18 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
         Waits for so many seconds.
     """
     stream = stream or sys.stdout
+    # Titles and messages are the user's text: brackets in them are no markup.
     console = Console(file=stream, markup=False, emoji=False, highlight=False)
     view = View(console, stream)
     try:
         with ExitStack() as stack:
             if console.is_terminal:
+                # Without a thread of its own, which would draw while the file is read.
                 view.live = stack.enter_context(Live(console=console, auto_refresh=False))
             while view.look(path):
                 sleep(every)
     except KeyboardInterrupt:
+        # Whoever presses Ctrl-C may fear for the run.
         console.print("no longer watching; the run continues")
         return INTERRUPTED
     for line in view.last_words:
@@ -85,6 +88,7 @@ class View:
             line = self._progress.line(codes) if runner and self._progress else _counts(codes)
             if self.live:
                 self.live.update(self._drawn(result, codes, runner, line), refresh=True)
+            # In a log only a new count is worth a line, not a new estimate of the rest.
             elif line.partition(" done")[0] != self._done:
                 self._console.print(f"[{time.strftime('%H:%M:%S')}] {line}", soft_wrap=True)
                 self._done = line.partition(" done")[0]
@@ -98,6 +102,7 @@ class View:
         self._failure = int(fresh[-1]) if fresh.size else self._failure
         self._codes = codes
         if self._progress is None:
+            # Weights are not in the file, so all cases count alike.
             self._progress = Progress(np.ones(codes.size), codes, self._stream, live=False)
 
     def _drawn(self, result: Any, codes: np.ndarray, runner: str, line: str) -> Group:
@@ -129,13 +134,16 @@ def _since(result: Any) -> str:
     """How long the last session has been running."""
     try:
         began = datetime.fromisoformat(result.sessions[-1]["start"])
+    # A session may be in the middle of being written; the view can do without it.
     except (IndexError, ValueError):
         return ""
+    # Never negative: clocks of two machines may disagree.
     return f", for {duration(max((datetime.now(UTC) - began).total_seconds(), 0.0))}"
 
 
 def best_so_far(result: Any, codes: np.ndarray) -> str:
     """The best grasp at the highest force at which any is solved, in one line."""
+    # Low forces are solved first, so the highest force has nothing to show for long.
     solved = (codes.reshape(-1, result.layout.shape[-1]) == DONE).any(axis=0)
     if not solved.any():
         return "best so far: no case is complete yet"
