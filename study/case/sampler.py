@@ -26,6 +26,7 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import Candidates, GraspPose
 from softjaw.study.scene.sections import Gripper
+from softjaw.study.units import converted
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -294,7 +295,7 @@ def antipodal_grasps(
     seed : int
         Of the points where grasps are looked for; the same seed gives the same grasps on every machine.
     """
-    points, triangles = (np.ascontiguousarray(part) for part in surface)
+    points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     own = longest_axis(points, triangles)
     seen: list[SampledGrasp] = []
     starts: list[Grip] = []
@@ -415,10 +416,16 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
 
 def _as_pose(grasp: SampledGrasp) -> GraspPose:
-    place = tuple(round(1e3 * float(x), 3) + 0.0 for x in grasp.point)
-    approach, long_side = (tuple(round(float(x), 6) + 0.0 for x in v) for v in (grasp.approach, grasp.long_side))
+    place = _rounded([converted(float(x), "m", "mm") for x in grasp.point], 3)
+    approach, long_side = _rounded(grasp.approach, 6), _rounded(grasp.long_side, 6)
     label = f"{place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f} mm, {_angle_text(approach)}"
     return GraspPose(point_mm=place, approach=approach, long_side=long_side, label=label)
+
+
+def _rounded(v: Sequence[float] | FloatArray, digits: int) -> tuple[float, float, float]:
+    """A vector in so many digits; 0.0 makes of a negative zero a positive one."""
+    x, y, z = (round(float(part), digits) + 0.0 for part in v)
+    return x, y, z
 
 
 def _angle_text(approach: Sequence[float]) -> str:

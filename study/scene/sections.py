@@ -61,7 +61,7 @@ class Gripper(SceneSection):
     sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
-    max_opening = si("max_opening_mm")
+    max_opening: ClassVar[Any] = si("max_opening_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
     sheet_support: ClassVar[Any] = si("sheet_support_mm")
 
