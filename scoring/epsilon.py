@@ -210,17 +210,22 @@ def certified_radius(
         Gap of the programme, relative to the radius squared, at which it stops.
     """
     programme = _Programme(c, D, kind, planes)
-    x = programme.start()
+    x = before = programme.start()
     mu = 1.0
     for _ in range(_NEWTON_STEPS):
-        step, decrement = programme.newton_step(x, mu)
+        try:
+            step, decrement = programme.newton_step(x, mu)
+        except np.linalg.LinAlgError:
+            # inside its cones but for rounding: what the iterate before has proved stands
+            x = before
+            break
         length = 1.0 if np.isfinite(decrement) else 0.0
         while length > 1e-8 and not programme.inside(x + length * step):
             length *= 0.7
         if length <= 1e-8:
             break
         # a step cut at the boundary stops short of it, where the next Hessian would be singular
-        x = x + (length if length == 1 else 0.9 * length) * step
+        before, x = x, x + (length if length == 1 else 0.9 * length) * step
         # from this decrement on the iterate is near the central path, and mu may shrink
         if decrement < 0.5:
             # on the central path the gap is mu times the parameter of the barrier
