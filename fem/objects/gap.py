@@ -118,6 +118,11 @@ def grid_triangles(rows: int, columns: int, *, closed: bool = False) -> IntArray
     return np.concatenate([np.stack([a, b, a + columns], 1), np.stack([b, b + columns, a + columns], 1)])
 
 
+def edges_of(triangles: IntArray) -> IntArray:
+    """Points at both ends ``(3 m, 2)`` of the edges of ``triangles (m, 3)``, as each triangle runs through them."""
+    return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
 class NoContactError(ValueError):
     """The pad does not meet the object on its way."""
 

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS, MOST_TRIANGLES
 from softjaw.fem.objects.mesh_holes import named_place, without_holes
 
@@ -238,7 +238,7 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
 
 def _closed(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Pairs of triangles that share an edge ``(e,)``, ``(e,)``, and whether they run through it in the same sense."""
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = edges_of(triangles)
     forward = edges[:, 0] < edges[:, 1]
     unique, inverse, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
     if (count > 2).any():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
 SMALL_HOLE, LARGEST_HOLE = 0.02, 0.5  # of the object's diagonal: smaller are filled, larger refused, others get a lid
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
@@ -28,7 +28,7 @@ def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
     loops, size = border_loops(triangles), float(np.linalg.norm(np.ptp(points, axis=0)))
     if not loops:
         return points, triangles, np.zeros(len(triangles), dtype=bool), []
-    sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    sides = np.sort(edges_of(triangles), axis=1)
     taken = set(map(tuple, sides.tolist()))
     parts, is_lid = [triangles], [np.zeros(len(triangles), dtype=bool)]
     filled: list[str] = []
@@ -50,7 +50,7 @@ def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, 
             centre, new = lid(points, loop)
             points = np.concatenate([points, centre[None]])
         # the filling of the next hole must not use an edge of this one a third time
-        taken.update(map(tuple, np.sort(new[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).tolist()))
+        taken.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         parts.append(new)
     notes = [
         f"{what}: {len(where)} ({'; '.join(where[:MOST_PLACES])}{'; ...' if len(where) > MOST_PLACES else ''})"
@@ -70,7 +70,7 @@ def border_loops(triangles: IntArray) -> list[list[int]]:
 
     Neighbouring triangles may disagree about their sense: edges are joined whichever way they run.
     """
-    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    sides = edges_of(triangles)
     _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
     border = sides[np.sort(first[count == 1])]
     at: dict[int, list[int]] = {}

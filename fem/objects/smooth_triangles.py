@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
@@ -117,7 +117,7 @@ class SmoothTriangles:
 
 def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: float = CREASE_ANGLE) -> SmoothTriangles:
     """Smooth version of a closed mesh; edges that turn by more than ``crease_angle`` [deg] stay."""
-    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    pairs = edges_of(triangles)
     ordered = np.sort(pairs, axis=1)
     key, first, edge = np.unique(ordered[:, 0] * len(points) + ordered[:, 1], return_index=True, return_inverse=True)
     edge = edge.ravel()
@@ -133,19 +133,23 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     for end in (0, 1):
         # either side's corner at this end: an edge's two sides run through it in opposite senses
         starts = pairs[halves, 0] == ordered[first][:, end : end + 1]
-        own = np.where(starts, halves, 3 * (halves // 3) + (halves % 3 + 1) % 3)
+        own = np.where(starts, halves, _following(halves))
         p, q = points[ordered[first][:, end]], points[ordered[first][:, 1 - end]]
         inner[:, end] = p + _tangent(q - p, corner_normals[own[:, 0]], corner_normals[own[:, 1]]) / 3
     return SmoothTriangles(points, triangles, ordered[first], edge.reshape(-1, 3), inner, crease)
+
+
+def _following(halves: IntArray) -> IntArray:
+    """The next side of the same triangle, of sides numbered 3 * triangle + corner."""
+    return 3 * (halves // 3) + (halves % 3 + 1) % 3
 
 
 def _corner_normals(
     points: FloatArray, triangles: IntArray, area: FloatArray, normal: FloatArray, smooth: IntArray
 ) -> FloatArray:
     """Unit normal ``(3 m, 3)`` at each triangle's corners: the mean over the faces joined across smooth edges."""
-    following = lambda half: 3 * (half // 3) + (half % 3 + 1) % 3  # noqa: E731
     one, two = smooth.T
-    links = np.concatenate([one, following(one)]), np.concatenate([following(two), two])
+    links = np.concatenate([one, _following(one)]), np.concatenate([_following(two), two])
     m = triangles.size
     group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(m, m)), directed=False)[1]
     x = points[triangles]

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
 LEAF = 4  # triangles in the smallest boxes
 DEPTH = 128  # of the stack; a tree of 500 000 triangles is 18 deep
@@ -211,7 +211,7 @@ def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray,
     at_corner = np.stack([
         np.bincount(triangles.ravel(), (angle * normal[:, d : d + 1]).ravel(), len(points)) for d in range(3)
     ], axis=1)  # fmt: skip
-    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = np.sort(edges_of(triangles), axis=1)
     key, edge, times = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True, return_counts=True)
     edge = edge.ravel()
     at_edge = np.stack([np.bincount(edge, np.repeat(normal[:, d], 3), len(key)) for d in range(3)], axis=1)
