@@ -149,9 +149,16 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def with_sampled_grasps(scene: Scene) -> Scene:
-    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`."""
+    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`.
+
+    Raises
+    ------
+    StudyError
+        For geometry that cannot be, or that leaves no grasp between the pads.
+    """
     if scene.candidates.sampler is None:
         return scene
+    check_object(scene)
     from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
 
     return sampler.with_sampled_grasps(scene)

@@ -37,14 +37,14 @@ def _mesh_size(options: Namespace) -> list[float]:
 
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
-    scene = scene_of(options)
+    scene = with_sampled_grasps(scene_of(options))
     check_object(scene)
     return hanging(scene_text(scene, options.scene), terminal_width())
 
 
 def plan(options: Namespace) -> str:
     """Say what a run will take."""
-    scene = scene_of(options)
+    scene = with_sampled_grasps(scene_of(options))
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
     lines = [plan_text(made, scene, path, options.ranks[0]), *(f"warning: {text}" for text in warnings(scene))]
@@ -63,12 +63,9 @@ def schema(_options: Namespace) -> str:
 def scene_of(options: Namespace) -> Scene:
     """The scene that the command line names, with what it changes."""
     try:
-        scene = load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
     except SceneError as error:
         raise StudyError(USAGE, str(error)) from error
-    if scene.candidates.sampler:
-        check_object(scene)
-    return with_sampled_grasps(scene)
 
 
 def target(options: Namespace, scene: Scene) -> Path:

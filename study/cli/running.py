@@ -13,7 +13,7 @@ from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study import pipeline
 from softjaw.study.accuracy import cost as costing
 from softjaw.study.accuracy.target import settled
-from softjaw.study.case.build import check_object, warnings
+from softjaw.study.case.build import check_object, warnings, with_sampled_grasps
 from softjaw.study.case.model import check_poses
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.cli.results import summary
@@ -39,11 +39,12 @@ def run(options: Namespace) -> int:
 
 def cost(options: Namespace) -> None:
     """Measure what accuracy costs in time."""
-    costing.run(options, options.scene_read)
+    costing.run(options, with_sampled_grasps(options.scene_read))
 
 
 def with_target_met(scene: Scene, path: Path) -> tuple[Scene, Any]:
-    """The scene with what its target of accuracy chooses, and the choice; by one rank."""
+    """The scene with its sampled grasps and what its target of accuracy chooses, and the choice; by one rank."""
+    scene = with_sampled_grasps(scene)
     if scene.accuracy.e_n is None:
         return scene, None
     check_object(scene)
