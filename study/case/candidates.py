@@ -68,8 +68,18 @@ def axis_poses(station: float, angle: float, roll: float) -> tuple[Pose, Pose]:
 def explicit_poses(pose: GraspPose) -> tuple[Pose, Pose]:
     """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts."""
     approach = np.array(pose.approach) / np.linalg.norm(pose.approach)
-    across = np.array(pose.long_side) - np.dot(approach, pose.long_side) * approach
-    return opposed_poses(np.array(pose.point), approach, across / np.linalg.norm(across))
+    return opposed_poses(np.array(pose.point), approach, across(approach, np.array(pose.long_side)))
+
+
+def across(approach: FloatArray, along: FloatArray) -> FloatArray:
+    """Unit vector ``(3,)`` of the part of ``along`` across the approach."""
+    part = along - np.dot(approach, along) * approach
+    return part / np.linalg.norm(part)
+
+
+def pad_axes(approach: FloatArray, long_side: FloatArray) -> FloatArray:
+    """Rotation of a pad: long side, short side and approach as columns ``(3, 3)``."""
+    return np.column_stack([long_side, np.cross(approach, long_side), approach])
 
 
 def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> tuple[Pose, Pose]:
@@ -91,8 +101,7 @@ def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray
 
 
 def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pose:
-    rotation = np.column_stack([long_side, np.cross(approach, long_side), approach])
-    return Pose(rotation, point - STANDOFF * approach)
+    return Pose(pad_axes(approach, long_side), point - STANDOFF * approach)
 
 
 def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:

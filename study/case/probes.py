@@ -13,7 +13,7 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.sampler import stiffness
+from softjaw.study.case.sampler import bed_closing, stiffness
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -190,11 +190,7 @@ class WinklerPad:
 
     def closing(self, force: float) -> float:
         """Closing displacement that carries a normal force [m]; the force is piecewise linear in it."""
-        h = np.sort(self.height[np.isfinite(self.height)])
-        count = np.arange(1, len(h) + 1)
-        # For the k lowest cells in contact the closing is known; the largest k that touches is right.
-        wanted = (force / (self.stiffness * self.area) + np.cumsum(h)) / count
-        return float(wanted[np.flatnonzero(wanted >= h)[-1]])
+        return bed_closing(self.height, force / (self.stiffness * self.area))
 
     def patch(self, force: float) -> ContactPatch:
         """Planar patch in the pad's frame at a normal force [N]."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import angle, slips
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
@@ -115,12 +116,10 @@ def height_fields(points, triangles, x, y):
 
 
 def axes_of(approach: FloatArray, along: FloatArray) -> FloatArray:
-    """Rotation with the long side (the part of ``along`` across the approach), short side and approach as columns."""
-    across = along - (along @ approach) * approach
-    if np.linalg.norm(across) < 1e-6:
-        across = np.eye(3)[np.argmin(np.abs(approach))] - approach[np.argmin(np.abs(approach))] * approach
-    long_side = across / np.linalg.norm(across)
-    return np.column_stack([long_side, np.cross(approach, long_side), approach])
+    """`pad_axes`; where ``along`` is the approach itself, the long side follows the axis that lies most across it."""
+    if np.linalg.norm(along - (along @ approach) * approach) < 1e-6:
+        along = np.eye(3)[np.argmin(np.abs(approach))]
+    return pad_axes(approach, across(approach, along))
 
 
 class Side:
@@ -131,7 +130,7 @@ class Side:
         self.height = height - self.touch
         self.x, self.y = np.meshgrid(x, y, indexing="ij")
         self.cell = (x[1] - x[0]) * (y[1] - y[0])
-        depth = _closing(np.sort(self.height[np.isfinite(self.height)]), jaws.force / (jaws.stiffness * self.cell))
+        depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
         filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
         self.slope = np.stack(np.gradient(filled, x, y), axis=-1)
@@ -166,13 +165,21 @@ class Side:
         return float((self.pressure * cosine).sum() / self.pressure.sum())
 
 
-def _closing(height: FloatArray, wanted: float) -> float:
-    """Closing at which springs that touch at ``height``, ascending [m], sum up to ``wanted`` [m]."""
-    goal = (wanted + np.cumsum(height)) / np.arange(1, len(height) + 1)
-    return float(goal[np.flatnonzero(goal >= height)[-1]])
+def stiffness(gripper: Gripper) -> float:
+    """Modulus of confined compression over the pad's thickness [Pa/m]."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
 
 
-class Grip:
+def bed_closing(height: FloatArray, wanted: float) -> float:
+    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
+    h = np.sort(height[np.isfinite(height)])
+    # for the k lowest springs in contact the closing is known; the largest k that touches is right
+    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
+    return float(closing[np.flatnonzero(closing >= h)[-1]])
+
+
+class JawsOnSurface:
     """Both pads on a surface, in one pose of the gripper."""
 
     def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
@@ -223,7 +230,9 @@ class Grip:
         return bool(low.min() < self.sides[0].touch - depth or high.max() > -self.sides[1].touch + depth)
 
 
-def straightened(surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> Grip:
+def straightened(
+    surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws
+) -> JawsOnSurface:
     """Turn and shift a gripper until both pads meet the object squarely and in their middles, or a few rounds are over.
 
     Raises
@@ -231,29 +240,28 @@ def straightened(surface: tuple[FloatArray, IntArray], point: FloatArray, axes: 
     NoContactError
         Where the pads pass the object.
     """
-    grip = Grip(surface, point, axes, jaws)
+    grip = JawsOnSurface(surface, point, axes, jaws)
     for _ in range(TURNS):
         tilt, shift = grip.tilt, grip.shift
         approach = grip.axes @ tilt
-        depth = 0.5 * (
-            grip.sides[0].touch - grip.sides[1].touch
-        )  # the middle between both contacts, along the approach
+        # the middle between both contacts, along the approach
+        depth = 0.5 * (grip.sides[0].touch - grip.sides[1].touch)
         point = grip.point + grip.axes @ np.array([*shift, depth])
         axes = axes_of(approach / np.linalg.norm(approach), grip.axes[:, 0])
         done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < CENTRED
-        grip = Grip(surface, point, axes, jaws)
+        grip = JawsOnSurface(surface, point, axes, jaws)
         if done:
             break
     return grip
 
 
-def same_place(one: Grip, other: Grip) -> bool:
+def same_place(one: JawsOnSurface, other: JawsOnSurface) -> bool:
     """Whether two grips are so near that both would lead to the same grasps."""
     near = np.linalg.norm(one.point - other.point) < 0.5 * APART * one.jaws.pad[0]
     return bool(near and abs(one.axes[:, 2] @ other.axes[:, 2]) > math.cos(0.5 * ALIKE))
 
 
-def long_sides(grip: Grip, own: FloatArray) -> list[FloatArray]:
+def long_sides(grip: JawsOnSurface, own: FloatArray) -> list[FloatArray]:
     """Directions for the pads' long side, in space: the flattest of the surface and the one across it.
 
     Where the surface curves alike every way, the object's own longest axis ``own`` decides.
@@ -296,10 +304,12 @@ def antipodal_grasps(
         Of the points where grasps are looked for; the same seed gives the same grasps on every machine.
     """
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
-    own = longest_axis(points, triangles)
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # twice the area long
+    own = longest_axis(corners, np.linalg.norm(normals, axis=1))
     seen: list[SampledGrasp] = []
-    starts: list[Grip] = []
-    for place, normal in sampled(points, triangles, samples, seed):
+    starts: list[JawsOnSurface] = []
+    for place, normal in sampled(corners, normals, samples, seed):
         try:
             start = straightened((points, triangles), place, axes_of(-normal, own), jaws)
             if any(same_place(start, other) for other in starts):
@@ -313,33 +323,32 @@ def antipodal_grasps(
     return thinned(seen, count, jaws.pad[0])
 
 
-def sampled(points: FloatArray, triangles: IntArray, count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:
-    """Points spread evenly over the area of a surface, with the normals of their triangles."""
-    corners = points[triangles]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
+def sampled(corners: FloatArray, normals: FloatArray, count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:
+    """Points spread evenly over the area of triangles ``corners (m, 3, 3)``, with the normals of their triangles.
+
+    ``normals (m, 3)`` are as long as the triangles are large.
+    """
+    area = np.linalg.norm(normals, axis=1)
     rng = np.random.default_rng(seed)
     # one point in each of `count` equal shares of the area: fewer gaps than independent points have
     share = (np.arange(count) + rng.random(count)) / count * area.sum()
-    chosen = np.minimum(np.searchsorted(np.cumsum(area), share), len(triangles) - 1)
+    chosen = np.minimum(np.searchsorted(np.cumsum(area), share), len(corners) - 1)
     u, v = rng.random((2, count))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     a, b, c = corners[chosen].transpose(1, 0, 2)
     place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return list(zip(place, cross[chosen] / area[chosen, None], strict=True))
+    return list(zip(place, normals[chosen] / area[chosen, None], strict=True))
 
 
-def longest_axis(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Direction in which a surface extends furthest: the first principal axis of its area ``(3,)``."""
-    corners = points[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
+    """Direction in which triangles ``corners (m, 3, 3)`` extend furthest: the first principal axis of their area."""
     middle = corners.mean(axis=1)
     off = middle - area @ middle / area.sum()
     axis = np.linalg.eigh((off * area[:, None]).T @ off)[1][:, -1]
     return axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
 
 
-def judged(grip: Grip) -> SampledGrasp:
+def judged(grip: JawsOnSurface) -> SampledGrasp:
     """State and rank of a grasp: the weaker finger's torque arm, less what curvature and misalignment take."""
     normals, line = grip.misalignment
     quality = min(side.arm * side.kept for side in grip.sides) * max(0.0, 1.0 - normals / WORST)
@@ -379,14 +388,8 @@ def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
 # --- scenes -----------------------------------------------------------------------------------------------------------
 
 
-def stiffness(gripper: Gripper) -> float:
-    """Modulus of confined compression over the pad's thickness [Pa/m]."""
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
-
-
 def with_sampled_grasps(scene: Scene) -> Scene:
-    """The scene with the grasps that its sampler finds as explicit poses; as it is where it has no sampler.
+    """The scene with the grasps that its sampler finds as explicit poses.
 
     Poses are rounded to 1 um and 1e-6, so that they are the same on every machine.
 
@@ -395,8 +398,6 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     StudyError
         Where no grasp fits between the pads.
     """
-    if scene.candidates.sampler is None:
-        return scene
     gripper, forces = scene.gripper, scene.load.normal_force
     jaws = Jaws(
         gripper.pad_size, stiffness(gripper), scene.friction.mu, forces[len(forces) // 2],

@@ -9,8 +9,8 @@ import trimesh
 from softjaw.study.case.sampler import (
     COLLIDES,
     WIDE,
-    Grip,
     Jaws,
+    JawsOnSurface,
     antipodal_grasps,
     axes_of,
     height_fields,
@@ -75,15 +75,15 @@ def test_inner_walls_holes_and_windings_do_not_count():
     outer, inner = trimesh.creation.icosphere(4, 0.03), trimesh.creation.icosphere(4, 0.028)
     hollow = trimesh.util.concatenate([outer, inner])
     turned = surface(outer)[0], surface(outer)[1][:, ::-1]
-    grip = Grip(surface(outer), np.zeros(3), np.eye(3), JAWS)
+    grip = JawsOnSurface(surface(outer), np.zeros(3), np.eye(3), JAWS)
     for other in (surface(hollow), turned):
-        same = Grip(other, np.zeros(3), np.eye(3), JAWS)
+        same = JawsOnSurface(other, np.zeros(3), np.eye(3), JAWS)
         np.testing.assert_allclose(same.sides[0].pressure, grip.sides[0].pressure, atol=1e-6)
         assert same.opening == pytest.approx(grip.opening, rel=1e-12)
 
 
 def test_the_pressure_carries_the_force_and_is_symmetric_on_a_ball():
-    grip = Grip(surface(trimesh.creation.icosphere(5, 0.03)), np.zeros(3), np.eye(3), JAWS)
+    grip = JawsOnSurface(surface(trimesh.creation.icosphere(5, 0.03)), np.zeros(3), np.eye(3), JAWS)
     for side in grip.sides:
         assert side.pressure.sum() * side.cell == pytest.approx(JAWS.force, rel=1e-12)
         np.testing.assert_allclose(side.centre, 0.0, atol=1e-5)
@@ -96,8 +96,8 @@ def test_fingers_that_are_larger_than_the_pads_meet_a_step():
     rim.apply_translation([0.035, 0, 0])
     body = surface(trimesh.util.concatenate([plate, rim]))
     pose = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
-    assert not Grip(body, np.zeros(3), pose, JAWS).collides()
-    assert Grip(body, np.zeros(3), pose, Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).collides()
+    assert not JawsOnSurface(body, np.zeros(3), pose, JAWS).collides()
+    assert JawsOnSurface(body, np.zeros(3), pose, Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).collides()
     assert COLLIDES
 
 
