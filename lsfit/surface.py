@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntFlag
@@ -39,20 +40,20 @@ ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface it
 OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the body does not carry it
 
 
-class LimitSurface:
+class LimitSurface(ABC):
     """Level set ``P(w) = 1`` of a positive homogeneous function, symmetric about the origin, in ``d`` dimensions."""
 
     flag: FitFlag
 
     @property
+    @abstractmethod
     def degree(self) -> int:
         """Degree of ``P``."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def dimension(self) -> int:
         """Number of components ``d`` of a wrench."""
-        raise NotImplementedError
 
     @property
     def span(self) -> FloatArray:
@@ -65,35 +66,35 @@ class LimitSurface:
         return self.span.shape[1]
 
     @property
+    @abstractmethod
     def volume(self) -> float:
         """Volume of the body; 0 if it is flat."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def shadow_area(self) -> float:
         """Area of the body's shadow on the plane of the first two components."""
-        raise NotImplementedError
 
     @cached_property
     def semi_axes(self) -> FloatArray:
         """Largest reach ``(d,)`` along each component."""
         return self.support(np.eye(self.dimension))
 
+    @abstractmethod
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
-        raise NotImplementedError
 
+    @abstractmethod
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P``, the direction of motion, ``(m, d) -> (m, d)``; within the span of a flat body."""
-        raise NotImplementedError
 
+    @abstractmethod
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def scaled(self, factors: ArrayLike) -> LimitSurface:
         """Image of the body under ``w -> factors * w``, for other units, ``(d,)``, factors not zero."""
-        raise NotImplementedError
 
     def radius(self, u: ArrayLike) -> FloatArray:
         """Factor that brings ``u`` onto the surface, ``P(u)^(-1 / degree)``, ``(m, d) -> (m,)``."""

@@ -161,6 +161,12 @@ def _root(B: FloatArray) -> FloatArray:
     return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
 
 
+def check_kind(kind: str) -> None:
+    """Refuse a metric of the normal forces that is neither "linf" nor "l1"."""
+    if kind not in ("linf", "l1"):
+        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
+
+
 def touching_points(body: Body, t: ArrayLike) -> FloatArray:
     """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
     T = np.atleast_2d(np.asarray(t, float))

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 from scipy.special import ndtri
 
-from softjaw.scoring.bodies import Body, ellipsoid_matrix, ellipsoid_near, joint_support, touching_points
+from softjaw.scoring.bodies import Body, check_kind, ellipsoid_matrix, ellipsoid_near, joint_support, touching_points
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.gauge import facing
 
@@ -72,8 +72,7 @@ def ray_volume(
     RayVolume
         Volume 0 if all wrenches lie in less than 6 dimensions; ``high`` if a body is no ellipsoid, see above.
     """
-    if kind not in ("linf", "l1"):
-        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
+    check_kind(kind)
     if len(contacts) < 2 or rays < 1 or corners < 16:
         raise ValueError(
             f"{len(contacts)} contacts, {rays} rays, {corners} corners: take at least 2 contacts, 1 ray, 16 corners"

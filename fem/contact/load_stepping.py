@@ -21,6 +21,7 @@ path.
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -84,7 +85,7 @@ class Work:
     halvings: int = 0
 
 
-class LoadPath:
+class LoadPath(ABC):
     """What follows a load path with one solver, and may continue with another problem where it has no solution."""
 
     solver: NonlinearSolver
@@ -93,9 +94,9 @@ class LoadPath:
         """Set up the solver."""
         self._set_up()
 
+    @abstractmethod
     def _set_up(self) -> None:
         """Make `solver` for the problem as it is now."""
-        raise NotImplementedError
 
     def _start_again(self) -> None:
         """Set up another solver after a change of the problem; its clock continues."""

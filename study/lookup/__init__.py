@@ -33,8 +33,6 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.units import UNITS
 
-NUMBER = (float, int)
-
 
 class GraspMap:
     """A result file as a function of station [m], angle [rad] and normal force [N].
