@@ -12,17 +12,21 @@ from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import StoredAxis
 from tests.study.sealing import sealed
 
-SCENE = """
+OBJECT = """
 [object]
 shape = "elliptic_cylinder"
 semi_axis_a_mm = 25
 semi_axis_b_mm = 20
 length_mm = 100
-[candidates]
+"""
+SCENE = (
+    OBJECT
+    + """[candidates]
 stations_mm = [0, 10]
 [load]
 normal_force_n = [1, 5]
 """
+)
 SKELETONS: dict[str, bytes] = {}  # files without values: to copy one is ten times faster than to make it
 STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(6) * np.pi / 6, np.array([1.0, 2.0, 4.0, 8.0])
 

@@ -11,17 +11,14 @@ from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import StoredAxis
 from softjaw.study.result.write import ResultWriter, record
+from tests.study.formula_results import OBJECT
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
 CLOSING, PRESSURE = 2e-3, 3e4
-SCENE = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-[gripper]
+SCENE = (
+    OBJECT
+    + """[gripper]
 elements = [2, 2, 2]
 [candidates]
 stations_mm = [-20, 0, 20]
@@ -29,6 +26,7 @@ angles_deg = [0, 90]
 [load]
 normal_force_n = [1, 5]
 """
+)
 FAILED = (2, 1, 1)
 
 

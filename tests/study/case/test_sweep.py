@@ -8,30 +8,25 @@ import pytest
 
 from softjaw.study.case import candidates
 from softjaw.study.scene import load_scene, parse_scene
+from tests.study.formula_results import OBJECT
 
 JOBS = Path(__file__).parents[3] / "jobs"
 Z = np.array([0.0, 0.0, 1.0])
-CYLINDER = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-[candidates]
+CYLINDER = (
+    OBJECT
+    + """[candidates]
 stations_mm = [-10, 0, 30]
 angles_deg = [0, 30, 90, 180, 210, 360]
 [load]
 normal_force_n = [1, 2, 5]
 """
-POSES = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-[load]
+)
+POSES = (
+    OBJECT
+    + """[load]
 normal_force_n = [1]
 """
+)
 
 
 def poses(*given):

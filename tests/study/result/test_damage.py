@@ -24,16 +24,13 @@ from softjaw.study.result.write import ResultWriter, record, verify
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.report.verdict import plain_report
+from tests.study.formula_results import OBJECT
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
-SCENE = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-mass_g = 50
+SCENE = (
+    OBJECT
+    + """mass_g = 50
 [gripper]
 elements = [4, 4, 2]
 [candidates]
@@ -42,6 +39,7 @@ angles_deg = [0]
 [load]
 normal_force_n = [1, 2]
 """
+)
 COMMANDS = {
     "status": ("status",),
     "status --json": ("status", "--json"),

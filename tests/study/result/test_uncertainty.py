@@ -25,15 +25,11 @@ from softjaw.study.show.tables.certainty import Sure, sure, verdict
 from softjaw.study.show.tables.compare import compare
 from softjaw.study.show.tables.export import cases
 from softjaw.study.show.tables.show import as_text, best
-from tests.study.formula_results import grid_axes, make
+from tests.study.formula_results import OBJECT, grid_axes, make
 
-BALL = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-[gripper]
+BALL = (
+    OBJECT
+    + """[gripper]
 elements = [8, 4, 3]
 [candidates]
 stations_mm = [-10, 0, 20]
@@ -41,6 +37,7 @@ angles_deg = [0, 90]
 [load]
 normal_force_n = [1, 2, 4]
 """
+)
 ALL = ("uncertainty.mesh=true", "uncertainty.mu=0.05", "uncertainty.shear_modulus_percent=10", "uncertainty.pose_mm=1")
 
 

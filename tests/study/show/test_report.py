@@ -28,20 +28,18 @@ from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report
 from softjaw.study.show.tables.show import best
 from softjaw.study.show.view.model import read_scene
+from tests.study.formula_results import OBJECT
 
 ROOT = Path(__file__).parent.parent.parent
 FACES = (6, 4)
-SCENE = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-[candidates]
+SCENE = (
+    OBJECT
+    + """[candidates]
 stations_mm = [0, 10, 20, 30]
 [load]
 normal_force_n = [1, 5]
 """
+)
 SWEEP = SCENE + '[sweep]\n"object.semi_axis_b_mm" = [10, 25, 50]\n'
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
