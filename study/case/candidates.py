@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.study.case.build import own_frame
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -42,8 +43,9 @@ def candidates(scene: Scene) -> list[Candidate]:
     """The grasp candidates in the order of their rows: stations, then angles at each."""
     where = scene.candidates
     if where.poses:
+        placed = own_frame(scene.object)
         return [
-            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), label)
+            Candidate(float(i), 0.0, 0.0, explicit_poses(pose, placed), label)
             for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
     places = product(where.station_values, where.angles)
@@ -65,10 +67,14 @@ def axis_poses(station: float, angle: float, roll: float) -> tuple[Pose, Pose]:
     return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
 
 
-def explicit_poses(pose: GraspPose) -> tuple[Pose, Pose]:
-    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts."""
-    approach = np.array(pose.approach) / np.linalg.norm(pose.approach)
-    return opposed_poses(np.array(pose.point), approach, across(approach, np.array(pose.long_side)))
+def explicit_poses(pose: GraspPose, placed: Pose) -> tuple[Pose, Pose]:
+    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts.
+
+    ``placed`` is where the object's frame lies in that of its file, in which the grasp is given.
+    """
+    approach = (np.array(pose.approach) / np.linalg.norm(pose.approach)) @ placed.rotation
+    long_side = across(approach, np.array(pose.long_side) @ placed.rotation)
+    return opposed_poses(placed.to_pad(np.array(pose.point)), approach, long_side)
 
 
 def across(approach: FloatArray, along: FloatArray) -> FloatArray:

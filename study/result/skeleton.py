@@ -150,6 +150,9 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
         study[name].attrs["long_name"] = label
     study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
+    # Stations and angles count in the object's frame, poses are in that of its mesh file.
+    if header.placed is not None:
+        study["scene"].attrs.update(object_rotation=header.placed.rotation, object_origin=header.placed.origin)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
