@@ -80,11 +80,14 @@ class View:
         """State of every candidate at a force ``(c,)``."""
         return self.over_candidates(self.ds.status.values, force)
 
-    def coloured(self, name: str) -> tuple[np.ndarray, tuple[float, float]]:
-        """A map in the displayed unit, over all axes, and its smallest and largest value at this point."""
+    def coloured(self, name: str) -> tuple[np.ndarray, list[tuple[float, float]]]:
+        """A map in the displayed unit, over all axes, and its smallest and largest value here at every force.
+
+        Grasps are compared at one force: over all forces together their differences would hardly be seen.
+        """
         found = field(self.ds, name)
         values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
-        return values, span(values[self.point])
+        return values, [span(values[self.point][..., k]) for k in range(values.shape[-1])]
 
     # --- the object, drawn in the frame in which its axis is z ---
 
