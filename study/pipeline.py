@@ -37,7 +37,8 @@ def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             else:
-                yield k, _probed(_result(scene, settings, solving, outcome), probing)
+                result = _result(scene, settings, solving, outcome)
+                yield k, _probed(result, probing, unit.candidate.note)
     finally:
         probing.close()
         solving.destroy()
@@ -64,13 +65,13 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     )
 
 
-def _probed(result: CaseResult, probing: Probing) -> CaseResult:
-    """The result with what the further solves of a probe give, and their time."""
+def _probed(result: CaseResult, probing: Probing, note: str) -> CaseResult:
+    """The result with what the further solves of a probe give, and their time, and a note on the candidate."""
     start = time.perf_counter()
     values = result.values | probing.values()
     for name in ("rest", "total"):
         values[f"work/seconds_{name}"] += time.perf_counter() - start
-    message = "; ".join(text for text in (result.message, *probing.failures) if text)
+    message = "; ".join(text for text in (result.message, note, *probing.failures) if text)
     return replace(result, values=values, message=message)
 
 
