@@ -15,8 +15,10 @@ MODELS = ("ccm", "pcm", "pcm_projected")
 MODEL_NAMES = dict(zip(MODELS, ("CCM", "PCM", "PCM scaled by F_N"), strict=True))  # in legends and captions
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("not computed", "complete", "failed")  # of a case, by these codes:
-MISSING, DONE, FAILED = range(3)
+# States of a case, by these codes. From WIDE on there is no grasp worth a solve: neither solved nor failed.
+STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips", "not among the best")
+MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
+NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
@@ -359,7 +361,7 @@ TABLE = (
     # how the case stands
     Quantity("code", (), "", "state of the case", "Whether it has values.", "status", meanings=STATES),
     Quantity("attempts", (), "", "times this case was begun", "Without coming to an end, or with.", "status"),
-    Quantity("message", (), "", "why a case failed, or what to know about a result", "Empty where all is said.",
+    Quantity("message", (), "", "why a case has no result, or what to know about one", "Empty where all is said.",
              "status"),
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))

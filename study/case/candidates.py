@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.build import middle_of, own_frame
+from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -224,6 +225,8 @@ class Unit:
         Work, in element solves; only ratios mean something.
     probe : bool
         Whether it is solved again with inputs changed, as `study.case.probing` does.
+    state, reason : int, str
+        One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
     """
 
     index: int
@@ -234,6 +237,8 @@ class Unit:
     turns: tuple[float, ...]
     cost: float
     probe: bool = False
+    state: int = MISSING
+    reason: str = ""
 
 
 def axes(scene: Scene) -> list[Axis]:

@@ -19,6 +19,8 @@ Count = Annotated[int, Field(ge=2, le=400)]
 Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
 Extent = Annotated[float, Field(ge=0, le=500)]
 Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
+FingerSide = Annotated[float, Field(ge=1, le=1000)]
+FingerSize = Annotated[tuple[FingerSide, FingerSide], Field(strict=False)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
@@ -53,7 +55,12 @@ class Gripper(SceneSection):
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
     grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
     max_opening_mm: float | None = Field(
-        None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not sampled"
+        None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
+    )
+    finger_size_mm: FingerSize | None = Field(
+        None,
+        description="length and width of what carries a pad, left out where it is the pad's own",
+        examples=[[60, 25]],
     )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
@@ -62,6 +69,7 @@ class Gripper(SceneSection):
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     max_opening: ClassVar[Any] = si("max_opening_mm")
+    finger_size: ClassVar[Any] = si("finger_size_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
     sheet_support: ClassVar[Any] = si("sheet_support_mm")
 
@@ -88,6 +96,10 @@ class Gripper(SceneSection):
     def findings(self) -> Iterator[Finding]:
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
         yield from self._hyperfoam_findings() if self.material == "hyperfoam" else self._material_findings()
+        pad = (self.pad_length_mm, self.pad_width_mm)
+        if self.finger_size_mm and any(own < least for own, least in zip(self.finger_size_mm, pad, strict=True)):
+            found, expected = shown(list(self.finger_size_mm)), f"at least the pad's, {shown(list(pad))}"
+            yield Finding(("finger_size_mm",), found, expected, "length comes first; leave it out for the pad's size")
         n = self.elements
         for i in (0, 1):
             if n[i] % 2 and self.grading[i] != 1:

@@ -16,9 +16,8 @@ from softjaw.study.case.build import own_frame
 from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
-from softjaw.study.quantities import ALONG, AROUND, TABLE
+from softjaw.study.quantities import ALONG, AROUND, DONE, FAILED, NO_GRASP, STATES, TABLE
 from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
-from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene import SceneError, parse_scene
@@ -201,8 +200,8 @@ class View:
         """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""
         lines = [f"candidate {candidate_of(self.ds, index)}: {place(self.ds, index, force=True)}"]
         state = self.ds.status.values[index]
-        if state == FAILED:
-            return [*lines, f"failed: {self.ds.message.values[index] or 'no reason was given'}"]
+        if state == FAILED or state in NO_GRASP:
+            return [*lines, f"{STATES[state]}: {self.ds.message.values[index] or 'no reason was given'}"]
         if state != DONE:
             return [*lines, "not computed yet"]
         for key in dict.fromkeys((name, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation")):
@@ -214,7 +213,9 @@ class View:
 
     def legend(self, index: Index, motion: str) -> list[str]:
         """What colours and marks of the picture of a case mean."""
-        marks = "balls: where the fingers first touch" if self.ds.attrs["poses"] else "light grey: no candidate there"
+        marks = "light grey: no candidate there, or no grasp"
+        if self.ds.attrs["poses"]:
+            marks = "balls: where the fingers first touch"
         wall = ["the wall is deformed as computed, not exaggerated"] * (self.displacement(index) is not None)
         return [f"blue: friction of the pads' faces against {SLIPS[motion]}", marks, "dark grey: failed",
                 "grey: not computed", *wall, *[self.note] * bool(self.note)]  # fmt: skip
