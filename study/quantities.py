@@ -261,10 +261,10 @@ TABLE = (
     Quantity("frame_flag", F, "", "flag of the contact frame",
              "0: regular; otherwise a rule for a degenerate patch chose the frame.", "fingers"),
     Quantity("pose_rotation", (*F, "component", "component_2"), "", "rotation of the pad",
-             "x_object = rotation x_pad + origin.", "fingers"),
+             "x = rotation x_pad + origin, in the frame of the object's own file.", "fingers"),
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
-             "Centre of the undeformed contact face at first touch, in the object's frame; under load the pad's back "
-             "has moved on by the closing displacement, along its z axis.", "fingers"),
+             "Centre of the undeformed contact face at first touch, in the frame of the object's own file; under load "
+             "the pad's back has moved on by the closing displacement, along its z axis.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
     Quantity("adhesion", F, "", "largest adhesion",
@@ -329,9 +329,9 @@ TABLE = (
              "As fit error, over the motions it was fitted to.", "limit_surface", needs="six components"),
     # deformed wall
     Quantity("place", ("wall_place", "component"), "m", "deformed wall",
-             f"Outer face in the object's frame at {AROUND} angles about the axis, in equal steps from finger 1's,"
-             f" times {ALONG} places along the outline, in equal steps of its arc length from the bottom's middle or"
-             " rim to the top; the angle runs slowest.", "wall", needs="wall"),
+             f"Outer face in the frame of the object's own file at {AROUND} angles about the axis, in equal steps from"
+             f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
+             " middle or rim to the top; the angle runs slowest.", "wall", needs="wall"),
     # large arrays
     Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
              "Friction (f_x, f_y, tau_z) of the CCM in the contact frame, for turns about the points of a"

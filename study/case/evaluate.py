@@ -26,6 +26,7 @@ from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.scoring.task import hold_task, weight_wrench
+from softjaw.study.case.build import own_frame
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.flags import raised
@@ -86,8 +87,10 @@ def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
     weight = None
     if scene.object.mass is not None:
-        centre = scene.task.centre_of_mass or np.mean(obj.bounds, axis=0)
-        weight = weight_wrench(scene.object.mass, scene.task.weight_direction, centre)
+        placed, centre = own_frame(scene.object), np.mean(obj.bounds, axis=0)
+        if scene.task.centre_of_mass:
+            centre = placed.to_pad(np.array(scene.task.centre_of_mass))
+        weight = weight_wrench(scene.object.mass, np.array(scene.task.weight_direction) @ placed.rotation, centre)
     return EvaluationSettings(
         *lengths(scene, obj), scene.limit_surface, weight, scene.friction.cor_grid,
         epsilon_everywhere=scene.score.epsilon == "everywhere", graspit=scene.score.graspit,

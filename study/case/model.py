@@ -195,7 +195,8 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
     if missed:
         lines = [
             f"candidates.poses[{i}]: found '{places[i].label}', where {who} the object; expected a line of"
-            " approach on which both pads meet it; change point_mm (in mm, in the object's frame) or approach"
+            " approach on which both pads meet it; change point_mm (in mm, in the frame of the object's own file) or"
+            " approach"
             for i, who in list(missed.items())[:MOST_NAMED]
         ]
         more = [f"and {len(missed) - MOST_NAMED} more poses pass the object"] if len(missed) > MOST_NAMED else []

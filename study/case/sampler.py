@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import angle, slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
@@ -368,7 +369,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     """
     obj = build_object(scene.object)
     found = antipodal_grasps(obj.surface(), jaws_of(scene), scene.candidates.count, scene.candidates.seed)
-    poses = tuple(_as_pose(grasp) for grasp in found if not grasp.state)
+    placed = own_frame(scene.object)
+    poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
         states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads pass the object"]
         raise StudyError(
@@ -379,9 +381,10 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     return scene.model_copy(update={"candidates": Candidates(poses=poses)})
 
 
-def _as_pose(grasp: SampledGrasp) -> GraspPose:
-    place = _rounded([converted(float(x), "m", "mm") for x in grasp.point], 3)
-    approach, long_side = _rounded(grasp.approach, 6), _rounded(grasp.long_side, 6)
+def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:
+    """A grasp in the frame of the object's own file, as a scene gives it."""
+    place = _rounded([converted(float(x), "m", "mm") for x in placed.to_object(grasp.point)], 3)
+    approach, long_side = (_rounded(placed.rotation @ v, 6) for v in (grasp.approach, grasp.long_side))
     label = f"{place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f} mm, {_angle_text(approach)}"
     return GraspPose(point_mm=place, approach=approach, long_side=long_side, label=label)
 

@@ -22,6 +22,7 @@ from softjaw.study.result.layout import ROOT, Layout
 BLOCK = 2**24  # bytes of rows that are put side by side at a time
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
+PLACED = ("object_rotation", "object_origin")
 
 
 def of_array(values: Any) -> int:
@@ -93,6 +94,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
         parts.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+        parts += [np.asarray(found[key]).tolist() for key in PLACED if key in found]
         parts += [[str(text) for text in found["options"]]] if "options" in found else []
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]

@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
-from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, pad_shape
+from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_shape
 from softjaw.study.case.fit import decided
 from softjaw.study.case.variations import changes, probe_candidates, with_probes
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
@@ -64,7 +64,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
-    surface = surface_of(scene, axes)
+    surface, placed = surface_of(scene, axes), own_frame(scene.object)
     units = decided(grasps.units(scene, lambda point: point.axis_symmetry))
     probes = probe_candidates(scene, units)
     header = Header(
@@ -75,7 +75,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        surface=surface,
+        surface=surface._replace(points=placed.to_object(surface.points)),
+        placed=placed,
     )
     layout = Layout(
         axes,

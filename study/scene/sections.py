@@ -228,9 +228,11 @@ class LimitSurfaceKeys(SceneSection):
 class TaskKeys(SceneSection):
     """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
 
-    weight_direction: Direction = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
+    weight_direction: Direction = Field(
+        (0.0, 0.0, -1.0), description="direction of the weight in the frame of the object's own file"
+    )
     centre_of_mass_mm: Vector | Literal["auto"] = Field(
-        "auto", description="centre of mass [x, y, z]; auto is the middle of the box round the object"
+        "auto", description="centre of mass [x, y, z] in the same frame; auto is the middle of the box round the object"
     )
     centre_of_mass: ClassVar[Any] = si("centre_of_mass_mm")
 

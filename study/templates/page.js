@@ -58,7 +58,7 @@ function object3d(div, all) {
       into[3].push(v == null ? all.colours[c < 0 || all.states[at.force][c] === 1 || all.states[at.force][c] > 2 ? 0 : all.states[at.force][c] ? 2 : 1] : v);
     }
     const names = Array.from(owner, told), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
-    const scale = q ? {cmin: q.low, cmax: q.high, colorscale: q.scale} : {}, [one, other, marks] = div.data;
+    const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other, marks] = div.data;
     Object.assign(one, base, {i: shown[0], j: shown[1], k: shown[2], intensity: shown[3], visible: shown[3].length > 0}, scale);
     Object.assign(other, base, {i: rest[0], j: rest[1], k: rest[2], facecolor: rest[3], visible: rest[3].length > 0});
     const balls = all.marks.points, of = all.marks.owner;

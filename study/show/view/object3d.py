@@ -127,11 +127,11 @@ def _packed(values: np.ndarray, kind: str) -> str:
 
 def _choice(view: View, name: str) -> dict[str, Any]:
     """A map that can be chosen."""
-    values, (low, high) = view.coloured(name)
+    values, limits = view.coloured(name)
     rows = [[float(f"{v:.6g}") if np.isfinite(v) else None for v in view.over_candidates(values, k)]
             for k in range(values.shape[-1])]  # fmt: skip
     title = label_of(view.ds, name)
-    return {"name": name, "title": title, "label": label(title), "low": low, "high": high, "values": rows,
+    return {"name": name, "title": title, "label": label(title), "limits": limits, "values": rows,
             "scale": plots.colours(name)}  # fmt: skip
 
 

@@ -61,11 +61,11 @@ def draw(plotter: Any, view: View, index: Index, quantity: str, motion: str) -> 
 
 
 def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
-    """The object in the colours of the map, over the map at all forces, deformed where the file has its wall."""
+    """The object in the colours of the map at this force, deformed where the file has its wall."""
     found, limits = view.coloured(quantity)
     values, state = view.over_candidates(found, index[-1]), view.state(index[-1])
     bar = {**BAR, "position_y": 0.55, "title": fill(label_of(view.ds, quantity), 22)}
-    colours = {"cmap": COLOURS.get(quantity, "viridis"), "clim": limits, "scalar_bar_args": bar}
+    colours = {"cmap": COLOURS.get(quantity, "viridis"), "clim": limits[index[-1]], "scalar_bar_args": bar}
     for name in ("object", "open", "failed", "none", "marks"):
         plotter.remove_actor(name, render=False)
     corners, cell = view.surface.triangles, view.surface.candidate
