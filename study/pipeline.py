@@ -108,6 +108,9 @@ def _state_values(contacts: Sequence[PressedContact]) -> dict[str, Any]:
     """What the solved states say beside their patches."""
     closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
+    one, two = (c.pose for c in contacts)
+    opening = float((two.origin - one.origin) @ one.rotation[:, 2])
+    values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}
     return values | {f"checks/{name}": [own[name] for own in checks] for name in checks[0]}
 
 

@@ -447,3 +447,21 @@ def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monke
     for _, path in found:
         assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in path] == [False, True, True]
         assert [("depends on the load path" in result.message) for result in path] == [False, True, True]
+
+
+TILTED = 2 * np.hypot(25e-3 * np.cos(np.pi / 6), 20e-3 * np.sin(np.pi / 6))  # between two tangents of the ellipse
+
+
+@pytest.mark.parametrize(
+    ("shape", "angle", "width", "rounding"),
+    [(BALL, 0, 60e-3, 1e-8), (OVAL, 0, 50e-3, 1e-8), (OVAL, 90, 40e-3, 1e-8), (OVAL, 30, TILTED, 2e-5)],
+)
+def test_the_opening_is_the_width_of_the_object_and_both_pads_close_it(shape, angle, width, rounding):
+    """At 30 degrees the place of first touch lies between the points that look for it, 1.1 mm apart."""
+    for values in cases(shape, angles=f"[{angle}]", forces="[2]"):
+        assert values["maps/opening"] == pytest.approx(width, abs=rounding)
+        closing = sum(values["fingers/closing"])
+        assert closing > 5e-4
+        assert values["maps/opening"] - values["maps/opening_loaded"] == pytest.approx(closing, abs=1e-15)
+        one, two = values["fingers/pose_origin"]
+        assert np.linalg.norm(two - one) == pytest.approx(values["maps/opening"], abs=1e-12)

@@ -101,7 +101,7 @@ def key_values(ds: xr.Dataset) -> list[tuple[str, str]]:
     if best is None:
         return []
     pairs = [("where", place(ds, best)), ("how hard", f"{_force(ds, best).replace(' ', NBSP)} per finger")]
-    if np.isfinite(opening := at(ds, "contact_distance", best)):
+    if np.isfinite(opening := at(ds, "opening", best)):
         pairs.insert(1, ("how wide (opening at first touch)", f"{number(1e3 * opening, 4)}\u00a0mm"))
     if "force_high" in ds:
         pairs.append(("safe forces [N]", safe_range(ds, best)))
