@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reason:
-    """A class of failures: its name, what its messages contain, and whether no better program could have solved it."""
+    """A class of failures: its name, what its messages contain, and what no better program could have changed."""
 
     name: str
     pattern: str
-    physics: bool = False
+    by: str = ""  # "physics", or "scene" where that is refused with good reason
 
 
 REASONS = (
@@ -20,18 +20,19 @@ REASONS = (
     Reason("killed at the time limit", r"time limit of"),
     Reason("a case took too long", r"may take|took too long|times the median|given up after"),
     Reason("a negative force as reason", r"(at|reached|of) -\d"),
-    Reason("foam loses ellipticity", r"^the foam loses ellipticity", physics=True),
-    Reason("pad compressed too far", r"^the pad is compressed too far", physics=True),
-    Reason("limit point", r"limit point|largest force that", physics=True),
+    Reason("foam loses ellipticity", r"^the foam loses ellipticity", "physics"),
+    Reason("pad compressed too far", r"^the pad is compressed too far", "physics"),
+    Reason("limit point", r"limit point|largest force that", "physics"),
     Reason("the pad jumps", r"the pad jumps|lies beyond the one"),
-    Reason("pad passes the object", r"passes the object|no pad meets|leaves the object", physics=True),
-    Reason("pad grazes the object", r"grazes the object", physics=True),
+    Reason("pad passes the object", r"passes the object|no pad meets|leaves the object", "physics"),
+    Reason("pad grazes the object", r"grazes the object", "physics"),
     Reason("no grasp found", r"found no grasp between"),
     Reason("no first contact", r"found no first contact"),
     Reason("state converged but is wrong", r"converged but is wrong"),
     Reason("closing falls", r"closing displacement falls"),
     Reason("force not reached", r"the force stays below"),
     Reason("stuck", r"stuck at"),
+    Reason("outline refused", r"profile's curve swings to the axis", "scene"),
     Reason("mesh refused", r"holes|cross itself|crosses itself|open edges"),
 )
 OTHER = Reason("other", "")

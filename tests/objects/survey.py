@@ -43,15 +43,16 @@ def said(words: list[str], folder: Path, limit: float) -> tuple[int | None, str]
     log = folder / "command.log"
     with log.open("w") as out:
         process = subprocess.Popen(words, cwd=folder, stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
-    stopped = False
-    for patience, kill in ((limit, signal.SIGTERM), (GRACE, signal.SIGKILL), (None, signal.SIGKILL)):
-        try:
-            process.wait(patience)
-            break
-        except subprocess.TimeoutExpired:
-            stopped = True
-            os.killpg(process.pid, kill)
-    return None if stopped else process.returncode, log.read_text(errors="replace")
+    try:
+        return process.wait(limit), log.read_text(errors="replace")
+    except subprocess.TimeoutExpired:
+        process.terminate()  # alone: mpirun passes it on, and waits for its ranks
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    return None, log.read_text(errors="replace")
 
 
 def file_name(name: str) -> str:
