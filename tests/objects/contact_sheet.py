@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from softjaw.study.show.view.solids import trimmed
 
 COLUMNS = 4
-OBJECT = (slice(None), slice(160, 930))  # rows and columns of such a picture without its scales and its text
+OBJECT = (slice(None), slice(200, 930))  # rows and columns of such a picture without its scales and its text
 
 
 def contact_sheet(pictures: dict[str, tuple[str, Path]], file: Path) -> None:
