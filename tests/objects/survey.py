@@ -19,7 +19,7 @@ from argparse import ArgumentParser, Namespace
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from softjaw.study.messages import DONE, SOME_FAILED
+from softjaw.study.messages import DONE, SOME_FAILED, StudyError
 from tests.objects.contact_sheet import contact_sheet
 from tests.objects.found import Found, of_file
 from tests.objects.objects_page import page
@@ -78,7 +78,10 @@ def survey_object(name: str, kind: str, make: Maker, options: Namespace) -> Foun
             break
     found.seconds = spent() - start
     if result.exists():
-        found.states, found.failures = of_file(result)
+        try:
+            found.states, found.failures = of_file(result)
+        except StudyError as error:
+            found.refused += f"the result cannot be read: {error}"
         found.best = look_at(file, folder, options.limit)
     return found
 
