@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.objects.centre_line import CentreLine, centre_line
 from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
@@ -28,6 +29,13 @@ from softjaw.study.scene.objects import Mesh, Walled
 def mesh_object(shape: Mesh) -> MeshObject:
     """The object of a mesh file; `ValueError` for a mesh that is open or crosses itself."""
     return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step, shape.crease_angle_deg)
+
+
+@lru_cache(maxsize=8)
+def middle_of(shape: Mesh, pad_length: float) -> CentreLine:
+    """Line through the middles of a mesh's sections, without waves that a pad of this length [m] would not follow."""
+    mesh = mesh_object(shape)
+    return centre_line(mesh.points, mesh.triangles, 0.5 * pad_length)
 
 
 def stacked(surface: OuterSurface) -> GapObject:

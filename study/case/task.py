@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.payload import GRAVITY, Payload, payload
+from softjaw.study.case.build import own_frame
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit
 from softjaw.study.flags import Flag
@@ -44,9 +45,11 @@ class Task:
 
 def task_of(scene: Scene, obj: Any) -> Task:
     """The task that a scene's sections ``[object]`` and ``[task]`` give."""
-    keys = scene.task
-    centre = centre_of_volume(obj) if keys.centre_of_mass is None else keys.centre_of_mass
-    return Task(centre, keys.direction, keys.drive, scene.object.mass)
+    keys, placed = scene.task, own_frame(scene.object)
+    given = keys.centre_of_mass
+    centre = centre_of_volume(obj) if given is None else placed.to_pad(np.array(given))
+    direction = None if keys.direction is None else np.array(keys.direction) @ placed.rotation
+    return Task(centre, direction, keys.drive, scene.object.mass)
 
 
 def centre_of_volume(obj: Any) -> FloatArray:

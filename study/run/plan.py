@@ -13,9 +13,10 @@ import numpy as np
 
 from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
-from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, pad_shape
+from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_shape
+from softjaw.study.case.fit import decided
 from softjaw.study.case.variations import changes, probe_candidates, with_probes
-from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.grid_surface import surface_of
 from softjaw.study.result.layout import Header, Layout
@@ -41,9 +42,14 @@ class Plan:
     units: tuple[Any, ...]
 
     @property
+    def tried(self) -> list[Any]:
+        """Units that are to be solved."""
+        return [unit for unit in self.units if not unit.state]
+
+    @property
     def costs(self) -> list[float]:
-        """Cost of every unit, in any unit of time."""
-        return [float(unit.cost) for unit in self.units]
+        """Cost of every unit that is tried, in any unit of time."""
+        return [float(unit.cost) for unit in self.tried]
 
     @property
     def served(self) -> int:
@@ -58,8 +64,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
-    surface = surface_of(scene, axes)
-    units = grasps.units(scene, lambda point: point.axis_symmetry)
+    surface, placed = surface_of(scene, axes), own_frame(scene.object)
+    units = decided(grasps.units(scene, lambda point: point.axis_symmetry))
     probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
@@ -69,7 +75,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        surface=surface,
+        surface=surface._replace(points=placed.to_object(surface.points)),
+        placed=placed,
     )
     layout = Layout(
         axes,
@@ -146,11 +153,12 @@ def shells(scene: Any) -> bool:
 
 
 def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
-    """Expected time of every unit from the measured times of some cases, ``(rows,)`` with NaN for the others [s].
+    """Expected time of every unit that is tried [s]; empty where nothing was measured.
 
-    Measured units keep their time, the others are judged by their cost; empty where nothing was measured.
+    ``seconds (rows,)`` are the measured times of some cases, NaN for the others. Measured units keep their
+    time, the others are judged by their cost.
     """
-    known = [_measured(unit, seconds) for unit in plan.units]
+    known = [_measured(unit, seconds) for unit in plan.tried]
     pairs = [(t, cost) for t, cost in zip(known, plan.costs, strict=True) if t is not None]
     if not pairs or not sum(cost for _, cost in pairs):
         return []
@@ -180,12 +188,26 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
+        "no grasp": _no_grasps(plan),
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
     }
-    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items())
+    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
+
+
+def _no_grasps(plan: Plan) -> str:
+    """How many candidates are not solved and why, those of every point of a sweep counted; empty where there are none.
+
+    The first of a state stands for the others.
+    """
+    found = []
+    for state in NO_GRASP:
+        units = [unit for unit in plan.units if unit.state == state]
+        count = sum(len(unit.rows) for unit in units)
+        found += [f"{count} of {plan.served} candidates {STATES[state]}: {units[0].reason}"] if units else []
+    return "; ".join(found)
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:

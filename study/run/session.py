@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
+from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
@@ -246,7 +247,7 @@ class Session:
             reason=f"stopped by {name or 'another rank'}" if missing else "complete",
             # Once more: libraries that were loaded for the solves are known only now.
             versions=provenance.versions(MPI.Get_library_version()),
-            done=codes.size - missing - failed,
+            done=int(np.sum(codes == CASE_DONE)),
             failed=failed,
         )
 

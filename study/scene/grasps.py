@@ -25,7 +25,8 @@ class GraspPose(SceneSection):
     """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
 
     point_mm: Vector = Field(
-        description="a point on the line along which the fingers close, [x, y, z]", examples=[[0, 0, 20]]
+        description="a point on the line along which the fingers close, [x, y, z] in the frame of its own file",
+        examples=[[0, 0, 20]],
     )
     approach: Direction = Field(description="direction from finger 1 towards the object", examples=[[1, 0, 0]])
     long_side: Direction = Field(
