@@ -378,7 +378,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    return scene.model_copy(update={"candidates": Candidates(poses=poses)})
+    kept = {key: getattr(scene.candidates, key) for key in ("solve_best", "skip_hopeless")}
+    return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 
 def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:

@@ -57,15 +57,19 @@ class Plan:
         return sum(len(unit.rows) for unit in self.units)
 
 
-def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
-    """The plan of a scene; builds its objects, so a mesh is read here."""
+def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False) -> Plan:
+    """The plan of a scene; builds its objects, so a mesh is read here; ``ordered`` marks units that come last."""
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
     surface, placed = surface_of(scene, axes), own_frame(scene.object)
-    units = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    if ordered or scene.candidates.solve_best is not None or scene.candidates.skip_hopeless:
+        from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
+
+        units = chosen(scene, units)
     probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
@@ -113,6 +117,14 @@ def by_cost(costs: Sequence[float]) -> list[int]:
     [1, 2, 3, 0]
     """
     return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+
+
+def in_order(units: Sequence[Any]) -> list[int]:
+    """Positions in the order of work: the costliest first, so that no rank is alone with a long load path at the end.
+
+    What cannot hold comes after all others.
+    """
+    return sorted(by_cost([unit.cost for unit in units]), key=lambda i: units[i].hopeless)
 
 
 def makespan(costs: Sequence[float], ranks: int) -> float:
