@@ -167,10 +167,15 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    meshes = dict.fromkeys(shape for shape in shapes if shape.shape == "mesh")
-    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
     placed = next((found for found in map(tuple, edges) if found), ())
-    return (*scene.warnings, *placed, *_remarks(scene), *walls, *mended)
+    return (*scene.warnings, *placed, *_remarks(scene), *walls)
+
+
+def told(scene: Scene) -> list[str]:
+    """Lines with all `warnings`, and notes on what of a mesh was mended or tolerated, which nobody need act on."""
+    meshes = dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh")
+    notes = [f"note: {shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
+    return [*(f"warning: {text}" for text in warnings(scene)), *notes]
 
 
 def _remarks(scene: Scene) -> Iterator[str]:

@@ -13,7 +13,7 @@ from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study import pipeline
 from softjaw.study.accuracy import cost as costing
 from softjaw.study.accuracy.target import settled
-from softjaw.study.case.build import check_object, warnings, with_sampled_grasps
+from softjaw.study.case.build import check_object, told, with_sampled_grasps
 from softjaw.study.case.model import check_poses
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.cli.results import summary
@@ -58,8 +58,8 @@ def prepare(scene: Scene, options: Namespace, choice: Any = None) -> Any:
     given = [*options.overrides, *petsc_overrides(options.petsc), *(choice.overrides() if choice else [])]
     plan = make_plan(scene, options.scene, given, ordered=True)
     check_poses(scene, [unit.scene for unit in plan.units])
-    for text in warnings(scene):
-        print(f"warning: {text}", flush=True)
+    for line in told(scene):
+        print(line, flush=True)
     return plan
 
 

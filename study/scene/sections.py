@@ -280,7 +280,9 @@ class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
-    contact: Literal["weighted", "nodal"] = Field("weighted", description="how gaps are collocated")
+    contact: Literal["auto", "weighted", "nodal"] = Field(
+        "auto", description="how gaps are collocated; auto is nodal for hex8 on rigid objects, else weighted"
+    )
     residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(
         1 / 8, gt=0, le=1, description="shortest part of a load step that is tried before displacement control"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from softjaw.study import pipeline
 from softjaw.study.case import solving
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
+from softjaw.study.case.model import contact_rules
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
@@ -305,9 +307,10 @@ def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(
         assert not any(isinstance(result, CaseFailure) for result in path)
         return
     good, ended, above = path
-    assert good.values["maps/e_n"][CURVED] > 0
+    assert good.values["maps/closing"] > 0
     assert isinstance(ended, CaseFailure)
-    assert ended.message.startswith("the force stays below 20 N: reached ")
+    reached = float(re.search(r"at (\S+) N", ended.message)[1])
+    assert 2 < reached < 20
     assert ended.message.endswith("; the last good force is 2 N")
     assert above.message.startswith("not tried, because the load path ended at 20 N: ")
 
@@ -336,13 +339,32 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
     """At the foot of the shipped bottle's neck the rim of the pad bears on a slope; 10 N is where that begins."""
     path = Path(__file__).parents[2] / "jobs" / "bottle-rigid.toml"
     place = ["candidates.stations_mm=[161.76470588235293]", "load.normal_force_n=[7, 10, 13]"]
+    place.append('accuracy.contact="weighted"')
     scene = parse_scene(path.read_text(), path, place)
     [unit] = units(scene, lambda point: point.object.axis_symmetry)
     path = [result for _, result in pipeline.solve_unit(unit)]
     assert [bool(result.values["maps/flags"] & 512) for result in path] == [False, True, True]
-    assert "nodal gaps were taken" not in path[0].message
-    for result in path[1:]:
-        assert "weighted gaps had no solution, nodal gaps were taken" in result.message
+    assert [Flag.NODAL.sentence in result.message for result in path] == [False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("choice", "element", "walled", "rules"),
+    [
+        ("auto", "hex8", False, ("nodal", "weighted")), ("auto", "hex27", False, ("weighted", "nodal")),
+        ("auto", "hex8", True, ("weighted", "nodal")), ("weighted", "hex8", False, ("weighted", "nodal")),
+        ("nodal", "hex27", False, ("nodal",)),
+    ],
+)  # fmt: skip
+def test_which_gaps_are_tried(choice, element, walled, rules):
+    overrides = [f'accuracy.contact="{choice}"', f'gripper.element="{element}"']
+    text = f"[object]\n{OVAL}\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
+    scene = parse_scene(text, "scene.toml", overrides)
+    assert contact_rules(scene, walled) == rules
+
+
+def test_nodal_gaps_that_were_chosen_raise_no_flag():
+    for values in cases(OVAL):
+        assert not int(values["maps/flags"]) & Flag.NODAL
 
 
 PRESSED_FLAT = """
