@@ -139,6 +139,14 @@ def stiffness(gripper: Gripper) -> float:
     return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
 
 
+def bed_closing(height: FloatArray, wanted: float) -> float:
+    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
+    h = np.sort(height[np.isfinite(height)])
+    # for the k lowest springs in contact the closing is known; the largest k that touches is right
+    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
+    return float(closing[np.flatnonzero(closing >= h)[-1]])
+
+
 def jaws_of(scene: Scene) -> Jaws:
     """The gripper of a scene at the force in the middle of its load path."""
     gripper, forces = scene.gripper, scene.load.normal_force

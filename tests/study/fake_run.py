@@ -40,7 +40,9 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1):
     for s in range(stations):
         rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
         for served in [tuple(rows)] if s % 2 == 0 else [(r,) for r in rows]:
-            units.append(SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3), state=0, reason=""))
+            unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3))
+            unit.state, unit.reason, unit.hopeless = 0, "", False
+            units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"
     labels = tuple(f"candidate {i}" for i in range(2 * stations))
