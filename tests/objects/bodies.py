@@ -1,4 +1,4 @@
-"""Meshes that users bring, by script: hollow bottles and bowls, scans with defects."""
+"""Meshes that users bring, by script: hollow bottles and bowls, a mug with a handle, scans with defects."""
 
 from __future__ import annotations
 
@@ -39,6 +39,19 @@ def hollow_bowl(radius: float, wall: float, depth: float) -> trimesh.Trimesh:
     outer = [(radius * np.sin(t), radius * (1.0 - np.cos(t))) for t in np.linspace(0.0, ends[0], 33)]
     inner = [((radius - wall) * np.sin(t), radius - (radius - wall) * np.cos(t)) for t in np.linspace(ends[1], 0.0, 33)]
     return revolved([*outer, *inner])
+
+
+def mug(radius: float = 0.04, height: float = 0.095, wall: float = 0.004) -> trimesh.Trimesh:
+    """A cylindrical cup with a handle that is a second closed body, as drawing programs export it."""
+    heights = np.linspace(0.0, height, 9)
+    cup = revolved([
+        (0.0, 0.0), *((radius, h) for h in heights),
+        *((radius - wall, max(h, wall)) for h in heights[::-1]), (0.0, wall),
+    ])  # fmt: skip
+    handle = trimesh.creation.torus(0.025, 0.005, major_sections=48, minor_sections=20)
+    handle.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    handle.apply_translation([radius + 0.018, 0.0, 0.5 * height])
+    return trimesh.util.concatenate([cup, handle])
 
 
 def punctured(mesh: trimesh.Trimesh, holes: int, rings: int = 1, seed: int = 0) -> trimesh.Trimesh:
