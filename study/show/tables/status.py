@@ -15,6 +15,7 @@ from softjaw.study.quantities import DONE, FAILED, MISSING, PARTS, STATES
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
+from softjaw.study.run.refine import about
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
@@ -39,10 +40,11 @@ def status_text(result: Any, width: int = PAPER) -> str:
 def status_json(result: Any) -> str:
     """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
-    about = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
-    about |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    about |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
-    return json.dumps(about, indent=2)
+    found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
+    found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    found |= {"added_stations_mm": [list(some) for some in result.layout.added]}
+    found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
+    return json.dumps(found, indent=2)
 
 
 def status_csv(result: Any) -> str:
@@ -75,11 +77,12 @@ def _place(result: Any, row: int) -> list[float]:
 
 
 def counts(result: Any) -> str:
-    """How many cases are in which state."""
+    """How many cases are in which state, and how many stations a refinement added."""
     title = f" ({result.title})" if result.title else ""
     missing, done, failed = (int(np.sum(result.status == state)) for state in (MISSING, DONE, FAILED))
     cases = f"{done} of {result.status.size} cases {STATES[DONE]}, {failed} {STATES[FAILED]}"
-    return f"{result.path}{title}:\n  {cases}, {missing} {STATES[MISSING]}"
+    stations = f"\n{wrapped(text, PAPER, '  ', '    ')}" if (text := about(result)) else ""
+    return f"{result.path}{title}:\n  {cases}, {missing} {STATES[MISSING]}{stations}"
 
 
 def reasons(result: Any, width: int = PAPER) -> list[str]:
