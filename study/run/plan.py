@@ -23,6 +23,7 @@ from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.run.estimate import START, estimated
 from softjaw.study.run.progress import duration
+from softjaw.study.run.refine import Rounds, added_cases, refined
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -58,10 +59,19 @@ class Plan:
         return sum(len(unit.rows) for unit in self.units)
 
 
-def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False) -> Plan:
-    """The plan of a scene; builds its objects, so a mesh is read here; ``ordered`` marks units that come last."""
+def make_plan(
+    scene: Any, scene_file: str = "", overrides: Sequence[str] = (), rounds: Rounds = (), ordered: bool = False
+) -> Plan:
+    """The plan of a scene, with the stations that ``rounds`` of refinement added; builds its objects.
+
+    ``ordered`` marks units that come last.
+    """
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
+    digest, text = scene.digest, scene.effective_toml()
+    if rounds:
+        own = grasps.units(scene, lambda point: point.axis_symmetry) if scene.uncertainty.parts else []
+        scene = refined(scene, rounds, probe_candidates(scene, own))
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
@@ -73,8 +83,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), o
         units = chosen(scene, units)
     probes = probe_candidates(scene, units)
     header = Header(
-        digest=scene.digest,
-        scene=scene.effective_toml(),
+        digest=digest,
+        scene=text,
         title=getattr(scene.object, "name", None) or Path(scene_file).stem,
         scene_file=scene_file,
         overrides=tuple(overrides),
@@ -98,6 +108,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), o
         pad_faces,
         probes,
         changes(scene) if probes else (),
+        rounds,
     )
     return Plan(layout, header, with_probes(scene, units, probes))
 
@@ -202,6 +213,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
         "no grasp": _no_grasps(plan),
+        **_rounds(plan, scene),
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
@@ -221,6 +233,16 @@ def _no_grasps(plan: Plan) -> str:
         count = sum(len(unit.rows) for unit in units)
         found += [f"{count} of {plan.served} candidates {STATES[state]}: {units[0].reason}"] if units else []
     return "; ".join(found)
+
+
+def _rounds(plan: Plan, scene: Any) -> dict[str, str]:
+    """What a refinement may add."""
+    asked = scene.candidates.refine
+    if asked is None:
+        return {}
+    each = added_cases(plan.units, plan.layout)
+    text = f"up to {asked.budget // each} more stations, {each} cases each, until the best is known to"
+    return {"rounds": f"{text} {asked.best_within:.2g} of itself; not in the numbers above and below"}
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
@@ -258,12 +280,17 @@ def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
 
 
 def measured_seconds(layout: Layout, path: Path) -> Any:
-    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file."""
+    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file.
+
+    Stations that a refinement added are left out.
+    """
     if not path.is_file():
         return None
     with open_result(path) as result:
+        own = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
+        seconds = result.read("work/seconds_total").take(own, axis=-3)
         # A file of another shape has other cases in the same places.
-        return result.read("work/seconds_total").ravel() if result.layout.shape == layout.shape else None
+        return seconds.ravel() if seconds.shape == layout.shape else None
 
 
 def _free(path: Path) -> int:

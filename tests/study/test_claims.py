@@ -73,7 +73,7 @@ def test_errors_of_the_lookup_between_stations(tmp_path):
 
     for count in (18, 35):
         path, stations = tmp_path / f"{count}.hdf", f"candidates.stations={count}"
-        words = ["-m", "softjaw", "run", BOTTLE, "-o", path, "--set", stations]
+        words = ["-m", "softjaw", "run", BOTTLE, "-o", path, "--set", stations, "--set", "candidates.refine=false"]
         assert launch(0, *words, "--set", "output.patches=none")[0] == 0
     coarse, fine = (GraspMap(tmp_path / f"{count}.hdf") for count in (18, 35))
     station, force = np.meshgrid(fine.axes[0].x[1::2], fine.axes[2].x, indexing="ij")
