@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 from typing import Any
@@ -10,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.objects import shapes as objects
-from softjaw.fem.objects.gap import GapObject
+from softjaw.fem.objects.gap import GapObject, Pose
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
+from softjaw.study.units import in_si
 
 
 def geometry() -> Any:
@@ -50,6 +52,11 @@ def build_object(shape: Any) -> GapObject:
         case "plane":
             return objects.Plane(shape.thickness)
     raise ValueError(f"no object is built from the shape '{shape.shape}'")
+
+
+def own_frame(shape: Any) -> Pose:
+    """Where the object's frame lies in that of its mesh file [m]; every other shape is described in its own frame."""
+    return geometry().mesh_object(shape).placed if shape.shape == "mesh" else Pose(np.eye(3), np.zeros(3))
 
 
 @lru_cache(maxsize=8)
@@ -118,6 +125,23 @@ def check_object(scene: Scene) -> None:
             _check_stations(scene, shape)
 
 
+def middle_of(scene: Scene) -> Any:
+    """The `CentreLine` that the scene's stations follow; None where they follow the axis z.
+
+    Raises
+    ------
+    StudyError
+        A mesh without sections across its axis.
+    """
+    shape = scene.object
+    if shape.shape != "mesh" or not scene.candidates.station_values_mm:
+        return None
+    try:
+        return geometry().middle_of(shape, scene.gripper.pad_size[0])
+    except ValueError as error:
+        raise StudyError(USAGE, f"object.mesh: {error}") from error
+
+
 def _check_stations(scene: Scene, mesh: Any) -> None:
     low, high = axis_span(mesh) or (-math.inf, math.inf)
     beside = [s for s in scene.candidates.station_values_mm if not low <= s <= high]
@@ -143,9 +167,28 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    meshes = dict.fromkeys(shape for shape in shapes if shape.shape == "mesh")
-    mended = [f"{shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
-    return (*scene.warnings, *next((found for found in map(tuple, edges) if found), ()), *walls, *mended)
+    placed = next((found for found in map(tuple, edges) if found), ())
+    return (*scene.warnings, *placed, *_remarks(scene), *walls)
+
+
+def told(scene: Scene) -> list[str]:
+    """Lines with all `warnings`, and notes on what of a mesh was mended or tolerated, which nobody need act on."""
+    meshes = dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh")
+    notes = [f"note: {shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
+    return [*(f"warning: {text}" for text in warnings(scene)), *notes]
+
+
+def _remarks(scene: Scene) -> Iterator[str]:
+    """What is doubtful about the centre line of a mesh at the stations, each remark once."""
+    middle, where = middle_of(scene), scene.candidates
+    half = in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
+    at: dict[str, list[float]] = {}
+    for mm, station in zip(where.station_values_mm, where.station_values, strict=True) if middle else ():
+        at.setdefault(middle.remark(station, half), []).append(mm)
+    for remark, places in at.items():
+        if remark:
+            listed = ", ".join(f"{mm:g}" for mm in places[:4]) + ", ..." * (len(places) > 4)
+            yield f"candidates: at {len(places)} of {len(where.station_values_mm)} stations ({listed} mm) {remark}"
 
 
 def with_sampled_grasps(scene: Scene) -> Scene:

@@ -10,14 +10,20 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.study.case.build import middle_of, own_frame
+from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
+
+if TYPE_CHECKING:
+    from softjaw.fem.objects.centre_line import CentreLine
 
 FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch
@@ -28,7 +34,8 @@ ALIKE = 1e-9  # differences of directions [-] and of lines of approach [m] that 
 class Candidate:
     """One place to grasp: station along the object's axis [m], angle about it, roll about the approach [rad].
 
-    With explicit poses ``station`` is the candidate's number and ``angle`` and ``roll`` are 0.
+    With explicit poses ``station`` is the candidate's number and ``angle`` and ``roll`` are 0. ``note`` is what the
+    reader of a result should know about its place.
     """
 
     station: float
@@ -36,39 +43,59 @@ class Candidate:
     roll: float
     poses: tuple[Pose, Pose]
     label: str
+    note: str = ""
 
 
 def candidates(scene: Scene) -> list[Candidate]:
     """The grasp candidates in the order of their rows: stations, then angles at each."""
     where = scene.candidates
     if where.poses:
+        placed = own_frame(scene.object)
         return [
-            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), label)
+            Candidate(float(i), 0.0, 0.0, explicit_poses(pose, placed), label)
             for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
+    middle, half = middle_of(scene), in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
+    notes = {s: middle.remark(s, half) if middle else "" for s in where.station_values}
     places = product(where.station_values, where.angles)
     return [
-        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll), label)
+        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll, middle), label, notes[station])
         for (station, angle), label in zip(places, where.labels, strict=True)
     ]
 
 
-def axis_poses(station: float, angle: float, roll: float) -> tuple[Pose, Pose]:
-    """Poses of the two pads at a station along the object's axis z.
+def axis_poses(station: float, angle: float, roll: float, middle: CentreLine | None = None) -> tuple[Pose, Pose]:
+    """Poses of the two pads at a station, which is a height, along the object's axis z or its centre line ``middle``.
 
     Finger 1 stands at ``angle`` and approaches along ``-(cos, sin, 0)``, finger 2 comes from the opposite side. At roll
-    0 both long sides are the object's z; ``roll`` turns the gripper about finger 1's approach.
+    0 both long sides are the object's z; ``roll`` turns the gripper about finger 1's approach. On a centre line all of
+    this is tilted with it, by the shortest turn that takes z to its tangent.
     """
     approach = -np.array([math.cos(angle), math.sin(angle), 0.0])
     # The rotation of z about the approach, which is normal to it.
     long_side = math.cos(roll) * np.array([0.0, 0.0, 1.0]) + math.sin(roll) * np.cross(approach, [0.0, 0.0, 1.0])
-    return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
+    if middle is None or middle.straight:
+        return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
+    point, tangent = middle.at(station)
+    tilt = shortest_turn(tangent)
+    return opposed_poses(point, tilt @ approach, tilt @ long_side)
 
 
-def explicit_poses(pose: GraspPose) -> tuple[Pose, Pose]:
-    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts."""
-    approach = np.array(pose.approach) / np.linalg.norm(pose.approach)
-    return opposed_poses(np.array(pose.point), approach, across(approach, np.array(pose.long_side)))
+def shortest_turn(tangent: FloatArray) -> FloatArray:
+    """Rotation ``(3, 3)`` that takes z to a unit vector above the plane z = 0 the shortest way."""
+    x, y, z = tangent
+    share = 1.0 / (1.0 + z)
+    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
+
+
+def explicit_poses(pose: GraspPose, placed: Pose) -> tuple[Pose, Pose]:
+    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts.
+
+    ``placed`` is where the object's frame lies in that of its file, in which the grasp is given.
+    """
+    approach = (np.array(pose.approach) / np.linalg.norm(pose.approach)) @ placed.rotation
+    long_side = across(approach, np.array(pose.long_side) @ placed.rotation)
+    return opposed_poses(placed.to_pad(np.array(pose.point)), approach, long_side)
 
 
 def across(approach: FloatArray, along: FloatArray) -> FloatArray:
@@ -198,6 +225,10 @@ class Unit:
         Work, in element solves; only ratios mean something.
     probe : bool
         Whether it is solved again with inputs changed, as `study.case.probing` does.
+    state, reason : int, str
+        One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
+    hopeless : bool
+        Whether a bed of springs says that it cannot hold, or bears on a pad's rim: it comes last in the order of work.
     """
 
     index: int
@@ -208,6 +239,9 @@ class Unit:
     turns: tuple[float, ...]
     cost: float
     probe: bool = False
+    state: int = MISSING
+    reason: str = ""
+    hopeless: bool = False
 
 
 def axes(scene: Scene) -> list[Axis]:

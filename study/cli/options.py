@@ -159,8 +159,7 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
         "name of the mesh)")  # fmt: skip
     add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
-    add("--axis", choices=("x", "y", "z"), default="z", help="axis of the mesh along which grasps are spread "
-        "(default z)")  # fmt: skip
+    add("--axis", choices=("x", "y", "z"), help="axis of the mesh along which grasps are spread (default: the longest)")
     add("--force", action="store_true", help="replace files that are there")
     add("--list", action="version", version=kinds, help="list the kinds and leave")
     more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.case.build import build_object, check_object, warnings, with_sampled_grasps
+from softjaw.study.case.build import build_object, check_object, geometry, told, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.plan import make_plan, plan_text
 from softjaw.study.run.scaling import scaling_text
@@ -16,23 +16,37 @@ from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.show.tables.columns import hanging, terminal_width
 from softjaw.study.show.tables.overview import scene_text
+from softjaw.study.units import in_si
 
 
 def init(options: Namespace) -> str:
     """Write a scene and a batch script to start from."""
-    return start.init(options, _mesh_size)
+    return start.init(options, _measured)
 
 
-def _mesh_size(options: Namespace) -> list[float]:
-    """Extents across and along the axis [mm] of a mesh that a study can take."""
-    # Absolute, because the scene that is written may lie in another folder.
-    mesh = str(Path(options.mesh).absolute())
-    shape = Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": options.axis})
+def _measured(options: Namespace) -> start.Measured:
+    """What a scene should say about a mesh that a study can take."""
+
+    def shape(axis: str) -> Mesh:
+        # Absolute, because the scene that is written may lie in another folder.
+        mesh = str(Path(options.mesh).absolute())
+        return Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": axis})
+
+    def sides(axis: str) -> dict[str, float]:
+        """Extents [mm] along the axes of the object."""
+        bounds: Any = build_object(shape(axis)).bounds
+        return dict(zip("xyz", (1e3 * (bounds[1] - bounds[0])).tolist(), strict=True))
+
+    def remark(axis: str, station: float) -> str:
+        middle = geometry().middle_of(shape(axis), in_si("pad_length_mm", start.PAD_LENGTH))
+        return middle.remark(in_si("station_mm", station), in_si("half_mm", start.PAD_LENGTH / 2))
+
     try:
-        bounds: Any = build_object(shape).bounds
+        axis = options.axis or start.longest(sides("z"))
+        extents = tuple(sides(axis).values())
+        return start.Measured(axis, extents, tuple(s for s in start.heights(extents[2]) if not remark(axis, s)))
     except (ValueError, OSError) as error:
         raise StudyError(USAGE, f"--mesh: {error}") from error
-    return [1e3 * float(high - low) for low, high in zip(*bounds, strict=True)]
 
 
 def check(options: Namespace) -> str:
@@ -47,7 +61,7 @@ def plan(options: Namespace) -> str:
     scene = with_sampled_grasps(scene_of(options))
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
-    lines = [plan_text(made, scene, path, options.ranks[0]), *(f"warning: {text}" for text in warnings(scene))]
+    lines = [plan_text(made, scene, path, options.ranks[0]), *told(scene)]
     if scene.accuracy.e_n is not None:
         lines.append("accuracy.e_n chooses mesh and effects when the run starts; this plan has those of the scene")
     if len(options.ranks) > 1 or options.repeat > 1:

@@ -13,7 +13,7 @@ from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study import pipeline
 from softjaw.study.accuracy import cost as costing
 from softjaw.study.accuracy.target import settled
-from softjaw.study.case.build import check_object, warnings, with_sampled_grasps
+from softjaw.study.case.build import check_object, told, with_sampled_grasps
 from softjaw.study.case.model import check_poses
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.cli.results import summary
@@ -44,7 +44,7 @@ def _growth(scene: Scene, plan: Any, choice: Any, comm: Any) -> Growth:
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
-        made = on_rank0(comm, make_plan, scene, *about, rounds)
+        made = on_rank0(comm, make_plan, scene, *about, True, rounds)
         return made, work(refined(scene, rounds), choice)
 
     return Growth(study, lambda result: next_stations(result, scene, each))
@@ -69,10 +69,10 @@ def prepare(scene: Scene, options: Namespace, choice: Any = None) -> Any:
     # A wrong option would fail every case alike, after hours of a large study.
     _check_petsc(dict(scene.petsc))
     given = [*options.overrides, *petsc_overrides(options.petsc), *(choice.overrides() if choice else [])]
-    plan = make_plan(scene, options.scene, given)
+    plan = make_plan(scene, options.scene, given, ordered=True)
     check_poses(scene, [unit.scene for unit in plan.units])
-    for text in warnings(scene):
-        print(f"warning: {text}", flush=True)
+    for line in told(scene):
+        print(line, flush=True)
     return plan
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.build import build_object, has_wall, outer_surface
+from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene.problems import SceneError
@@ -42,7 +42,10 @@ def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> S
     cell = np.full(len(corners), NOBODY)
     # Explicit poses have no unit on the station axis, and no cells.
     if axes[-3].units:
+        middle = middle_of(here)
+        corners = middle.straightened(corners) if middle else corners
         corners, cell = coloured(corners, cells_of(here, axes, body.axis_symmetry))
+        corners = middle.straightened(corners, -1.0) if middle else corners
         if has_wall(here.object):
             kept = ~_lid(here.object, corners)
             corners, cell = corners[kept], cell[kept]

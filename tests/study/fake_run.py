@@ -23,11 +23,12 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True, rounds=()):
-    """Stations x two angles x three forces; both angles of an even station are one unit.
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=()):
+    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide.
 
     Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
     """
+    from softjaw.study.quantities import WIDE
     from softjaw.study.result.layout import Derived, Header, Layout
     from softjaw.study.result.store import StoredAxis
     from softjaw.study.run.plan import Plan
@@ -47,8 +48,11 @@ def fake_plan(digest="scene", stations=6, derived=True, rounds=()):
         rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
         for a in [(0, 1)] if name % 2 == 0 else [(0,), (1,)]:
             served = tuple(rows[i] for i in a)
-            first = (2 * name + a[0]) * FORCES
-            units.append(SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3), first=first))
+            unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
+            unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
+            units.append(unit)
+    if wide >= 0:
+        units[wide].state, units[wide].reason = WIDE, "needs more"
     labels = tuple(f"candidate {i}" for i in range(2 * len(places)))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
     return Plan(Layout(axes, FACES, derived=slope, added=rounds), header, tuple(units))
@@ -125,7 +129,7 @@ def main():
     parser.add_argument("--memory", type=float, default=0.5)
     parser.add_argument("--stations", type=int, default=6)
     parser.add_argument("--grow", action="store_true")
-    for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug"):
+    for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args()
     from mpi4py import MPI
@@ -146,10 +150,8 @@ def main():
     work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
     growth = fake_growth(options.digest, options.stations, work) if options.grow else None
     try:
-        return run_study(
-            fake_plan(options.digest, options.stations), work, options.file, comm, retry_failed=options.retry_failed,
-            growth=growth,
-        )  # fmt: skip
+        plan = fake_plan(options.digest, options.stations, wide=options.wide)
+        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed, growth=growth)
     except StudyError as error:
         return complain(error)
     except BaseException:

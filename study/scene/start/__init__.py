@@ -3,22 +3,60 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shlex
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 
 HERE = Path(__file__).parent
-PAD_LENGTH = 50.0  # mm, as in the templates
+PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
+MOST_STATIONS = 8  # proposed: at two angles a first map of 16 candidates
+LONGER = 1.01  # an axis is the longest where it is so many times as long as z, so that rounding does not choose
 
 
-def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) -> str:
-    """Write both files, and say what to do next; ``measure`` gives the extents of the mesh [mm], the axis last.
+@dataclass(frozen=True)
+class Measured:
+    """What a scene should say about a mesh.
+
+    ``axis`` of the file is the object's, along which ``extents`` [mm] are the last; at ``stations`` [mm] a pad fits on.
+    """
+
+    axis: str
+    extents: tuple[float, ...]
+    stations: tuple[float, ...]
+
+
+def longest(sides: Mapping[str, float]) -> str:
+    """Axis of the largest extent; z where no other is clearly larger.
+
+    >>> longest({"x": 100.1, "y": 90.0, "z": 100.0}), longest({"x": 110.0, "y": 120.0, "z": 100.0})
+    ('z', 'y')
+    """
+    axis = max(sides, key=lambda name: sides[name])
+    return axis if sides[axis] > LONGER * sides["z"] else "z"
+
+
+def heights(height: float) -> tuple[float, ...]:
+    """Stations [mm] at which a pad along the axis of an object does not reach beyond its ends; none on a short one.
+
+    >>> heights(61.0), heights(40.0)
+    ((25.0, 30.5, 36.0), ())
+    """
+    room = height - PAD_LENGTH
+    count = min(MOST_STATIONS, 1 + int(room // 5))
+    # Down to 0.1 mm, so that rounding leads over neither end.
+    return tuple(math.floor(10 * (PAD_LENGTH / 2 + room * i / max(count - 1, 1))) / 10 for i in range(max(count, 0)))
+
+
+def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
+    """Write both files, and say what to do next; ``measure`` looks at the mesh.
 
     Raises
     ------
@@ -38,8 +76,9 @@ def init(options: Namespace, measure: Callable[[Namespace], Sequence[float]]) ->
     mesh = _about_mesh(options, scene, measure) if options.kind == "mesh" else {}
     for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
         write_file(path, _filled(template, words | mesh), folders=True)
-    unit = f"--unit {options.unit} --axis {options.axis}"
-    measured = [f"object:  {mesh['SIZE']} mm, the last along its axis, with {unit}"] if mesh else []
+    measured = []
+    if mesh:
+        measured = ["object:  {SIZE} mm, the last along its axis, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
         f"written: {batch}  a Slurm job that resumes after its time limit",
@@ -70,7 +109,7 @@ def _filled(template: str, words: dict[str, str]) -> str:
     text = (HERE / template).read_text(encoding="utf-8")
     for name, word in words.items():
         text = text.replace(f"@{name}@", word)
-    return text
+    return re.sub(r"[ ]+$", "", text, flags=re.MULTILINE)
 
 
 def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str, str]:
@@ -80,23 +119,37 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str,
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
-    *across, height = measure(options)
-    half = 0.5 * min(PAD_LENGTH, _rounded(0.5 * height))
+    found = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
+    longest_side, next_side, _ = sorted(found.extents, reverse=True)
     return {
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
-        "AXIS": options.axis,
-        "SIZE": " x ".join(f"{side:.4g}" for side in (*across, height)),
-        "LOW": f"{_rounded(half):g}",
-        "HIGH": f"{height - half:.4g}",
+        "AXIS": found.axis,
+        "SIZE": " x ".join(f"{side:.4g}" for side in found.extents),
+        "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
+        "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
+        "STATIONS": _stations(found),
     }
 
 
-def _rounded(length: float) -> float:
-    """A length in whole mm, or with two digits where it is short.
+def _larger(pad: float, side: float, word: str) -> str:
+    """A comment where the user's pad is larger than the object; the pad stays as it is."""
+    return f"# {word} than the object, {side:.3g} mm: the rest of it stays free" if pad > side else ""
 
-    >>> _rounded(33.4), _rounded(3.456)
-    (33.0, 3.5)
-    """
-    return float(f"{length:.2g}") if length < 10 else float(round(length))
+
+def _stations(found: Measured) -> str:
+    """Lines that propose stations, or say why there are none that `check` would not warn of."""
+    wide, deep, height = found.extents
+    angles = [angle for angle, width in ((0, wide), (90, deep)) if width <= OPENING]
+    if height < PAD_LENGTH:
+        return f"# Stations along its axis: none, because the pad is longer than the object there, {height:.3g} mm."
+    if not angles or not found.stations:
+        why = f"it is wider than {OPENING:g} mm" if not angles else "the line through its middle bends too much"
+        return f"# Stations along its axis: none that would do everywhere, because {why}."
+    return (
+        "# Or, for an object with an axis, stations: heights above its lowest point, at which the pad stays on it.\n"
+        f"# stations_mm = {json.dumps(found.stations)}\n"
+        f"# angles_deg = {json.dumps(angles)}        # about the centre line of the object's sections; those where it"
+        f" is at most {OPENING:g} mm wide"
+    )

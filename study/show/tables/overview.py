@@ -11,7 +11,7 @@ from softjaw.study.units import UNITS, shown, shown_text
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
     # here and below: who only reads results must not load all that checks scenes
-    from softjaw.study.case.build import has_wall, warnings
+    from softjaw.study.case.build import has_wall, told
 
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
@@ -43,8 +43,7 @@ def scene_text(scene: Any, file: str) -> str:
         "each case": limits_text(scene.run),
         "results": scene.output.file,
     }
-    lines = [f"warning: {text}" for text in warnings(scene)]
-    return "\n".join([f"{file}: no errors", *aligned(rows), *lines])
+    return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
 
 
 def _refinement(asked: Any) -> str:

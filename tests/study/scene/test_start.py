@@ -7,15 +7,25 @@ import sys
 import tomllib
 
 import pytest
+import trimesh
 
 from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
+from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan
 from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
+BODIES = {
+    "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
+    "flat bottle": lambda: hollow_bottle(0.1, 0.028, 0.02, 0.002),
+    "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
+    "mug": mug,
+    "banana with holes": lambda: punctured(scan("banana"), 3),
+    **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
+}
 SMALL = {  # what makes a run of a second or two of each kind
     "bottle": ["candidates.stations=2", "load.normal_force_n=[2]"],
     "cup": ["candidates.stations=2", "load.normal_force_n=[0.5]",
@@ -84,13 +94,62 @@ def test_a_mesh_gets_a_sampler_and_keeps_the_pads(tmp_path):
     assert started("mesh", "-o", "sub/flask") == 0
     scene = load_scene(tmp_path / "sub" / "flask.toml")
     assert (scene.candidates.sampler, scene.candidates.count) == ("antipodal", 12)
-    assert "# station_range_mm = [25, 95]" in (tmp_path / "sub" / "flask.toml").read_text()
+    proposed = "# stations_mm = [25.0, 35.0, 45.0, 55.0, 65.0, 75.0, 85.0, 95.0]"
+    assert proposed in (tmp_path / "sub" / "flask.toml").read_text()
     assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
     assert (tmp_path / "sub" / scene.object.mesh).resolve() == FLASK.resolve()
     assert started("mesh", "-o", "lying.toml", "--axis", "y") == 0
     lying = load_scene(tmp_path / "lying.toml")
     assert (lying.object.axis, lying.gripper.pad_length_mm) == ("y", 50)
-    assert "# station_range_mm = [12, " in (tmp_path / "lying.toml").read_text()
+    assert "stations_mm" not in (tmp_path / "lying.toml").read_text()
+
+
+def with_stations(path):
+    """A scene with its commented stations in place of the sampler, if it proposes any."""
+    text = path.read_text()
+    if "# stations_mm" in text:
+        for key, new in (("sampler", "# sampler"), ("count", "# count"), ("# stations_mm", "stations_mm"),
+                         ("# angles_deg", "angles_deg")):  # fmt: skip
+            text = text.replace(f"\n{key} =", f"\n{new} =")
+    path.write_text(text)
+    return load_scene(path)
+
+
+def no_warnings(capsys, name):
+    capsys.readouterr()
+    assert main(["check", name]) == 0
+    return "warning" not in capsys.readouterr().out
+
+
+def test_a_banana_is_grasped_along_its_longest_axis_where_its_line_bends_less_than_the_pad(tmp_path, capsys):
+    assert main(["init", "mesh", "--mesh", str(SCANS / "ycb_011_banana.stl"), "--unit", "m", "-o", "b"]) == 0
+    scene = with_stations(tmp_path / "b.toml")
+    assert scene.object.axis == "x"
+    assert 4 <= len(scene.candidates.station_values_mm) <= 8
+    assert scene.candidates.total <= 24
+    assert no_warnings(capsys, "b.toml")
+
+
+def test_a_pad_larger_than_the_object_stays_as_it_is_and_is_said(tmp_path):
+    trimesh.creation.cylinder(9, 36).export(tmp_path / "cork.stl")
+    assert main(["init", "mesh", "--mesh", "cork.stl", "--unit", "mm"]) == 0
+    scene, text = load_scene("cork.toml"), (tmp_path / "cork.toml").read_text()
+    assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
+    assert "pad_length_mm = 50            # longer than the object, 36 mm" in text
+    assert "pad_width_mm = 22             # wider than the object, 18 mm" in text
+    assert "stations_mm" not in text
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", BODIES)
+def test_what_is_proposed_for_a_body_is_not_warned_of(name, tmp_path, capsys):
+    BODIES[name]().export(tmp_path / "body.stl")
+    assert main(["init", "mesh", "--mesh", "body.stl", "--unit", "m"]) == 0
+    assert no_warnings(capsys, "body.toml")
+    assert load_scene("body.toml").candidates.total <= 24
+    assert with_stations(tmp_path / "body.toml").candidates.total <= 24
+    assert no_warnings(capsys, "body.toml")
+    assert main(["plan", "body.toml"]) == 0
 
 
 @pytest.mark.parametrize("there", ["bottle.toml", "bottle.sbatch"])

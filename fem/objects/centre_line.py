@@ -1,0 +1,149 @@
+"""Centre line of a triangle surface: the middles of its sections across the axis z, joined smoothly.
+
+A section is cut into its loops; the largest is the object there, so a handle beside a mug or a cavity inside it does
+not pull the line off. A centroid of a loop is exact for its polygon. The line is a smoothing spline through the
+centroids; its tangent is the local axis that pads are turned about.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.traced_outline import sections, smooth_spline
+
+HEIGHTS = 161  # at which sections are cut
+FEWEST = 8  # of them that enclose an area
+END = 0.02  # of the height: nearer to the ends a section is the object's rounding, its middle is continued
+STRAIGHT = 3e-3  # of the line's height: one that stays so near to the axis z is the axis, but for noise of a scan
+ARM = 5e-3  # of the largest loop's area: what is smaller is noise of a mesh, not an arm
+
+
+@dataclass(frozen=True, eq=False)
+class CentreLine:
+    """Middle of an object over the height.
+
+    Parameters
+    ----------
+    z : (k,) array
+        Ascending heights [m].
+    middle : (k, 2) array
+        Centroids of the largest loops, smoothed [m].
+    loops : (k,) array of int
+        Closed loops that enclose material at each height; more than one: the object has arms there.
+    """
+
+    z: FloatArray
+    middle: FloatArray
+    loops: IntArray
+
+    @cached_property
+    def _curve(self) -> CubicSpline:
+        return CubicSpline(self.z, self.middle)
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is the axis z itself, but for the noise of a scan."""
+        return bool(np.abs(self.middle).max() <= STRAIGHT * (self.z[-1] - self.z[0]))
+
+    def remark(self, z: float, half: float) -> str:
+        """What is doubtful where a pad reaches ``half`` [m] to both sides of a height, if anything."""
+        if not self.z[0] <= z <= self.z[-1]:
+            return "the centre line of the object's sections ends before the station and goes on straight"
+        if self.radius(z - half, z + half) < half:
+            return "the centre line of the object's sections bends in a radius below half the pad's length"
+        if self.loops[np.abs(self.z - z).argmin()] > 1:
+            return "the object's section has several parts, of which the pads stand about the largest"
+        return ""
+
+    def radius(self, low: float, high: float) -> float:
+        """Smallest radius [m] in which the line bends between two heights."""
+        z = self.z[(self.z >= low) & (self.z <= high)]
+        if self.straight or not len(z):
+            return np.inf
+        one, two = (np.column_stack([self._curve(z, k), np.full(len(z), 2.0 - k)]) for k in (1, 2))
+        curvature = np.linalg.norm(np.cross(one, two), axis=1) / np.linalg.norm(one, axis=1) ** 3
+        return float(1.0 / curvature.max()) if curvature.any() else np.inf
+
+    def straightened(self, x: FloatArray, sense: float = 1.0) -> FloatArray:
+        """Points ``(..., 3)`` shifted across z so that the line becomes the axis; ``sense`` -1 shifts them back."""
+        if self.straight:
+            return x
+        moved = x.copy()
+        moved[..., :2] -= sense * self._curve(np.clip(x[..., 2], self.z[0], self.z[-1]))
+        return moved
+
+    def at(self, z: float) -> tuple[FloatArray, FloatArray]:
+        """Place ``(3,)`` [m] and unit tangent ``(3,)`` at a height; beyond the ends the line goes on straight."""
+        if self.straight:
+            return np.array([0.0, 0.0, z]), np.array([0.0, 0.0, 1.0])
+        inside = float(np.clip(z, self.z[0], self.z[-1]))
+        slope = self._curve(inside, 1)
+        tangent = np.array([*slope, 1.0])
+        return np.array([*(self._curve(inside) + (z - inside) * slope), z]), tangent / np.linalg.norm(tangent)
+
+
+def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> CentreLine:
+    """Centre line of a surface whose axis is z.
+
+    Parameters
+    ----------
+    points, triangles : (n, 3), (m, 3) arrays
+        The surface [m]; outward, small holes do no harm.
+    wavelength : float
+        Waves of the line that are shorter are smoothed out [m]; half a pad is a good choice.
+
+    Raises
+    ------
+    MeshError
+        Where hardly any section encloses an area.
+    """
+    low, high = points[:, 2].min(), points[:, 2].max()
+    margin = END * (high - low)
+    z = np.linspace(low + margin, high - margin, HEIGHTS)
+    middle, loops = largest_loops(points, triangles, z)
+    known = np.isfinite(middle[:, 0])
+    if np.count_nonzero(known) < FEWEST:
+        raise MeshError(
+            f"the mesh has closed sections at {np.count_nonzero(known)} of {HEIGHTS} heights along its axis; expected"
+            f" at least {FEWEST}: choose another axis, or give poses"
+        )
+    smooth = smooth_spline(z[known], middle[known], wavelength, (z[known][0], z[known][-1]))
+    inside = (z >= z[known][0]) & (z <= z[known][-1])
+    return CentreLine(z[inside], smooth(z[inside]), loops[inside])
+
+
+def largest_loops(points: FloatArray, triangles: IntArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Centroids ``(k, 2)`` of the largest loop at every height (NaN: none), and how many loops enclose material."""
+    segments, cut = sections(points, triangles, z)
+    middle, count = np.full((len(z), 2), np.nan), np.zeros(len(z), dtype=np.int64)
+    for k in range(len(z)):
+        areas, centroids = _loops(segments[cut == k])
+        if len(areas) and areas.max() > 0.0:
+            middle[k], count[k] = centroids[areas.argmax()], np.count_nonzero(areas > ARM * areas.max())
+    return middle, count
+
+
+def _loops(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Areas ``(l,)``, positive round material, and centroids ``(l, 2)`` of the loops of segments ``(m, 2, 2)``."""
+    # segments of neighbouring triangles share their end points to the last bit, so loops are found without a tolerance
+    ends, number = np.unique(segments.reshape(-1, 2), axis=0, return_inverse=True)
+    first, last = number.reshape(-1, 2).T
+    joined = coo_array((np.ones(len(first)), (first, last)), shape=(len(ends), len(ends)))
+    loops, of_end = connected_components(joined, directed=False)
+    loop = of_end[first]
+    p, q = segments[:, 0], segments[:, 1]
+    base = np.stack([np.bincount(of_end, ends[:, i], loops) / np.bincount(of_end, minlength=loops) for i in (0, 1)], 1)
+    p, q = p - base[loop], q - base[loop]  # about its own middle: far from the axis areas would cancel
+    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    area = 0.5 * np.bincount(loop, cross, loops)
+    moment = np.stack([np.bincount(loop, cross * (p + q)[:, i], loops) for i in (0, 1)], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return area, base + moment / (6.0 * area[:, None])
