@@ -44,7 +44,7 @@ def _growth(scene: Scene, plan: Any, choice: Any, comm: Any) -> Growth:
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
-        made = on_rank0(comm, make_plan, scene, *about, rounds)
+        made = on_rank0(comm, make_plan, scene, *about, True, rounds)
         return made, work(refined(scene, rounds), choice)
 
     return Growth(study, lambda result: next_stations(result, scene, each))

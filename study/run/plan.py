@@ -60,7 +60,7 @@ class Plan:
 
 
 def make_plan(
-    scene: Any, scene_file: str = "", overrides: Sequence[str] = (), rounds: Rounds = (), ordered: bool = False
+    scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False, rounds: Rounds = ()
 ) -> Plan:
     """The plan of a scene, with the stations that ``rounds`` of refinement added; builds its objects.
 
@@ -213,7 +213,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
         "no grasp": _no_grasps(plan),
-        **_rounds(plan, scene),
+        "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
@@ -235,14 +235,14 @@ def _no_grasps(plan: Plan) -> str:
     return "; ".join(found)
 
 
-def _rounds(plan: Plan, scene: Any) -> dict[str, str]:
-    """What a refinement may add."""
+def _rounds(plan: Plan, scene: Any) -> str:
+    """What a refinement may add; empty without one."""
     asked = scene.candidates.refine
     if asked is None:
-        return {}
+        return ""
     each = added_cases(plan.units, plan.layout)
     text = f"up to {asked.budget // each} more stations, {each} cases each, until the best is known to"
-    return {"rounds": f"{text} {asked.best_within:.2g} of itself; not in the numbers above and below"}
+    return f"{text} {asked.best_within:.2g} of itself; not in the numbers above and below"
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:

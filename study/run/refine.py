@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import LOST
-from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.quantities import DONE, MISSING
 
 if TYPE_CHECKING:
     from softjaw.study.scene import Scene
@@ -37,6 +37,8 @@ def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
     numbers = _Renumbered(given, stations, len(where.angles_deg))
     fixed: dict[str, Any] = {"stations": None, "station_range_mm": None, "stations_mm": stations, "refine": None}
+    # What was left out as not among the best stays so in the file; the added stations are all solved.
+    fixed["solve_best"] = None
     parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
     if not isinstance(names := scene.limit_surface.wrench_samples, str):
         samples = numbers(where.numbers(names))

@@ -105,16 +105,16 @@ class Candidates(SceneSection):
     )
     count: int = Field(12, ge=1, le=1000, description="distinct grasps that the sampler gives at most")
     seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
-    solve_best: int | None = Field(
-        None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
-    )
-    skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     refine: Annotated[Refinement | None, BeforeValidator(_switched)] = Field(
         None,
         description="solves further stations where the best grasp may lie between the given ones",
         examples=[True],
         json_schema_extra=_also_a_switch,
     )
+    solve_best: int | None = Field(
+        None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
+    )
+    skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
 
     @property

@@ -23,7 +23,7 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True, rounds=(), wide=-1):
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=()):
     """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide.
 
     Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
@@ -49,8 +49,7 @@ def fake_plan(digest="scene", stations=6, derived=True, rounds=(), wide=-1):
         for a in [(0, 1)] if name % 2 == 0 else [(0,), (1,)]:
             served = tuple(rows[i] for i in a)
             unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
-            unit.first = (2 * name + a[0]) * FORCES
-            unit.state, unit.reason, unit.hopeless = 0, "", False
+            unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
             units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"

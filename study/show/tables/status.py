@@ -43,6 +43,7 @@ def status_json(result: Any) -> str:
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"added_stations_mm": [list(some) for some in result.layout.added]}
     found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
