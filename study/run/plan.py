@@ -105,6 +105,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), o
 def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
     asked["two scores"] = scene.accuracy.meshes > 1
