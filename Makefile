@@ -13,6 +13,8 @@ BIN     = .venv/bin
 LIMIT   = timeout -k 30
 # Of the benchmark: any of kernels linearised element contact factors map; all if empty.
 PARTS   =
+# Of the random scenes and bodies of `make objects`: the page of 0 is kept in docs, those of others beside their results.
+SEED    = 0
 # Exit code of a finished study with failed cases; the report lists them with their reasons.
 SOME_FAILED = 6
 
@@ -34,7 +36,7 @@ NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures effects test test-blas test-long bench hard-cases lint doctor
+.PHONY: help setup map figures effects test test-blas test-long bench hard-cases objects lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
@@ -45,6 +47,7 @@ help:
 	@echo 'make test-long  the checks that take minutes'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
+	@echo 'make objects    scans, hollow bodies, mugs and random scenes, into docs/objects.md; SEED=7 for others'
 	@echo 'make lint       ruff and mypy'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
 	@echo 'make setup      only what each of the above does first: packages and .venv'
@@ -88,6 +91,9 @@ test-long: setup
 
 hard-cases: setup
 	$(BIN)/python -m pytest -q -n 2 tests/hard_cases -m "" --table docs/hard-cases.md
+
+objects: setup
+	$(BIN)/python -m tests.objects.survey --seed $(SEED) --mpirun '$(MPIRUN)'
 
 bench: setup
 	$(BIN)/python -m tests.benchmark.run $(PARTS)

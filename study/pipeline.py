@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
@@ -90,16 +90,17 @@ def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | Cas
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
-    """The result of the ``c``-th candidate that a unit serves: the same grasp, turned about the object's axis."""
-    angle = unit.turns[c]
-    if angle == 0.0:
-        return result
+    """The result of the ``c``-th candidate that a unit serves, in the frame of the object's own file.
+
+    It is the same grasp, turned about the object's axis.
+    """
+    angle, placed = unit.turns[c], own_frame(unit.scene.object)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
+    rotation = placed.rotation @ turn
     values = dict(result.values)
-    values["fingers/pose_rotation"] = turn @ values["fingers/pose_rotation"]
-    values["fingers/pose_origin"] = values["fingers/pose_origin"] @ turn.T
-    if "wall/place" in values:
-        values["wall/place"] = values["wall/place"] @ turn.T
+    values["fingers/pose_rotation"] = rotation @ values["fingers/pose_rotation"]
+    for name in {"fingers/pose_origin", "wall/place"} & values.keys():
+        values[name] = values[name] @ rotation.T + placed.origin
     return replace(result, values=values)
 
 
@@ -107,6 +108,9 @@ def _state_values(contacts: Sequence[PressedContact]) -> dict[str, Any]:
     """What the solved states say beside their patches."""
     closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
+    one, two = (c.pose for c in contacts)
+    opening = float((two.origin - one.origin) @ one.rotation[:, 2])
+    values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}
     return values | {f"checks/{name}": [own[name] for own in checks] for name in checks[0]}
 
 

@@ -15,11 +15,13 @@ MODELS = ("ccm", "pcm", "pcm_projected")
 MODEL_NAMES = dict(zip(MODELS, ("CCM", "PCM", "PCM scaled by F_N"), strict=True))  # in legends and captions
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
-STATES = ("not computed", "complete", "failed")  # of a case, by these codes:
-MISSING, DONE, FAILED = range(3)
+# States of a case, by these codes. From WIDE on there is no grasp worth a solve: neither solved nor failed.
+STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips", "not among the best")
+MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
+NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "two scores")
 HELD = ("cor grid", "samples", "probes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
@@ -144,6 +146,13 @@ TABLE = (
              "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
              "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
              " as in the paper.", rank=1),
+    Quantity("payload", M, "kg", "mass that is held",
+             "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
+             " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
+             " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
+             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3),
+    Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
+             symbol="safety", needs="mass"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
              "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
              " many motions.", symbol="fitted", rank=9),
@@ -183,6 +192,12 @@ TABLE = (
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
     Quantity("closing", (), "m", "closing displacement of the pad",
              "How far the pad's back moved towards the object after first touch; mean of both fingers."),
+    Quantity("opening", (), "m", "opening at first touch",
+             "Distance of the undeformed contact faces of both pads, along the approach, when they touch the object.",
+             rank=11),
+    Quantity("opening_loaded", (), "m", "opening under load",
+             "Opening at first touch less the closing displacements of both pads, as the gripper shows it then.",
+             symbol="loaded", rank=12),
     Quantity("contact_area", (), "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
     Quantity("p_max", (), "Pa", "largest pressure", "Largest contact pressure on either finger."),
     Quantity("contact_distance", (), "m", "distance of the contacts", "Distance between the contact frames' origins."),
@@ -221,13 +236,8 @@ TABLE = (
                  needs="two meshes")
         for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_pcm_projected")
     ),
-    Quantity("safety_factor", M, "", "weight held over weight",
-             "How many times its own weight the object could have before the grasp, with the normal force of this "
-             "case on both fingers, lost it, with the hull of the sampled wrenches as limit surface (on the safe "
-             "side). Below 1 it cannot hold the object. The centre of mass is that of [task], or the middle of the "
-             "box round the object.", symbol="safety", needs="mass", rank=5),
     Quantity("indentation", (), "m", "indentation of the wall",
-             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=3),
+             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=5),
     Quantity("wall_stress", (), "Pa", "largest stress in the wall",
              "Largest von Mises stress on its two faces.", symbol="stress", needs="wall", rank=6),
     Quantity("wall_strain", (), "", "largest strain of the wall",
@@ -253,10 +263,10 @@ TABLE = (
     Quantity("frame_flag", F, "", "flag of the contact frame",
              "0: regular; otherwise a rule for a degenerate patch chose the frame.", "fingers"),
     Quantity("pose_rotation", (*F, "component", "component_2"), "", "rotation of the pad",
-             "x_object = rotation x_pad + origin.", "fingers"),
+             "x = rotation x_pad + origin, in the frame of the object's own file.", "fingers"),
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
-             "Centre of the undeformed contact face at first touch, in the object's frame; under load the pad's back "
-             "has moved on by the closing displacement, along its z axis.", "fingers"),
+             "Centre of the undeformed contact face at first touch, in the frame of the object's own file; under load "
+             "the pad's back has moved on by the closing displacement, along its z axis.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
     Quantity("adhesion", F, "", "largest adhesion",
@@ -321,9 +331,9 @@ TABLE = (
              "As fit error, over the motions it was fitted to.", "limit_surface", needs="six components"),
     # deformed wall
     Quantity("place", ("wall_place", "component"), "m", "deformed wall",
-             f"Outer face in the object's frame at {AROUND} angles about the axis, in equal steps from finger 1's,"
-             f" times {ALONG} places along the outline, in equal steps of its arc length from the bottom's middle or"
-             " rim to the top; the angle runs slowest.", "wall", needs="wall"),
+             f"Outer face in the frame of the object's own file at {AROUND} angles about the axis, in equal steps from"
+             f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
+             " middle or rim to the top; the angle runs slowest.", "wall", needs="wall"),
     # large arrays
     Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
              "Friction (f_x, f_y, tau_z) of the CCM in the contact frame, for turns about the points of a"
@@ -359,7 +369,7 @@ TABLE = (
     # how the case stands
     Quantity("code", (), "", "state of the case", "Whether it has values.", "status", meanings=STATES),
     Quantity("attempts", (), "", "times this case was begun", "Without coming to an end, or with.", "status"),
-    Quantity("message", (), "", "why a case failed, or what to know about a result", "Empty where all is said.",
+    Quantity("message", (), "", "why a case has no result, or what to know about one", "Empty where all is said.",
              "status"),
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))

@@ -74,7 +74,7 @@ def check(
         adhesion=max(0.0, -float(pressure.min())) / largest,
         penetration=max(0.0, -float(gap.min())) / size,
         complementarity=float(np.abs(pressure * gap).max(initial=0.0)) / (largest * size),
-        penetration_depth=max(0.0, -float(points.gap.min())),
+        penetration_depth=points.depth,
         min_det_f=det,
         max_strain=strain,
         ellipticity=ellipticity,

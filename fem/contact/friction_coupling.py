@@ -83,7 +83,7 @@ class CoupledProblem(ContactProblem):
         """As that of the frictionless problem, with the friction forces of the points."""
         pressure, gap, p = super().contact_state(x)
         friction = self.pad.face_area[..., None] * self._traction(x)[0]
-        return pressure, gap, ContactPoints(p.position, p.normal, p.gap, p.load, friction)
+        return pressure, gap, ContactPoints(p.position, p.normal, p.depth, p.load, friction)
 
     def _pressure(self, x: FloatArray) -> FloatArray:
         """Nominal pressures of the points ``(faces, points)`` [Pa], negative ones of quadratic faces cut off."""

@@ -1,10 +1,10 @@
 """Press a pad on an object along a load path, each normal force started from the one before.
 
-A force that Newton's method does not reach in one step is approached by step halving. Where that fails, or the pad
-jumps, and a fallback pad with nodal gaps is given, the load path continues with that one, from first contact (weighted
-gaps couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever).
-Where that fails too, or there is none, displacement control takes over until the force is bracketed. Every state that
-is passed on has converged and has been checked.
+A force that Newton's method does not reach in one step is approached by step halving, then by displacement control
+until the force is bracketed. Where that fails and a fallback pad with other gaps is given, the load path continues with
+that one, from first contact. A pad with weighted gaps leaves its path to one with nodal gaps sooner, before
+displacement control and where it jumps: weighted gaps couple neighbouring pressures, and a pad's rim on a steep slope
+can fold or make their active set cycle for ever. Every state that is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ class Pressed:
         Position, normal and load of the quadrature points of the meshed contact face.
     path_dependent : bool
         Whether the pad has jumped before: another load path may lead to another state.
+    instead : bool
+        Whether the fallback pad was taken.
     """
 
     force: float
@@ -62,11 +64,12 @@ class Pressed:
     halvings: int
     seconds: Seconds
     path_dependent: bool = False
+    instead: bool = False
 
 
 def pressed(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
-    settings: Settings, work: Work, seconds: Seconds, path_dependent: bool = False,
+    settings: Settings, work: Work, seconds: Seconds, path_dependent: bool = False, instead: bool = False,
 ) -> Pressed:  # fmt: skip
     """State of one pad that has passed its checks; parameters as in ``fem.contact.checks.check``."""
     pad, (pressure, _, points) = foam.pad, state
@@ -74,7 +77,7 @@ def pressed(
     contact_face = (pad.nodes + pad.displacement(x))[pad.contact_nodes]
     return Pressed(
         force, float(x[pad.closing_dof]), x, pad, pressure, contact_face, points, checks, work.iterations, work.steps,
-        work.halvings, seconds, path_dependent,
+        work.halvings, seconds, path_dependent, instead,
     )  # fmt: skip
 
 
@@ -90,7 +93,7 @@ class Press(LoadPath):
     options : dict
         PETSc options with the prefix ``contact_``.
     fallback : Pad, optional
-        The same pad with nodal gaps, for forces at which ``pad`` has no solution.
+        The same pad with other gaps, for forces at which ``pad`` has no solution.
     settings : Settings
     problem_of : callable
         Pad and gap to the problem.
@@ -108,6 +111,16 @@ class Press(LoadPath):
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
     load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
     stepping: type[Stepping] = Following
+
+    def __post_init__(self) -> None:
+        """Set up the solver."""
+        self._wanted = self.pad
+        super().__post_init__()
+
+    @property
+    def _leads(self) -> bool:
+        """Whether displacement control may take over, and jumps are passed, with the pad at hand."""
+        return self.fallback is None or self.pad.contact == "nodal"
 
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
@@ -150,16 +163,17 @@ class Press(LoadPath):
             state = self.problem.contact_state(x)
             yield pressed(
                 self.problem.foam, x.copy(), state, left_over, force, self.settings, work, elapsed(),
-                self._stepping.jumped,
+                self._stepping.jumped, self.pad is not self._wanted,
             )  # fmt: skip
 
-    def _from_first_contact(self, nodal: Pad, force: float, work: Work) -> FloatArray:
-        """State at ``force`` of the pad with nodal gaps, else of the pad itself beyond a jump, from first contact on.
+    def _from_first_contact(self, other: Pad, force: float, work: Work) -> FloatArray:
+        """State at ``force`` of the other pad, else of one with weighted gaps beyond a jump, from first contact on.
 
         All forces that follow keep to the pad that was found to serve.
         """
         # no fallback from here on, so that displacement control may take over and jumps are passed
-        pads, self.fallback, errors = (nodal, self.pad), None, []
+        pads = (other,) if self._leads else (other, self.pad)
+        self.fallback, errors = None, []
         for pad in pads:
             self.pad = pad
             self._start_again()
@@ -167,7 +181,7 @@ class Press(LoadPath):
                 return self._step_to(None, 0.0, force, work)
             except ConvergenceError as error:
                 errors.append(error)
-        # the nodal pad's: what failed for the pad itself has failed once before
+        # the other pad's: what failed for the pad itself has failed once before
         raise errors[0]
 
     def _step_to(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
@@ -180,7 +194,7 @@ class Press(LoadPath):
         try:
             # the first contact may bear more than the first steps ask for
             for goal in (f for f in steps if f > reached or f == force):
-                x, reached = self._stepping.step_to(x, reached, goal, work, by_displacement=self.fallback is None), goal
+                x, reached = self._stepping.step_to(x, reached, goal, work, by_displacement=self._leads), goal
             return x
         except ConvergenceError as error:
             raise explained(error, self.problem.foam, *self._last) from error

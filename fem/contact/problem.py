@@ -61,8 +61,9 @@ class ContactPoints:
     ----------
     position, normal : (faces, points, 3) arrays
         Deformed points [m] and the object's outward normals there.
-    gap : (faces, points) array
-        Signed distance to the object [m]; the solve makes its weighted mean at a node non-negative, not every value.
+    depth : float
+        How far the deepest Gauss point of the contact face is inside the object [m]; the solve keeps the nodes outside,
+        each by itself or with the weighted mean round it, not every point.
     load : (faces, points) array
         Contact pressure times reference area [N].
     friction : (faces, points, 3) array, optional
@@ -71,7 +72,7 @@ class ContactPoints:
 
     position: FloatArray
     normal: FloatArray
-    gap: FloatArray
+    depth: float
     load: FloatArray
     friction: FloatArray | None = None
 
@@ -116,10 +117,13 @@ class PressedPad:
         """Nominal pressures of the contact face's nodes at the whole state ``x`` [Pa]."""
         return self.kappa * x[self.pressures]
 
-    def points(self, x: FloatArray) -> FloatArray:
-        """Quadrature points of the deformed contact face in the pad's frame ``(facets, points, 3)`` [m]."""
+    def points(self, x: FloatArray, N: FloatArray | None = None) -> FloatArray:
+        """Points of the deformed contact face in the pad's frame ``(facets, points, 3)`` [m].
+
+        ``N (points, k)`` are the facets' shape functions there; by default the points are those of the quadrature.
+        """
         corners = (self.pad.nodes + self.pad.displacement(x[self.own]))[self.pad.face_nodes]
-        return np.einsum("qa,fai->fqi", self.pad.face_N, corners)
+        return np.einsum("qa,fai->fqi", self.pad.face_N if N is None else N, corners)
 
     def nodal(self, values: FloatArray) -> FloatArray:
         """Sums ``(n,)`` over the facets of values ``(facets, k)`` at their nodes."""
@@ -319,7 +323,10 @@ class ContactProblem(PressedPad):
         """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
         weighted_gap = self._contact(x, tangent=False)
         pressure = borne(self.pressure(x), self.active(x[self.pressures], weighted_gap))
-        points = ContactPoints(self._points, self._normal, self._gap, self.loads(pressure))
+        # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
+        between = self.gap(self.points(x, self.pad.gauss_N).reshape(-1, 3))[0]
+        depth = max(0.0, -float(between.min()))
+        points = ContactPoints(self._points, self._normal, depth, self.loads(pressure))
         return pressure, weighted_gap / self.area, points
 
 

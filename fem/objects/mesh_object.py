@@ -55,6 +55,8 @@ class MeshObject:
         Edges that turn by less are taken for facets of a smooth surface [deg]; 0 keeps every facet flat.
     lids : (l,) array of int
         Triangles that close a large hole: they tell inside from outside, and no pad may stand on them.
+    placed : Pose
+        Where the object's frame lies in that of the mesh file [m].
     crossing : str
         The note on closed parts that cross each other; empty if there are none.
     """
@@ -65,6 +67,7 @@ class MeshObject:
     notes: tuple[str, ...] = ()
     crease_angle: float = CREASE_ANGLE
     lids: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    placed: Pose = field(default_factory=lambda: Pose(np.eye(3), np.zeros(3)))
     crossing: str = ""
 
     def __post_init__(self) -> None:
@@ -89,11 +92,13 @@ class MeshObject:
             sound = sound_mesh(corners, triangles, unit)
         except MeshError as problem:
             raise MeshError(f"{path}: {problem}") from problem
-        points = sound.points[:, TURNS[axis]]
+        turn = np.eye(3)[:, TURNS[axis]]
+        points = sound.points @ turn
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
         points = np.ascontiguousarray(points - origin)
-        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, sound.lids, sound.crossing)
+        placed, lids = Pose(turn, turn @ origin), sound.lids
+        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, lids, placed, sound.crossing)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m] to the flat triangles, its unit gradient ``(n, 3)`` and a Hessian of zeros.

@@ -149,6 +149,11 @@ class Grip(LoadPath):
     settings: Settings = field(default_factory=Settings)
     fallback: Callable[[], GripProblem] | None = None
 
+    def __post_init__(self) -> None:
+        """Set up the solver."""
+        self._wanted = self.problem
+        super().__post_init__()
+
     def _set_up(self) -> None:
         fingers = self.problem.fingers
         self.opening = Opening(self.problem.model.shell.mesh)
@@ -268,7 +273,7 @@ class Grip(LoadPath):
             part = seconds if k == 0 else Seconds()
             fingers.append(pressed(
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
-                work if k == 0 else Work(), part,
+                work if k == 0 else Work(), part, instead=problem is not self._wanted,
             ))  # fmt: skip
         load, q = problem.wall_load(x), problem.wall_state(x)
         worst = residual[: problem.model.size].max(initial=0.0)

@@ -277,7 +277,7 @@ class GripProblem:
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
         load = np.where(gap < FAR, f.loads(pressure), 0.0)
-        return pressure, c.weighted / f.area, ContactPoints(own, normal, gap, load)
+        return pressure, c.weighted / f.area, ContactPoints(own, normal, max(0.0, -float(gap.min())), load)
 
     def _no_force(self) -> FloatArray:
         return np.zeros((len(self.model.first), 3))

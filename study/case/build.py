@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.objects import shapes as objects
-from softjaw.fem.objects.gap import GapObject
+from softjaw.fem.objects.gap import GapObject, Pose
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
@@ -52,6 +52,11 @@ def build_object(shape: Any) -> GapObject:
         case "plane":
             return objects.Plane(shape.thickness)
     raise ValueError(f"no object is built from the shape '{shape.shape}'")
+
+
+def own_frame(shape: Any) -> Pose:
+    """Where the object's frame lies in that of its mesh file [m]; every other shape is described in its own frame."""
+    return geometry().mesh_object(shape).placed if shape.shape == "mesh" else Pose(np.eye(3), np.zeros(3))
 
 
 @lru_cache(maxsize=8)

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.build import middle_of
+from softjaw.study.case.build import middle_of, own_frame
+from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -49,8 +50,9 @@ def candidates(scene: Scene) -> list[Candidate]:
     """The grasp candidates in the order of their rows: stations, then angles at each."""
     where = scene.candidates
     if where.poses:
+        placed = own_frame(scene.object)
         return [
-            Candidate(float(i), 0.0, 0.0, explicit_poses(pose), label)
+            Candidate(float(i), 0.0, 0.0, explicit_poses(pose, placed), label)
             for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
     middle, half = middle_of(scene), in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
@@ -86,10 +88,14 @@ def shortest_turn(tangent: FloatArray) -> FloatArray:
     return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
 
 
-def explicit_poses(pose: GraspPose) -> tuple[Pose, Pose]:
-    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts."""
-    approach = np.array(pose.approach) / np.linalg.norm(pose.approach)
-    return opposed_poses(np.array(pose.point), approach, across(approach, np.array(pose.long_side)))
+def explicit_poses(pose: GraspPose, placed: Pose) -> tuple[Pose, Pose]:
+    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts.
+
+    ``placed`` is where the object's frame lies in that of its file, in which the grasp is given.
+    """
+    approach = (np.array(pose.approach) / np.linalg.norm(pose.approach)) @ placed.rotation
+    long_side = across(approach, np.array(pose.long_side) @ placed.rotation)
+    return opposed_poses(placed.to_pad(np.array(pose.point)), approach, long_side)
 
 
 def across(approach: FloatArray, along: FloatArray) -> FloatArray:
@@ -219,6 +225,10 @@ class Unit:
         Work, in element solves; only ratios mean something.
     probe : bool
         Whether it is solved again with inputs changed, as `study.case.probing` does.
+    state, reason : int, str
+        One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
+    hopeless : bool
+        Whether a bed of springs says that it cannot hold, or bears on a pad's rim: it comes last in the order of work.
     """
 
     index: int
@@ -229,6 +239,9 @@ class Unit:
     turns: tuple[float, ...]
     cost: float
     probe: bool = False
+    state: int = MISSING
+    reason: str = ""
+    hopeless: bool = False
 
 
 def axes(scene: Scene) -> list[Axis]:

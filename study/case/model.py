@@ -151,12 +151,18 @@ def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) 
     return pad(scene.gripper, symmetry, rule, coarser, backing_plate_level(scene).elastic)
 
 
+def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
+    """How gaps are collocated, and how where that has no solution; ``walled``: on a wall that gives way."""
+    if scene.accuracy.contact == "auto" and scene.gripper.element == "hex8" and not walled:
+        return "nodal", "weighted"
+    return ("nodal",) if scene.accuracy.contact == "nodal" else ("weighted", "nodal")
+
+
 def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     """Pad on its object, with friction where the scene wants it to act back."""
-    elements, rule = pad_shape(scene.gripper, coarser).elements, scene.accuracy.contact
-    symmetry = usable_symmetry(scene, finger, elements)
-    wanted, nodal = (pad_of(scene, symmetry, r, coarser) for r in (rule, "nodal"))
-    fallback = None if nodal is wanted else nodal
+    symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
+    wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
+    fallback = others[0] if others else None
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
         return Press(wanted, finger.gap, dict(scene.petsc), None, settings(scene), problem, load_steps, Stepping)
@@ -195,7 +201,8 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
     if missed:
         lines = [
             f"candidates.poses[{i}]: found '{places[i].label}', where {who} the object; expected a line of"
-            " approach on which both pads meet it; change point_mm (in mm, in the object's frame) or approach"
+            " approach on which both pads meet it; change point_mm (in mm, in the frame of the object's own file) or"
+            " approach"
             for i, who in list(missed.items())[:MOST_NAMED]
         ]
         more = [f"and {len(missed) - MOST_NAMED} more poses pass the object"] if len(missed) > MOST_NAMED else []

@@ -19,20 +19,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import angle, slips
+from softjaw.study.case.fit import Jaws, bed_closing, fit_of, jaws_of
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import Candidates, GraspPose
-from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GRID = (25, 11)  # points of a pad's face along length and width
-FINGER_GRID = (31, 21)  # of a finger, where it is larger than its pad
 SAMPLES = 300  # points of the surface from which grasps are looked for
 TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
@@ -42,7 +43,6 @@ APART = 0.25  # of the pad's length: grasps that are nearer, and alike in direct
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
 STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
 WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of a grasp
-WIDE, COLLIDES, SLIPS = "too wide", "collides", "slips"
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class SampledGrasp:
         Distance of the pads' faces at first touch [m].
     quality : float
         Torque arm of the weaker finger, less what curvature and misalignment take, for ranking [m].
-    state : str
-        Empty, or why it is not worth a solve: `WIDE`, `COLLIDES`, `SLIPS`.
+    state : int
+        Why it is not worth a solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
     """
 
     point: FloatArray
@@ -68,19 +68,7 @@ class SampledGrasp:
     long_side: FloatArray
     opening: float
     quality: float
-    state: str = ""
-
-
-@dataclass(frozen=True)
-class Jaws:
-    """What a grasp is looked for with: lengths [m], stiffness of the springs [Pa/m], normal force [N]."""
-
-    pad: tuple[float, float, float]
-    stiffness: float
-    mu: float
-    force: float
-    max_opening: float = math.inf
-    finger: tuple[float, float] | None = None  # length and width of what carries the pad; None: as the pad
+    state: int = MISSING
 
 
 @njit(cache=True)
@@ -165,20 +153,6 @@ class Side:
         return float((self.pressure * cosine).sum() / self.pressure.sum())
 
 
-def stiffness(gripper: Gripper) -> float:
-    """Modulus of confined compression over the pad's thickness [Pa/m]."""
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
-
-
-def bed_closing(height: FloatArray, wanted: float) -> float:
-    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
-    h = np.sort(height[np.isfinite(height)])
-    # for the k lowest springs in contact the closing is known; the largest k that touches is right
-    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
-    return float(closing[np.flatnonzero(closing >= h)[-1]])
-
-
 class JawsOnSurface:
     """Both pads on a surface, in one pose of the gripper."""
 
@@ -219,15 +193,6 @@ class JawsOnSurface:
         (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
         line = np.array([u - x, -v - y, self.opening])
         return angle(one, -two), max(angle(one, line), angle(-two, line))
-
-    def collides(self) -> bool:
-        """Whether the object reaches past a backing plate beside the pad, where the finger is larger than the pad."""
-        if self.jaws.finger is None:
-            return False
-        steps = (np.linspace(-0.5, 0.5, n) * side for side, n in zip(self.jaws.finger, FINGER_GRID, strict=True))
-        low, high = height_fields(self.local, self.triangles, *steps)
-        depth = self.jaws.pad[2]
-        return bool(low.min() < self.sides[0].touch - depth or high.max() > -self.sides[1].touch + depth)
 
 
 def straightened(
@@ -352,12 +317,8 @@ def judged(grip: JawsOnSurface) -> SampledGrasp:
     """State and rank of a grasp: the weaker finger's torque arm, less what curvature and misalignment take."""
     normals, line = grip.misalignment
     quality = min(side.arm * side.kept for side in grip.sides) * max(0.0, 1.0 - normals / WORST)
-    state = ""
-    if grip.opening > grip.jaws.max_opening:
-        state = WIDE
-    elif grip.collides():
-        state = COLLIDES
-    elif slips(line, grip.jaws.mu):
+    state = fit_of(grip.local, grip.triangles, grip.jaws).state
+    if not state and slips(line, grip.jaws.mu):
         state = SLIPS
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, quality, state)
 
@@ -398,27 +359,25 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     StudyError
         Where no grasp fits between the pads.
     """
-    gripper, forces = scene.gripper, scene.load.normal_force
-    jaws = Jaws(
-        gripper.pad_size, stiffness(gripper), scene.friction.mu, forces[len(forces) // 2],
-        math.inf if gripper.max_opening is None else gripper.max_opening,
-    )  # fmt: skip
     obj = build_object(scene.object)
-    found = antipodal_grasps(obj.surface(), jaws, scene.candidates.count, scene.candidates.seed)
-    poses = tuple(_as_pose(grasp) for grasp in found if not grasp.state)
+    found = antipodal_grasps(obj.surface(), jaws_of(scene), scene.candidates.count, scene.candidates.seed)
+    placed = own_frame(scene.object)
+    poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
-        states = sorted({grasp.state for grasp in found}) or ["the pads pass the object"]
+        states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads pass the object"]
         raise StudyError(
             USAGE,
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    return scene.model_copy(update={"candidates": Candidates(poses=poses)})
+    kept = {key: getattr(scene.candidates, key) for key in ("solve_best", "skip_hopeless")}
+    return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 
-def _as_pose(grasp: SampledGrasp) -> GraspPose:
-    place = _rounded([converted(float(x), "m", "mm") for x in grasp.point], 3)
-    approach, long_side = _rounded(grasp.approach, 6), _rounded(grasp.long_side, 6)
+def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:
+    """A grasp in the frame of the object's own file, as a scene gives it."""
+    place = _rounded([converted(float(x), "m", "mm") for x in placed.to_object(grasp.point)], 3)
+    approach, long_side = (_rounded(placed.rotation @ v, 6) for v in (grasp.approach, grasp.long_side))
     label = f"{place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f} mm, {_angle_text(approach)}"
     return GraspPose(point_mm=place, approach=approach, long_side=long_side, label=label)
 

@@ -22,7 +22,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
-from softjaw.study.case.model import Finger, pad_of, press_of, settings
+from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
 from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.scene import Scene
@@ -49,7 +49,7 @@ class PressedContact(Contact):
         patch = extract(state.pad, state)
         super().__init__(seen(patch) if seen else patch, scene.friction.mu, finger.pose, whole_face=True)
         self.finger, self.state = finger, state
-        self.nodal_instead = state.pad.contact != scene.accuracy.contact
+        self.nodal_instead = state.instead and state.pad.contact == "nodal"
 
     def of(self, finger: Finger) -> PressedContact:
         """The same contact of another finger, which stands where the object looks the same."""
@@ -130,7 +130,7 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
         return OnRigid(scene, fingers, poses, None)
     _refuse_along_axis(fingers)
     held = _grasp(scene, fingers, False)
-    pad = pad_of(scene, held.pad_symmetry, scene.accuracy.contact, False)
+    pad = pad_of(scene, held.pad_symmetry, contact_rules(scene, walled=True)[0], False)
     closing = SpringBed(pad, fingers[0].gap).closing(scene.load.normal_force[-1])
     level = choose_level(scene, held, closing)
     if level.number == RIGID:
@@ -257,9 +257,9 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: WallLevel, co
         return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
-    rule = scene.accuracy.contact
-    fallback = None if rule == "nodal" else lambda: problem("nodal")
-    return Grip(problem(rule), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
+    first, *others = contact_rules(scene, walled=True)
+    fallback = (lambda: problem(others[0])) if others else None
+    return Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
 
 
 def _gap(finger: Finger, turned: bool):

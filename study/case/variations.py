@@ -150,7 +150,8 @@ def probe_candidates(scene: Scene, units: Sequence[Any]) -> tuple[int, ...]:
     forces = len(scene.load.normal_force)
     first = {unit.index: unit.rows[0][0] // forces for unit in units}
     if isinstance(own.probes, int):
-        return tuple(sorted(first[unit.index] for unit in spread(units, own.probes)))
+        tried = [unit for unit in units if not unit.state]
+        return tuple(sorted(first[unit.index] for unit in spread(tried, own.probes))) if tried else ()
     named = () if isinstance(own.probes, int) else scene.candidates.numbers(own.probes)
     # A named candidate may be an image: the unit that serves it is the probe.
     serving = {rows[0] // forces: first[unit.index] for unit in units for rows in unit.rows}

@@ -56,7 +56,7 @@ def prepare(scene: Scene, options: Namespace, choice: Any = None) -> Any:
     # A wrong option would fail every case alike, after hours of a large study.
     _check_petsc(dict(scene.petsc))
     given = [*options.overrides, *petsc_overrides(options.petsc), *(choice.overrides() if choice else [])]
-    plan = make_plan(scene, options.scene, given)
+    plan = make_plan(scene, options.scene, given, ordered=True)
     check_poses(scene, [unit.scene for unit in plan.units])
     for line in told(scene):
         print(line, flush=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
-from softjaw.study.quantities import FORCE_RANGE, MAIN
-from softjaw.study.result.layout import MISSING
+from softjaw.study.quantities import FAILED, FORCE_RANGE, MAIN, MISSING
+from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
 
 if TYPE_CHECKING:
@@ -163,7 +163,11 @@ class GraspPoint:
         cases = self._cases(i)
         if state == NO_RESULT:
             bad = next(c for c, n in cases if not self.map.done.ravel()[n])
-            what = "is not solved yet" if source.status[bad] == MISSING else f"failed: {source.messages[bad]}"
+            state = source.status[bad]
+            what = "is not solved yet"
+            if state != MISSING:
+                word = "failed" if state == FAILED else f"is no grasp, {OF_CASES[state]}"
+                what = f"{word}: {source.messages[bad]}"
             return f"no value: the case beside it at {source.case(bad)} {what}"
         if state == SNAP:
             before, after = (next(c for c, n in cases if self.map.snapped.ravel()[n] == side) for side in (False, True))

@@ -14,14 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.quantities import MISSING
+from softjaw.study.quantities import MISSING, STATES
 from softjaw.study.result.datasets import CLOSING, STATE, SUMS, Column
 from softjaw.study.result.guarded import GuardedFile
-from softjaw.study.result.layout import DONE, FAILED, ROOT, Layout
+from softjaw.study.result.layout import ROOT, Layout
 
 BLOCK = 2**24  # bytes of rows that are put side by side at a time
-OF_STATE = {state: zlib.crc32(bytes([state])) for state in (MISSING, DONE, FAILED)}
+OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
+PLACED = ("object_rotation", "object_origin")
 
 
 def of_array(values: Any) -> int:
@@ -74,7 +75,8 @@ def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_wa
     if under_way and wrong.any():
         # A kill between checksum and state leaves exactly this: begun, not computed, and the sum of an end.
         begun = file.values(file.checked(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"))).ravel() > 0
-        wrong &= ~(begun & (codes == MISSING) & np.isin(stored, [OF_STATE[DONE], OF_STATE[FAILED]]))
+        ends = [crc for state, crc in OF_STATE.items() if state != MISSING]
+        wrong &= ~(begun & (codes == MISSING) & np.isin(stored, ends))
     return np.flatnonzero(wrong)
 
 
@@ -92,6 +94,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     for name in ("scene", *axes):
         found = file.attributes(f"{ROOT}/{name}")
         parts.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
+        parts += [np.asarray(found[key]).tolist() for key in PLACED if key in found]
         parts += [[str(text) for text in found["options"]]] if "options" in found else []
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]

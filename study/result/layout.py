@@ -47,7 +47,8 @@ SESSION = np.dtype(
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``surface`` is the object as `study.result.vtkhdf.Surface`, None where the file shows none.
+    ``surface`` is the object as `study.result.vtkhdf.Surface`, None where the file shows none. ``placed`` is where the
+    frame in which stations and angles count lies in that of the poses, the object's own file, as rotation and origin.
     """
 
     digest: str
@@ -58,6 +59,7 @@ class Header:
     petsc_options: str = ""
     labels: tuple[str, ...] = ()
     surface: Any = None
+    placed: Any = None
 
 
 @dataclass(frozen=True)

@@ -213,4 +213,6 @@ def _attributes(result: Result) -> dict[str, Any]:
         "provenance": result.sessions, "planar": layout.planar, "has": layout.has, "meshes": layout.meshes,
         "patches": layout.patches, "pad_faces": layout.pad_faces, "poses": not result.axes[-3].units,
         "derived": tuple(d.name for d in layout.derived),
+        "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),
+        "object_origin": np.asarray(scene.get("object_origin", np.zeros(3))),
     }  # fmt: skip

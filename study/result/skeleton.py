@@ -45,6 +45,7 @@ TEXTS = {
     "definitions": "what every quantity means",
     "report": "best grasps, failures with their reasons, how to read the file",
 }
+CUT = " ..."  # at the end of a text that was too long
 UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF are written at its end."
 
 
@@ -150,6 +151,9 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
         study[name].attrs["long_name"] = label
     study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
+    # Stations and angles count in the object's frame, poses are in that of its mesh file.
+    if header.placed is not None:
+        study["scene"].attrs.update(object_rotation=header.placed.rotation, object_origin=header.placed.origin)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
@@ -167,8 +171,16 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
 
 
 def text_bytes(text: str, length: int) -> bytes:
-    """UTF-8 of at most ``length`` bytes, on one line, without a broken last letter."""
-    return " ".join(text.split()).encode()[:length].decode(errors="ignore").encode()
+    """UTF-8 of at most ``length`` bytes, on one line; what is too long ends after a whole word.
+
+    >>> text_bytes("the pad leaves the object", 20)
+    b'the pad leaves ...'
+    """
+    line = " ".join(text.split())
+    if len(line.encode()) <= length:
+        return line.encode()
+    short = line.encode()[: length - len(CUT)].decode(errors="ignore")
+    return ((short.rpartition(" ")[0] or short) + CUT).encode()
 
 
 def report_bytes(text: str) -> np.ndarray:

@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.quantities import STATES
 from softjaw.study.result import checksums
 from softjaw.study.result.guarded import opened, text_of
 from softjaw.study.result.layout import (
-    FAILED,
     LABEL,
     MISSING,
     PROGRAM,
@@ -123,9 +123,9 @@ class Result:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """State of every case when it was read first: 0 not computed, 1 complete, 2 failed."""
+        """State of every case when it was read first, as `study.quantities.STATES` numbers them."""
         codes = self.codes
-        if codes.max() > FAILED:
+        if codes.max() >= len(STATES):
             raise self._damaged(f"a case has the state {codes.max()}, which does not exist")
         if not self._unchecked:
             under_way = self.killed or bool(holder(self.path))

@@ -73,7 +73,7 @@ def grid_datasets(layout: Any) -> Iterator[Dataset]:
     for name in ("Points", "Cells", "ConnectivityIds"):
         yield made(f"NumberOf{name}", (1,), "<i8", 0)
     # Single precision is enough for a picture; the exact values stand in the maps.
-    yield made("Points", (steps * points, 3), "<f4", 0.0, "m", "points in the object's frame, force by force")
+    yield made("Points", (steps * points, 3), "<f4", 0.0, "m", "points in the object file's frame, force by force")
     yield made("Connectivity", (corners,), "<i8", 0)
     yield made("Offsets", (cells + 1,), "<i8", 0)
     yield made("Types", (cells,), "u1", 0)

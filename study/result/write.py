@@ -73,9 +73,9 @@ class ResultWriter:
         """Store a solved case; ``values`` as from ``record``."""
         self._store(row, values, DONE)
 
-    def fail(self, row: int, message: str) -> None:
-        """Store why a case has no result."""
-        self._store(row, blank(self.layout, message), FAILED)
+    def fail(self, row: int, message: str, state: int = FAILED) -> None:
+        """Store why a case has no result: it failed, or is one of `study.quantities.NO_GRASP`."""
+        self._store(row, blank(self.layout, message), state)
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
@@ -162,7 +162,7 @@ def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarra
 
 
 def blank(layout: Layout, message: str = "") -> list[np.ndarray]:
-    """A row without values, as a failed case leaves it."""
+    """A row without values, as a case without a result leaves it."""
     row = [np.full(c.shape, c.fill, c.dtype) for c in layout.columns]
     row[-1] = np.array(text_bytes(message, MESSAGE), layout.columns[-1].dtype)
     return row

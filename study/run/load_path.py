@@ -27,14 +27,14 @@ NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fe
 
 
 def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
-    """Decide by one process what is missing: torn rows again, failed ones on demand, deadly ones no more.
+    """Decide by one process what is missing: torn rows again, failed ones on demand, no grasps and deadly ones never.
 
     Returns
     -------
     (rows,) array
         State of every case as the run begins.
     """
-    codes, attempts = writer.codes(), writer.attempts()
+    units, codes, attempts = list(units), writer.codes(), writer.attempts()
     again = [*torn, *(np.flatnonzero(codes == FAILED) if retry_failed else ())]
     for row in again:
         writer.forget(int(row))
@@ -43,6 +43,10 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
     for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):
         writer.tidy(int(row))
     for unit in units:
+        # Decided before any solve, alike in every run of the scene; what a file holds already stays.
+        for row in (row for rows in unit.rows for row in rows if unit.state and codes[row] == MISSING):
+            writer.fail(row, unit.reason, unit.state)
+            codes[row] = unit.state
         for rows in unit.rows:
             deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]
             # Forces above are given up as well, because the load path would lead through the deadly one again.

@@ -13,13 +13,15 @@ import numpy as np
 
 from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
-from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, pad_shape
+from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_shape
+from softjaw.study.case.fit import decided
 from softjaw.study.case.variations import changes, probe_candidates, with_probes
-from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.grid_surface import surface_of
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.store import open_result
+from softjaw.study.run.estimate import START, estimated
 from softjaw.study.run.progress import duration
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
@@ -41,9 +43,14 @@ class Plan:
     units: tuple[Any, ...]
 
     @property
+    def tried(self) -> list[Any]:
+        """Units that are to be solved."""
+        return [unit for unit in self.units if not unit.state]
+
+    @property
     def costs(self) -> list[float]:
-        """Cost of every unit, in any unit of time."""
-        return [float(unit.cost) for unit in self.units]
+        """Cost of every unit that is tried, in any unit of time."""
+        return [float(unit.cost) for unit in self.tried]
 
     @property
     def served(self) -> int:
@@ -51,15 +58,19 @@ class Plan:
         return sum(len(unit.rows) for unit in self.units)
 
 
-def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
-    """The plan of a scene; builds its objects, so a mesh is read here."""
+def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False) -> Plan:
+    """The plan of a scene; builds its objects, so a mesh is read here; ``ordered`` marks units that come last."""
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
-    surface = surface_of(scene, axes)
-    units = grasps.units(scene, lambda point: point.axis_symmetry)
+    surface, placed = surface_of(scene, axes), own_frame(scene.object)
+    units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    if ordered or scene.candidates.solve_best is not None or scene.candidates.skip_hopeless:
+        from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
+
+        units = chosen(scene, units)
     probes = probe_candidates(scene, units)
     header = Header(
         digest=scene.digest,
@@ -69,7 +80,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        surface=surface,
+        surface=surface._replace(points=placed.to_object(surface.points)),
+        placed=placed,
     )
     layout = Layout(
         axes,
@@ -93,6 +105,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
 def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
     asked["two scores"] = scene.accuracy.meshes > 1
@@ -106,6 +119,14 @@ def by_cost(costs: Sequence[float]) -> list[int]:
     [1, 2, 3, 0]
     """
     return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+
+
+def in_order(units: Sequence[Any]) -> list[int]:
+    """Positions in the order of work: the costliest first, so that no rank is alone with a long load path at the end.
+
+    What cannot hold comes after all others.
+    """
+    return sorted(by_cost([unit.cost for unit in units]), key=lambda i: units[i].hopeless)
 
 
 def makespan(costs: Sequence[float], ranks: int) -> float:
@@ -145,11 +166,12 @@ def shells(scene: Any) -> bool:
 
 
 def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
-    """Expected time of every unit from the measured times of some cases, ``(rows,)`` with NaN for the others [s].
+    """Expected time of every unit that is tried [s]; empty where nothing was measured.
 
-    Measured units keep their time, the others are judged by their cost; empty where nothing was measured.
+    ``seconds (rows,)`` are the measured times of some cases, NaN for the others. Measured units keep their
+    time, the others are judged by their cost.
     """
-    known = [_measured(unit, seconds) for unit in plan.units]
+    known = [_measured(unit, seconds) for unit in plan.tried]
     pairs = [(t, cost) for t, cost in zip(known, plan.costs, strict=True) if t is not None]
     if not pairs or not sum(cost for _, cost in pairs):
         return []
@@ -179,37 +201,60 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
+        "no grasp": _no_grasps(plan),
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
     }
-    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items())
+    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
+
+
+def _no_grasps(plan: Plan) -> str:
+    """How many candidates are not solved and why, those of every point of a sweep counted; empty where there are none.
+
+    The first of a state stands for the others.
+    """
+    found = []
+    for state in NO_GRASP:
+        units = [unit for unit in plan.units if unit.state == state]
+        count = sum(len(unit.rows) for unit in units)
+        found += [f"{count} of {plan.served} candidates {STATES[state]}: {units[0].reason}"] if units else []
+    return "; ".join(found)
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     seconds = measured_seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        known = f"a few load paths are in {path}: start the run, then plan again"
-        wall = shells(scene)
-        return f"{_wall_time(plan, scene, ranks)}; known better when {known}" if wall else f"not known before {known}"
+        return f"{_estimated_time(plan, scene, ranks)}; known better when a few load paths are in {path}"
     whole = duration(makespan(expected, ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
 
 
-def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
-    """Rule of thumb for walls, between the cheapest and the costliest level of all candidates."""
-    wall = wall_size(scene)
+def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
+    """Time before anything is solved: of elements and springs, for walls the middle between their levels."""
+    on = f"on {ranks} rank{'s' * (ranks > 1)}"
+    times = _wall_seconds(plan, scene)
+    if not times:
+        repeats = 1 + len(plan.layout.variations)
+        seconds = [t * (repeats if u.probe else 1) for t, u in zip(estimated(plan.tried), plan.tried, strict=True)]
+        return f"about {duration(START + makespan(seconds, ranks))} {on}, estimated on a bed of springs"
+    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.tried)
+    low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
+    if low == high:
+        return f"about {duration(START + low)} {on} ({scene.effects.object.replace('_', ' ')})"
+    ends = f"{duration(low)} if all candidates are rigid, {duration(high)} if all take the costliest shell"
+    return f"about {duration(START + math.sqrt(low * high))} {on} ({ends})"
+
+
+def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
+    """Seconds of a force at the levels that a wall may be solved with, rising; empty where that is not known."""
+    wall = wall_size(scene) if plan.tried and shells(scene) else None
     if wall is None:
-        return "not known yet for this wall"
+        return []
     level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
-    times = sorted(level.get(scene.effects.object, wall.seconds))
-    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
-    whole = [duration(each * makespan(paths, ranks)) for each in (times[0], times[-1])]
-    names = scene.effects.object.replace("_", " ")
-    names = "all candidates rigid, or all on the costliest shell" if len(times) > 1 else names
-    return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
+    return sorted(level.get(scene.effects.object, wall.seconds))
 
 
 def measured_seconds(layout: Layout, path: Path) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 
 
 def duration(seconds: float) -> str:
@@ -92,7 +92,8 @@ class Progress:
         """Counts, and as soon as they mean something seconds for each case and the expected rest."""
         solved = self._todo & (codes != MISSING)
         done, failed = int(np.sum(codes == DONE)), int(np.sum(codes == FAILED))
-        text = f"{done}/{codes.size} done" + (f", {failed} failed" if failed else "")
+        tried = int(np.sum(~np.isin(codes, NO_GRASP)))
+        text = f"{done}/{tried} done" + (f", {failed} failed" if failed else "")
         now, count, gone = self._clock(), int(solved.sum()), float(self._weights[solved].sum())
         if self._first is None and count:
             self._first = now, count, gone

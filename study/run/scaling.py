@@ -110,7 +110,7 @@ def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
 def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
     """Load paths of a plan with the times of its cases, ``(rows,)`` with NaN where none was taken [s]."""
     found = []
-    for unit in plan.units:
+    for unit in plan.tried:
         times = seconds[list(unit.rows[0])]
         if np.isfinite(times).any():  # the forces above a failed one were not tried
             found.append(LoadPath(tuple(map(float, times[np.isfinite(times)])), unit.cost, len(unit.rows)))

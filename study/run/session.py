@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
+from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
@@ -27,7 +28,7 @@ from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, settle
-from softjaw.study.run.plan import Plan, by_cost
+from softjaw.study.run.plan import Plan, in_order
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.schedule import Claims, LostRanks
 
@@ -151,8 +152,7 @@ class Session:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
         todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
-        # The costliest first, so that no rank is alone with a long load path at the end.
-        self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
+        self._todo = [todo[i] for i in in_order(todo)]
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
         if comm.rank == 0:
             writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
@@ -246,7 +246,7 @@ class Session:
             reason=f"stopped by {name or 'another rank'}" if missing else "complete",
             # Once more: libraries that were loaded for the solves are known only now.
             versions=provenance.versions(MPI.Get_library_version()),
-            done=codes.size - missing - failed,
+            done=int(np.sum(codes == CASE_DONE)),
             failed=failed,
         )
 

@@ -25,7 +25,8 @@ class GraspPose(SceneSection):
     """One explicit grasp: finger 1 comes along ``approach`` through the point, finger 2 from the opposite side."""
 
     point_mm: Vector = Field(
-        description="a point on the line along which the fingers close, [x, y, z]", examples=[[0, 0, 20]]
+        description="a point on the line along which the fingers close, [x, y, z] in the frame of its own file",
+        examples=[[0, 0, 20]],
     )
     approach: Direction = Field(description="direction from finger 1 towards the object", examples=[[1, 0, 0]])
     long_side: Direction = Field(
@@ -86,6 +87,10 @@ class Candidates(SceneSection):
     )
     count: int = Field(12, ge=1, le=1000, description="distinct grasps that the sampler gives at most")
     seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
+    solve_best: int | None = Field(
+        None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
+    )
+    skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
 
     @property

@@ -19,6 +19,8 @@ Count = Annotated[int, Field(ge=2, le=400)]
 Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
 Extent = Annotated[float, Field(ge=0, le=500)]
 Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
+FingerSide = Annotated[float, Field(ge=1, le=1000)]
+FingerSize = Annotated[tuple[FingerSide, FingerSide], Field(strict=False)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
@@ -53,7 +55,12 @@ class Gripper(SceneSection):
     grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
     grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
     max_opening_mm: float | None = Field(
-        None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not sampled"
+        None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
+    )
+    finger_size_mm: FingerSize | None = Field(
+        None,
+        description="length and width of what carries a pad, left out where it is the pad's own",
+        examples=[[60, 25]],
     )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
@@ -62,6 +69,7 @@ class Gripper(SceneSection):
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     max_opening: ClassVar[Any] = si("max_opening_mm")
+    finger_size: ClassVar[Any] = si("finger_size_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
     sheet_support: ClassVar[Any] = si("sheet_support_mm")
 
@@ -88,6 +96,10 @@ class Gripper(SceneSection):
     def findings(self) -> Iterator[Finding]:
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
         yield from self._hyperfoam_findings() if self.material == "hyperfoam" else self._material_findings()
+        pad = (self.pad_length_mm, self.pad_width_mm)
+        if self.finger_size_mm and any(own < least for own, least in zip(self.finger_size_mm, pad, strict=True)):
+            found, expected = shown(list(self.finger_size_mm)), f"at least the pad's, {shown(list(pad))}"
+            yield Finding(("finger_size_mm",), found, expected, "length comes first; leave it out for the pad's size")
         n = self.elements
         for i in (0, 1):
             if n[i] % 2 and self.grading[i] != 1:
@@ -214,13 +226,24 @@ class LimitSurfaceKeys(SceneSection):
 
 
 class TaskKeys(SceneSection):
-    """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
+    """What the grasp has to hold: the object's weight, in any direction or in one."""
 
-    weight_direction: Direction = Field((0.0, 0.0, -1.0), description="direction of the weight in the object's frame")
+    weight_direction: Direction | Literal["worst"] = Field(
+        "worst", description="direction of the weight in the frame of the object's own file; worst: held in every one"
+    )
     centre_of_mass_mm: Vector | Literal["auto"] = Field(
-        "auto", description="centre of mass [x, y, z]; auto is the middle of the box round the object"
+        "auto", description="centre of mass [x, y, z] in the same frame; auto is the centroid of the object's volume"
+    )
+    safety: float = Field(2.0, ge=1, le=100, description="how many times object.mass_g the force to use has to hold")
+    drive: Literal["shared", "up_to", "fixed"] = Field(
+        "shared", description="what a load makes of the normal forces: their sum stays, each gives way, each stays"
     )
     centre_of_mass: ClassVar[Any] = si("centre_of_mass_mm")
+
+    @property
+    def direction(self) -> tuple[float, float, float] | None:
+        """Direction of the weight, None for every direction."""
+        return None if isinstance(self.weight_direction, str) else self.weight_direction
 
 
 class Effects(SceneSection):
@@ -266,7 +289,9 @@ class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
-    contact: Literal["weighted", "nodal"] = Field("weighted", description="how gaps are collocated")
+    contact: Literal["auto", "weighted", "nodal"] = Field(
+        "auto", description="how gaps are collocated; auto is nodal for hex8 on rigid objects, else weighted"
+    )
     residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(
         1 / 8, gt=0, le=1, description="shortest part of a load step that is tried before displacement control"

@@ -40,7 +40,7 @@ function object3d(div, all) {
   function told(c) {
     if (c < 0) return "no candidate";
     const q = quantity(), v = q && q.values[at.force][c], key = `${at.force} ${c}`;
-    return `${all.names[c]}<br>` + (v == null ? ["not computed", "", "failed"][all.states[at.force][c]]
+    return `${all.names[c]}<br>` + (v == null ? (all.states[at.force][c] === 1 ? "" : all.stated[all.states[at.force][c]])
       : `${q.label}: ${+v.toPrecision(4)}`) + (all.notes[key] ? `<br>${all.notes[key]}` : "");
   }
 
@@ -55,10 +55,10 @@ function object3d(div, all) {
     for (let t = 0; t < corners.length; t += 3) {
       const c = owner[corners[t]], v = c < 0 || !q ? null : q.values[at.force][c], into = v == null ? rest : shown;
       for (let k = 0; k < 3; k++) into[k].push(corners[t + k]);
-      into[3].push(v == null ? all.colours[c < 0 || all.states[at.force][c] === 1 ? 0 : all.states[at.force][c] ? 2 : 1] : v);
+      into[3].push(v == null ? all.colours[c < 0 || all.states[at.force][c] === 1 || all.states[at.force][c] > 2 ? 0 : all.states[at.force][c] ? 2 : 1] : v);
     }
     const names = Array.from(owner, told), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
-    const scale = q ? {cmin: q.low, cmax: q.high, colorscale: q.scale} : {}, [one, other, marks] = div.data;
+    const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other, marks] = div.data;
     Object.assign(one, base, {i: shown[0], j: shown[1], k: shown[2], intensity: shown[3], visible: shown[3].length > 0}, scale);
     Object.assign(other, base, {i: rest[0], j: rest[1], k: rest[2], facecolor: rest[3], visible: rest[3].length > 0});
     const balls = all.marks.points, of = all.marks.owner;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -143,9 +144,14 @@ def scene_of(case: HardCase) -> Scene:
 
 @cache
 def outcome(name: str) -> Outcome:
-    """Solve a case, once in a process; whatever it dies of is its outcome."""
+    """Solve a case, once in a process."""
+    return outcome_of(lambda: scene_of(CASES[name]))
+
+
+def outcome_of(made_scene: Callable[[], Scene]) -> Outcome:
+    """Solve all cases of a scene; whatever it dies of is its outcome."""
     try:
-        scene = scene_of(CASES[name])
+        scene = made_scene()
         check_object(scene)
         made = units(scene, lambda point: build_object(point.object).axis_symmetry)
         check_poses(scene, [unit.scene for unit in made])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.study.case.sampler import Jaws, antipodal_grasps
+from softjaw.study.case.fit import Jaws
+from softjaw.study.case.sampler import antipodal_grasps
 from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan, spoiled
 
 JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)

@@ -23,8 +23,9 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True):
-    """Stations x two angles x three forces; both angles of an even station are one unit."""
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1):
+    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide."""
+    from softjaw.study.quantities import WIDE
     from softjaw.study.result.layout import Derived, Header, Layout
     from softjaw.study.result.store import StoredAxis
     from softjaw.study.run.plan import Plan
@@ -39,7 +40,11 @@ def fake_plan(digest="scene", stations=6, derived=True):
     for s in range(stations):
         rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
         for served in [tuple(rows)] if s % 2 == 0 else [(r,) for r in rows]:
-            units.append(SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3)))
+            unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3))
+            unit.state, unit.reason, unit.hopeless = 0, "", False
+            units.append(unit)
+    if wide >= 0:
+        units[wide].state, units[wide].reason = WIDE, "needs more"
     labels = tuple(f"candidate {i}" for i in range(2 * stations))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
     return Plan(Layout(axes, FACES, derived=slope), header, tuple(units))
@@ -101,7 +106,7 @@ def main():
     parser.add_argument("--limit", type=float, default=600.0)
     parser.add_argument("--memory", type=float, default=0.5)
     parser.add_argument("--stations", type=int, default=6)
-    for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug"):
+    for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args()
     from mpi4py import MPI
@@ -121,9 +126,8 @@ def main():
 
     work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
     try:
-        return run_study(
-            fake_plan(options.digest, options.stations), work, options.file, comm, retry_failed=options.retry_failed
-        )
+        plan = fake_plan(options.digest, options.stations, wide=options.wide)
+        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed)
     except StudyError as error:
         return complain(error)
     except BaseException:

@@ -12,8 +12,8 @@ import time
 import numpy as np
 import pytest
 
-from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.store import open_result
+from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
+from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
 pytestmark = pytest.mark.launches
@@ -93,6 +93,22 @@ def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once,
     assert codes[-1] == 0
     assert set(codes[:-1]) <= {4}
     assert once(differing, path, uninterrupted) == []
+
+
+def test_what_is_no_grasp_is_never_solved_and_no_failure(once, shared_path):
+    """A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again."""
+    path = shared_path / "wide.hdf"
+    code, _, errors = once(study, 2, path, "--wide", 3)
+    assert code == 0, errors
+    wide = [i for i, s in enumerate(once(states, path)) if s == WIDE]
+    assert len(wide) == 6
+    assert once(study, 0, path, "--wide", 3, "--retry-failed")[0] == 0
+    assert [i for i, s in enumerate(once(states, path)) if s != DONE] == wide
+    with open_result(path) as result:
+        assert set(result.messages.ravel()[wide]) == {"needs more"}
+        assert not torn_rows(path, result.layout)
+        assert result.sessions[-1]["failed"] == 0
+        assert result.sessions[-1]["done"] == result.status.size - 6
 
 
 @pytest.mark.long

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import EFFECTS, FIRST, PARTS
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, NO_GRASP, PARTS, STATES
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
     Index,
@@ -36,7 +35,8 @@ MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_
         *(f"{name}_error" for name in (*FIRST, "tau_z_max")))  # fmt: skip
 LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 PART_COLOURS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS
-NOT_SOLVED = {DONE: "", FAILED: "failed: ", MISSING: "not computed"}
+MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
+NOT_SOLVED = {DONE: "", MISSING: STATES[MISSING], **{state: f"{STATES[state]}: " for state in (FAILED, *NO_GRASP)}}
 
 
 def main_axis(ds: xr.Dataset) -> int:
@@ -120,7 +120,7 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
     where = elsewhere(ds, index, x, y, over)
     caption = (
         f"{f'At {where}. ' if where else ''}Choose the quantity at the upper left; point at a cell for its values and"
-        " notes. Crosses: failed. Dots: not computed yet."
+        " notes. Crosses: failed. Lines: no grasp, its note says why. Dots: not computed yet."
     )
     names = " and ".join(plots.MODELS[m][0] for m in models)
     alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, {names}. {extremes(ds, index)}"
@@ -135,10 +135,10 @@ def _on_cells(made: Any, ds: xr.Dataset, cuts: Any, x: int, y: int) -> None:
         row, column = k // 2 + 1, k % 2 + 1
         made.data[k].customdata = None if notes is None else plane(notes, x, y, here)
         states = plane(ds.status.values, x, y, here)
-        for state, symbol in ((FAILED, "x-thin-open"), (MISSING, "circle")):
-            i, j = np.nonzero(states == state)
+        for which, symbol, size in MARKS:
+            i, j = np.nonzero(np.isin(states, which))
             if i.size:
-                look = {"symbol": symbol, "size": 8 if state == FAILED else 3, "color": plots.SOFT}
+                look = {"symbol": symbol, "size": size, "color": plots.SOFT}
                 made.add_scatter(x=[xv[n] for n in j], y=[yv[n] for n in i], mode="markers", marker=look,
                                  hoverinfo="skip", row=row, col=column)  # fmt: skip
     titles = xs.pop("title_text"), ys.pop("title_text")

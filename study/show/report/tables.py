@@ -9,8 +9,8 @@ import xarray as xr
 
 from softjaw.study.flags import flags_in
 from softjaw.study.page import Block, bullets, details, table, text, verbatim
-from softjaw.study.quantities import EFFECTS, MODEL_NAMES, PARTS, REASONS
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, EFFECTS, FAILED, MISSING, MODEL_NAMES, NO_GRASP, PARTS, REASONS
+from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.run.progress import duration
 from softjaw.study.show.grasps import (
     ABOVE,
@@ -40,7 +40,7 @@ HEADS = dict(zip(VALUES, ("quality", "quality, fitted", "e_n [mm]", "max f_x [N]
                  strict=True))  # fmt: skip
 BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
-STATES = {DONE: "solved", FAILED: "failed", MISSING: "missing"}
+STATES = {DONE: "solved", FAILED: "failed", MISSING: "missing"} | {state: OF_CASES[state] for state in NO_GRASP}
 MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
 WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
 FORCED = REASONS.index("forced by the scene")
@@ -103,9 +103,9 @@ def _row(ds: xr.Dataset, index: Index) -> list[str]:
 
 
 def note(ds: xr.Dataset, index: Index) -> str:
-    """The reason of a failed case; the checks that a solved one misses, and its flags."""
+    """Why a case has no result; the checks that a solved one misses, and its flags."""
     state = ds.variables["status"].values[index]
-    if state == FAILED:
+    if state == FAILED or state in NO_GRASP:
         return str(ds.variables["message"].values[index]) or "no reason was given"
     if state != DONE:
         return ""
@@ -115,7 +115,8 @@ def note(ds: xr.Dataset, index: Index) -> str:
 def states(ds: xr.Dataset) -> list[Block]:
     """Counts of the cases by state and by flag, and notes on solved cases, alike messages together."""
     status = ds.status.values
-    counts = [[name, str(int(np.sum(status == state)))] for state, name in STATES.items()]
+    counts = [[name, str(int(np.sum(status == state)))] for state, name in STATES.items()
+              if state not in NO_GRASP or np.any(status == state)]  # fmt: skip
     found = [table("State of the cases", ["state", "cases"], counts, texts=(0,))]
     flags = ds["flags"].values[status == DONE]
     raised = flags_in(int(np.bitwise_or.reduce(flags))) if flags.size else []
@@ -126,8 +127,9 @@ def states(ds: xr.Dataset) -> list[Block]:
 
 
 def reasons(ds: xr.Dataset, state: int) -> list[Block]:
-    """Why cases failed, or notes on solved ones, alike messages together; empty where there are none."""
-    caption = "Why cases failed" if state == FAILED else "Notes on solved cases"
+    """Why cases have no result, or notes on solved ones, alike messages together; empty where there are none."""
+    captions = {FAILED: "Why cases failed", DONE: "Notes on solved cases"}
+    caption = captions.get(state, f"No grasp: {STATES[state]}")
     groups = grouped(ds, state)
     rows = [[str(count), message, _places(ds, where)] for count, message, where in groups[:MOST_REASONS]]
     found = [table(caption, ["cases", "message (one example)", "where"], rows, wide=(1, 2))] if rows else []

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import BORNE
-from softjaw.study.quantities import MODEL_NAMES
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
 from softjaw.study.show.grasps import (
     Index,
     at,
@@ -36,6 +35,7 @@ from softjaw.study.show.tables.certainty import verdict as judgement
 from softjaw.study.show.tables.ranking import largest, passed_over
 from softjaw.study.show.tables.show import as_text
 from softjaw.study.show.tables.show import best as best_table
+from softjaw.study.show.tables.status import no_grasps
 
 LEAST = 1e-4  # relative error below which only a bound is given
 NBSP = "\u00a0"
@@ -84,7 +84,8 @@ def verdict(ds: xr.Dataset, mu: float | None) -> list[str]:
     """The answer in sentences, and how many cases it rests on."""
     done, failed, missing = (int(np.sum(ds.status.values == state)) for state in (DONE, FAILED, MISSING))
     total, best = ds.status.size, ds.attrs["best"]
-    cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing."
+    none = "".join(f", {text}" for text in no_grasps(ds.status.values))
+    cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing{none}."
     if done == total:
         cases = f"All {total} cases are solved." if total > 1 else "It is the only case of this study."
     if best is None:
@@ -100,7 +101,7 @@ def key_values(ds: xr.Dataset) -> list[tuple[str, str]]:
     if best is None:
         return []
     pairs = [("where", place(ds, best)), ("how hard", f"{_force(ds, best).replace(' ', NBSP)} per finger")]
-    if np.isfinite(opening := at(ds, "contact_distance", best)):
+    if np.isfinite(opening := at(ds, "opening", best)):
         pairs.insert(1, ("how wide (opening at first touch)", f"{number(1e3 * opening, 4)}\u00a0mm"))
     if "force_high" in ds:
         pairs.append(("safe forces [N]", safe_range(ds, best)))
@@ -257,6 +258,8 @@ def chosen(ds: xr.Dataset) -> str:
     which = f"Chosen candidate {candidate_of(ds, index)}: {place(ds, index, force=True)}"
     if ds.status.values[index] == FAILED:
         return f"{which}, failed: {ds.message.values[index] or 'no reason was given'}"
+    if (state := ds.status.values[index]) in NO_GRASP:
+        return f"{which}, is no grasp, {STATES[state]}: {ds.message.values[index]}."
     if ds.status.values[index] != DONE:
         return f"{which}, is not solved yet."
     ranked = order(ds, index[-1])
@@ -310,7 +313,7 @@ def plain_report(ds: xr.Dataset, mu: float | None) -> str:
     named, ds = ds.attrs["title"], judge(ds)
     size = subtitle(ds).partition(": ")[2]
     table = [as_text(best_table(ds, top=TOP, whole_lines=True), WIDTH)] if ds.attrs["best"] else []
-    notes = "\n".join(line for state in (FAILED, DONE) for line in _notes(ds, state))
+    notes = "\n".join(line for state in (FAILED, *NO_GRASP, DONE) for line in _notes(ds, state))
     answer = "\n".join([*verdict(ds, mu), *warnings(ds), meaning(ds)]).strip()
     parts = [f"{named}: {size}" if named else size, answer, *table, notes, READING,
              CAVEAT.replace("the scene below", "/study/scene")]  # fmt: skip
@@ -320,8 +323,8 @@ def plain_report(ds: xr.Dataset, mu: float | None) -> str:
 
 
 def _notes(ds: xr.Dataset, state: int) -> list[str]:
-    """Why cases failed, or notes on solved ones: one line for messages that differ in numbers only."""
-    word, lines = "failed" if state == FAILED else "noted", []
+    """Why cases have no result, or notes on solved ones: one line for messages that differ in numbers only."""
+    word, lines = "noted" if state == DONE else STATES[state], []
     for count, text, where in grouped(ds, state)[:MOST_REASONS]:
         places = "; ".join(place(ds, index, force=True) for index in where[:MOST_PLACES])
         lines.append(f"{word} {count} x {text} [{places}{'; ...' * (count > MOST_PLACES)}]")

@@ -16,9 +16,8 @@ import xarray as xr
 from softjaw.study import pictures
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, heading, page, text
-from softjaw.study.quantities import FIRST
+from softjaw.study.quantities import FAILED, FIRST, NO_GRASP
 from softjaw.study.result.grid_surface import edges
-from softjaw.study.result.layout import FAILED
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import (
     Index,
@@ -69,7 +68,8 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     sections: list[Section] = [
         ("verdict", "", the_answer(ds, scene)),
         ("object", "The object", the_object(view, best)),
-        ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) + tables.reasons(ds, FAILED)),
+        ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) +
+         [block for state in (FAILED, *NO_GRASP) for block in tables.reasons(ds, state)]),
         ("wall", "What the wall bears", wall(view, best)),
         ("curvature", "What curvature costs", curves.differences(ds, scene, best)),
         *(cases(view, scene) if ds.attrs["best"] is not None else []),

@@ -18,7 +18,7 @@ from softjaw.study.show.tables.columns import csv_text, with_unit
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
-# Name, unit of every component, names of the components; of each finger, in the object's frame.
+# Name, unit of every component, names of the components; of each finger, in the frame of the object's own file.
 FINGER: tuple[tuple[str, str | tuple[str, ...], tuple[str, ...]], ...] = (
     ("pose_origin", "m", XYZ),
     ("pose_rotation", "", NINE),
@@ -36,8 +36,8 @@ FINGER: tuple[tuple[str, str | tuple[str, ...], tuple[str, ...]], ...] = (
     ("certificate", "", ()),
 )
 MEANING = {
-    "pose": "x_object = pose_rotation x_pad + pose_origin at first touch",
-    "frame": "contact frame in the object's frame: origin, and rows x, y, N with N into the object",
+    "pose": "x = pose_rotation x_pad + pose_origin at first touch, in the frame of the object's own file",
+    "frame": "contact frame in the same frame: origin, and rows x, y, N with N into the object",
     "semi_axes": "largest f_x, f_y, tau_z: the ellipsoid from three motions",
     "fitted surface": "P(f_x, f_y, tau_z) = 1: divide a wrench by unit, then P is the quartic of coefficients (of "
     + ", ".join(MONOMIALS)

@@ -9,9 +9,10 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.study.flags import flag_sentences, flags_in
-from softjaw.study.quantities import DONE, FAILED, MISSING, PARTS, STATES
+from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
@@ -41,6 +42,7 @@ def status_json(result: Any) -> str:
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     about = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     about |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    about |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     about |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
     return json.dumps(about, indent=2)
 
@@ -54,12 +56,13 @@ def status_csv(result: Any) -> str:
 
 
 def _cases(result: Any, state: int) -> list[dict[str, Any]]:
-    """Cases in one state that have a message."""
+    """Cases in one state that have a message; with the state where there is no grasp."""
     messages, names = result.messages.ravel(), [axis.name for axis in result.axes]
     found = []
     for row in map(int, np.flatnonzero((result.status.ravel() == state) & (messages != ""))):
         label = "" if result.axes[-3].units else str(result.labels[np.unravel_index(row, result.layout.shape)[-3:-1]])
         where = dict(zip(names, _place(result, row), strict=True)) | ({"label": label} if label else {})
+        where |= {"state": STATES[state]} if state in NO_GRASP else {}
         found.append({"row": row, **where, "message": str(messages[row])})
     return found
 
@@ -77,15 +80,22 @@ def _place(result: Any, row: int) -> list[float]:
 def counts(result: Any) -> str:
     """How many cases are in which state."""
     title = f" ({result.title})" if result.title else ""
-    missing, done, failed = (int(np.sum(result.status == state)) for state in (MISSING, DONE, FAILED))
-    cases = f"{done} of {result.status.size} cases {STATES[DONE]}, {failed} {STATES[FAILED]}"
-    return f"{result.path}{title}:\n  {cases}, {missing} {STATES[MISSING]}"
+    states = [*(f"{int(np.sum(result.status == state))} {STATES[state]}" for state in (FAILED, MISSING)),
+              *no_grasps(result.status)]  # fmt: skip
+    done = f"{int(np.sum(result.status == DONE))} of {result.status.size} cases {STATES[DONE]}"
+    return f"{result.path}{title}:\n  {', '.join([done, *states])}"
+
+
+def no_grasps(codes: NDArray[np.integer]) -> list[str]:
+    """How many cases have each of the states that are no grasp, as far as there are any."""
+    counts = {state: int(np.sum(codes == state)) for state in NO_GRASP}
+    return [f"{count} {STATES[state]}" for state, count in counts.items() if count]
 
 
 def reasons(result: Any, width: int = PAPER) -> list[str]:
-    """Reasons of failed cases, then notes on solved ones, the most frequent first and with some of their places."""
+    """Reasons of failed cases and of what is no grasp, then notes on solved cases, with some of their places."""
     lines = []
-    for state, title in ((FAILED, "failed"), (DONE, "note")):
+    for state, title in ((FAILED, "failed"), *((state, STATES[state]) for state in NO_GRASP), (DONE, "note")):
         where: dict[str, list[int]] = {}
         for text, row in _reasons(result, state):
             where.setdefault(text, []).append(row)

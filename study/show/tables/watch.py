@@ -24,7 +24,7 @@ from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import Progress, duration
 from softjaw.study.show.tables.show import best
-from softjaw.study.show.tables.status import place, reasons
+from softjaw.study.show.tables.status import no_grasps, place, reasons
 from softjaw.study.units import shown_text
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
@@ -127,7 +127,9 @@ class View:
 
 def _counts(codes: np.ndarray) -> str:
     failed = int(np.sum(codes == FAILED))
-    return f"{int(np.sum(codes == DONE))}/{codes.size} done" + (f", {failed} failed" if failed else "")
+    return f"{int(np.sum(codes == DONE))}/{codes.size} done" + "".join(
+        f", {text}" for text in ([f"{failed} failed"] if failed else []) + no_grasps(codes)
+    )
 
 
 def _since(result: Any) -> str:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from softjaw.fem.objects.gap import Pose
+from softjaw.study.case.build import own_frame
 from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
-from softjaw.study.quantities import ALONG, AROUND, TABLE
+from softjaw.study.quantities import ALONG, AROUND, DONE, FAILED, NO_GRASP, STATES, TABLE
 from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
-from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene import SceneError, parse_scene
@@ -78,13 +79,24 @@ class View:
         """State of every candidate at a force ``(c,)``."""
         return self.over_candidates(self.ds.status.values, force)
 
-    def coloured(self, name: str) -> tuple[np.ndarray, tuple[float, float]]:
-        """A map in the displayed unit, over all axes, and its smallest and largest value at this point."""
+    def coloured(self, name: str) -> tuple[np.ndarray, list[tuple[float, float]]]:
+        """A map in the displayed unit, over all axes, and its smallest and largest value here at every force.
+
+        Grasps are compared at one force: over all forces together their differences would hardly be seen.
+        """
         found = field(self.ds, name)
         values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
-        return values, span(values[self.point])
+        return values, [span(values[self.point][..., k]) for k in range(values.shape[-1])]
 
-    # --- the object ---
+    # --- the object, drawn in the frame in which its axis is z ---
+
+    @cached_property
+    def placed(self) -> Pose:
+        """Where the frame that is drawn in lies in that of the file's poses [m]."""
+        try:
+            return own_frame(self.scene.object)
+        except (AttributeError, ValueError, OSError):  # the object is not drawn either
+            return Pose(np.eye(3), np.zeros(3))
 
     @cached_property
     def surface(self) -> Surface:
@@ -118,7 +130,8 @@ class View:
         known = origin[self.point].reshape(self.candidates, -1, *origin.shape[-2:])
         solved = np.isfinite(known).all(axis=(2, 3))
         of = np.flatnonzero(solved.any(axis=1))
-        return known[of, solved[of].argmax(axis=1)].reshape(-1, 3), np.repeat(of, origin.shape[-2])
+        first = known[of, solved[of].argmax(axis=1)].reshape(-1, 3)
+        return self.placed.to_pad(first), np.repeat(of, origin.shape[-2])
 
     @cached_property
     def wall(self) -> Wall | None:
@@ -127,14 +140,15 @@ class View:
 
     @cached_property
     def _places(self) -> np.ndarray:
-        return read_field(self.ds.attrs["file"], "wall/place", **self._here(self.point)).values
+        places = read_field(self.ds.attrs["file"], "wall/place", **self._here(self.point)).values
+        return self.placed.to_pad(places)
 
     def displacement(self, index: Index) -> tuple[np.ndarray, float] | None:
         """Displacement of the wall's places ``(AROUND, ALONG, 3)`` and the angle they begin at, if stored."""
         rotation = field(self.ds, "finger_pose_rotation") if self.walled else None
         if rotation is None or not np.isfinite(self._places[index[-3:]]).all():
             return None
-        approach = rotation[index][0][:, 2]
+        approach = rotation[index][0][:, 2] @ self.placed.rotation
         angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
         before = undeformed(self.scene.object, angle)
         return None if before is None else (self._places[index[-3:]].reshape(AROUND, ALONG, 3) - before, angle)
@@ -167,7 +181,7 @@ class View:
 
     def pads(self, index: Index) -> list[Pad]:
         """Both pads of a case; empty where it is not solved."""
-        return pads_of(self.ds, getattr(self.scene, "gripper", None), index, self.faces(index))
+        return pads_of(self.ds, getattr(self.scene, "gripper", None), index, self.faces(index), self.placed)
 
     def limit(self, index: Index) -> np.ndarray | None:
         """Points ``(r, c, 3)`` of the weaker finger's limit surface (CCM) [N, N, N mm]; None where there is none."""
@@ -186,8 +200,8 @@ class View:
         """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""
         lines = [f"candidate {candidate_of(self.ds, index)}: {place(self.ds, index, force=True)}"]
         state = self.ds.status.values[index]
-        if state == FAILED:
-            return [*lines, f"failed: {self.ds.message.values[index] or 'no reason was given'}"]
+        if state == FAILED or state in NO_GRASP:
+            return [*lines, f"{STATES[state]}: {self.ds.message.values[index] or 'no reason was given'}"]
         if state != DONE:
             return [*lines, "not computed yet"]
         for key in dict.fromkeys((name, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation")):
@@ -199,7 +213,9 @@ class View:
 
     def legend(self, index: Index, motion: str) -> list[str]:
         """What colours and marks of the picture of a case mean."""
-        marks = "balls: where the fingers first touch" if self.ds.attrs["poses"] else "light grey: no candidate there"
+        marks = "light grey: no candidate there, or no grasp"
+        if self.ds.attrs["poses"]:
+            marks = "balls: where the fingers first touch"
         wall = ["the wall is deformed as computed, not exaggerated"] * (self.displacement(index) is not None)
         return [f"blue: friction of the pads' faces against {SLIPS[motion]}", marks, "dark grey: failed",
                 "grey: not computed", *wall, *[self.note] * bool(self.note)]  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from softjaw.study.page import Block, Section, label, page, plot, text
-from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.quantities import ALONG, AROUND, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import Index, field, forces, label_of, order, place
@@ -81,6 +81,7 @@ def payload(
         "forces": forces(ds).tolist(),
         "names": [label(place(ds, view.index(c, 0))) for c in range(view.candidates)],
         "states": [view.state(k).tolist() for k in levels],
+        "stated": STATES,
         "words": {key: view.summary(i, quantity) for key, i in every.items()},
         "notes": {key: label(said) for key, i in every.items() if (said := note(ds, i))},
         "quantities": [_choice(view, n) for n in dict.fromkeys((*CHOICES, quantity)) if field(ds, n) is not None],
@@ -126,11 +127,11 @@ def _packed(values: np.ndarray, kind: str) -> str:
 
 def _choice(view: View, name: str) -> dict[str, Any]:
     """A map that can be chosen."""
-    values, (low, high) = view.coloured(name)
+    values, limits = view.coloured(name)
     rows = [[float(f"{v:.6g}") if np.isfinite(v) else None for v in view.over_candidates(values, k)]
             for k in range(values.shape[-1])]  # fmt: skip
     title = label_of(view.ds, name)
-    return {"name": name, "title": title, "label": label(title), "low": low, "high": high, "values": rows,
+    return {"name": name, "title": title, "label": label(title), "limits": limits, "values": rows,
             "scale": plots.colours(name)}  # fmt: skip
 
 

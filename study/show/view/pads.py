@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.contact import LOADED
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.vtkhdf import corners_of
@@ -119,12 +120,16 @@ class Pad:
         return np.stack([start, start + longest * force / most], axis=1)
 
 
-def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
-    """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read."""
+def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces, placed: Pose) -> list[Pad]:
+    """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read.
+
+    ``placed`` is where the frame that is drawn in lies in that of the file's poses.
+    """
     names = ("pose_rotation", "pose_origin", "closing", "frame_axes", "frame_origin")
     if at(ds, "status", index) != DONE or gripper is None or any(f"finger_{name}" not in ds for name in names):
         return []
     stored = [ds.variables[f"finger_{name}"].values[index] for name in names]
+    stored[:2] = placed.rotation.T @ stored[0], placed.to_pad(stored[1])
     if not all(np.isfinite(s).all() for s in stored):
         return []
     deepest = ds.variables["check_penetration_depth"].values[index] if "check_penetration_depth" in ds else np.zeros(2)

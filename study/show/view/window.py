@@ -10,7 +10,7 @@ import numpy as np
 import pyvista as pv
 
 from softjaw.study.pictures import COLOURS, INK
-from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.grasps import Index, forces, label_of
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
@@ -44,7 +44,10 @@ def plot(view: View, index: Index, quantity: str, motion: str, *, off_screen: bo
     solids.look(plotter, (0.8, -1.0, 0.55), (0, 0, 1), 0.95)
     plotter.subplot(0, 0)
     solids.look(plotter, *view.eye(index), 0.9)
-    plotter.add_axes(xlabel="x", ylabel="y", zlabel="z", color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
+    # the object is drawn with its axis upright; its file's own axes are named
+    named = ["xyz"[abs(column).argmax()] for column in view.placed.rotation.T]
+    labels = dict(zip(("xlabel", "ylabel", "zlabel"), named, strict=True))
+    plotter.add_axes(**labels, color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
     return plotter
 
 
@@ -61,18 +64,18 @@ def draw(plotter: Any, view: View, index: Index, quantity: str, motion: str) -> 
 
 
 def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
-    """The object in the colours of the map, over the map at all forces, deformed where the file has its wall."""
+    """The object in the colours of the map at this force, deformed where the file has its wall."""
     found, limits = view.coloured(quantity)
     values, state = view.over_candidates(found, index[-1]), view.state(index[-1])
     bar = {**BAR, "position_y": 0.55, "title": fill(label_of(view.ds, quantity), 22)}
-    colours = {"cmap": COLOURS.get(quantity, "viridis"), "clim": limits, "scalar_bar_args": bar}
+    colours = {"cmap": COLOURS.get(quantity, "viridis"), "clim": limits[index[-1]], "scalar_bar_args": bar}
     for name in ("object", "open", "failed", "none", "marks"):
         plotter.remove_actor(name, render=False)
     corners, cell = view.surface.triangles, view.surface.candidate
     of = np.where(cell == NOBODY, NOBODY, state[cell])
     shown = (of == DONE) & np.isfinite(values[cell])
-    plain = {"none": (NEUTRAL, (of == NOBODY) | ((of == DONE) & ~shown)), "failed": (CROSSED, of == FAILED)}
-    plain["open"] = (OPEN, (of != NOBODY) & (of != DONE) & (of != FAILED))
+    none = np.isin(of, (NOBODY, *NO_GRASP)) | ((of == DONE) & ~shown)
+    plain = {"none": (NEUTRAL, none), "failed": (CROSSED, of == FAILED), "open": (OPEN, of == MISSING)}
     x = 1e3 * view.moved(index)
     for name, (colour, chosen) in plain.items():
         if chosen.any():

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import (
-    COLLIDES,
-    WIDE,
-    Jaws,
     JawsOnSurface,
     antipodal_grasps,
     axes_of,
@@ -18,6 +16,7 @@ from softjaw.study.case.sampler import (
     with_sampled_grasps,
 )
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import SceneError, parse_scene
 
 PAD = (0.05, 0.022, 0.015)
@@ -96,9 +95,9 @@ def test_fingers_that_are_larger_than_the_pads_meet_a_step():
     rim.apply_translation([0.035, 0, 0])
     body = surface(trimesh.util.concatenate([plate, rim]))
     pose = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
-    assert not JawsOnSurface(body, np.zeros(3), pose, JAWS).collides()
-    assert JawsOnSurface(body, np.zeros(3), pose, Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).collides()
-    assert COLLIDES
+    points = body[0] @ pose
+    assert fit_of(points, body[1], JAWS).state == MISSING
+    assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).state == COLLIDES
 
 
 def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():

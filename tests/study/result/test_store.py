@@ -241,9 +241,11 @@ def test_a_result_that_does_not_fit_the_tables_is_a_bug():
         record(layout, CaseResult({}, {"pressure": np.zeros((2, 5))}))
 
 
-def test_messages_are_cut_between_letters():
+def test_messages_are_cut_between_words():
     assert text_bytes("a\n b", 9) == b"a b"
-    assert text_bytes("ä" * 5, 5).decode() == "ää"
+    assert text_bytes("ä" * 5, 8).decode() == "ää ..."
+    assert text_bytes("the pad leaves", 14) == b"the pad leaves"
+    assert text_bytes("the pad leaves", 13) == b"the pad ..."
     assert blank(small(), "no contact")[-1] == b"no contact"
 
 

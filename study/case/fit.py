@@ -1,0 +1,172 @@
+"""Whether a gripper fits round an object where a candidate stands, from the object's triangles alone.
+
+A gripper closes along a line, so both pads meet the object's extremes along it over their faces, and what carries a pad
+runs into whatever reaches past its back. Triangles have their extremes over a rectangle at corners, at its sides and
+at its own corners: these are exact, with no grid to fall through.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import Unit
+from softjaw.study.quantities import COLLIDES, MISSING, WIDE
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import Gripper
+from softjaw.study.units import shown_text
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+DRAWN = 1e-3  # of the object's size, by which its triangles may be off the surface that is solved with
+DIGITS = 4  # of lengths in messages
+
+
+@dataclass(frozen=True)
+class Jaws:
+    """What a grasp is looked for with: lengths [m], stiffness of the springs [Pa/m], normal force [N]."""
+
+    pad: tuple[float, float, float]
+    stiffness: float
+    mu: float
+    force: float
+    max_opening: float = math.inf
+    finger: tuple[float, float] | None = None  # length and width of what carries the pad; None: as the pad
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a gripper fits: the opening it needs at first touch [m], and why it does not fit.
+
+    ``state`` is `WIDE` or `COLLIDES` with a ``message``, or `MISSING`, not computed, where it fits or that is open.
+    """
+
+    opening: float
+    state: int = MISSING
+    message: str = ""
+
+
+def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]) -> tuple[float, float]:
+    """Lowest and highest z of triangles over a rectangle about the origin; infinite where there are none.
+
+    Parameters
+    ----------
+    points, triangles : (k, 3) array, (m, 3) int array
+        [m]
+    sides : tuple of float
+        Length and width of the rectangle, along x and y [m].
+    """
+    half = 0.5 * np.array(sides)
+    corners = points[triangles]
+    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+    corners = corners[((low <= half) & (high >= -half)).all(axis=1)]
+    z = np.concatenate([_inside(corners, half), _on_sides(corners, half), _on_corners(corners, half)])
+    return (float(z.min()), float(z.max())) if z.size else (math.inf, -math.inf)
+
+
+def _inside(corners: FloatArray, half: FloatArray) -> FloatArray:
+    within = (np.abs(corners[..., :2]) <= half).all(axis=-1)
+    return corners[within][:, 2]
+
+
+def _on_sides(corners: FloatArray, half: FloatArray) -> FloatArray:
+    """Heights at which edges cross the sides of the rectangle."""
+    start, step = corners, np.roll(corners, -1, axis=1) - corners
+    found = []
+    for k in (0, 1):
+        for side in (-half[k], half[k]):
+            along = step[..., k]
+            t = np.divide(side - start[..., k], along, out=np.full(along.shape, np.nan), where=along != 0.0)
+            place = start + t[..., None] * step
+            crosses = (t >= 0.0) & (t <= 1.0) & (np.abs(place[..., 1 - k]) <= half[1 - k])
+            found.append(place[crosses][:, 2])
+    return np.concatenate(found)
+
+
+def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
+    """Heights of the triangles above the rectangle's corners."""
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    # seen from its edge a triangle has no height of its own: its neighbours have it
+    a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
+    found = []
+    for sign in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        x, y = (np.array(sign) * half - a[:, :2]).T
+        s, t = (x * v[:, 1] - y * v[:, 0]) / area, (u[:, 0] * y - u[:, 1] * x) / area
+        over = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+        found.append((a[:, 2] + s * u[:, 2] + t * v[:, 2])[over])
+    return np.concatenate(found)
+
+
+def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> Fit:
+    """How a gripper fits round triangles given in its own frame: z along finger 1's approach, x along the long side.
+
+    Parameters
+    ----------
+    points, triangles : arrays
+        As for `extremes`.
+    jaws : Jaws
+    doubt : float
+        What is nearer to a limit is undecided [m], and counts as a fit.
+    """
+    low, high = extremes(points, triangles, jaws.pad[:2])
+    opening = high - low
+    if opening > jaws.max_opening + doubt:
+        needed, allowed = (shown_text(v, "m", DIGITS) for v in (opening, jaws.max_opening))
+        return Fit(opening, WIDE, f"needs an opening of {needed}, the gripper opens to {allowed}")
+    if jaws.finger is None or not math.isfinite(opening):
+        return Fit(opening)
+    front, back = extremes(points, triangles, jaws.finger)
+    # how far the object reaches back beside each pad, from the pad's face
+    reach = {"finger 1": low - front, "finger 2": back - high}
+    hit = {name: far for name, far in reach.items() if far > jaws.pad[2] + doubt}
+    if not hit:
+        return Fit(opening)
+    far = " and ".join(f"{shown_text(v, 'm', DIGITS)} behind the face of its pad for {name}" for name, v in hit.items())
+    thick, size = shown_text(jaws.pad[2], "m", DIGITS), " x ".join(shown_text(v, "m", DIGITS) for v in jaws.finger)
+    return Fit(opening, COLLIDES, f"the object reaches {far}, which begins {thick} behind it and is {size} large")
+
+
+def stiffness(gripper: Gripper) -> float:
+    """Modulus of confined compression over the pad's thickness [Pa/m]."""
+    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
+
+
+def bed_closing(height: FloatArray, wanted: float) -> float:
+    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
+    h = np.sort(height[np.isfinite(height)])
+    # for the k lowest springs in contact the closing is known; the largest k that touches is right
+    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
+    return float(closing[np.flatnonzero(closing >= h)[-1]])
+
+
+def jaws_of(scene: Scene) -> Jaws:
+    """The gripper of a scene at the force in the middle of its load path."""
+    gripper, forces = scene.gripper, scene.load.normal_force
+    opening = math.inf if gripper.max_opening is None else gripper.max_opening
+    return Jaws(
+        gripper.pad_size, stiffness(gripper), scene.friction.mu, forces[len(forces) // 2], opening, gripper.finger_size
+    )
+
+
+def decided(units: Sequence[Unit]) -> list[Unit]:
+    """Units of work with the states of those whose candidate is too wide or collides; images share the state."""
+    surfaces: dict[Any, tuple[FloatArray, IntArray]] = {}
+    found = []
+    for unit in units:
+        scene, jaws = unit.scene, jaws_of(unit.scene)
+        if math.isfinite(jaws.max_opening) or jaws.finger is not None:
+            points, triangles = surfaces.setdefault(scene.object, build_object(scene.object).surface())
+            pose = unit.candidate.poses[0]
+            size = float(np.linalg.norm(np.ptp(points, axis=0)))
+            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, DRAWN * size)
+            unit = replace(unit, state=fit.state, reason=fit.message)
+        found.append(unit)
+    return found

@@ -1,0 +1,103 @@
+"""Whether a gripper fits: extremes of triangles by closed forms, states of candidates of every kind, the undecided."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from softjaw.study.case.candidates import units
+from softjaw.study.case.fit import Jaws, decided, extremes, fit_of
+from softjaw.study.quantities import COLLIDES, MISSING, WIDE
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import SceneError, parse_scene
+
+PAD = (0.05, 0.022, 0.015)
+ELLIPSE = """
+[object]
+shape = "elliptic_cylinder"
+semi_axis_a_mm = 25
+semi_axis_b_mm = 20
+length_mm = 80
+[gripper]
+{gripper}
+[load]
+normal_force_n = [1, 2]
+[candidates]
+"""
+GRID = ELLIPSE + "stations_mm = [-5, 10]\nangles_deg = [0, 90]\n"
+POSES = ELLIPSE + "".join(
+    f"[[candidates.poses]]\npoint_mm = [0, 0, 0]\napproach = {way}\nlong_side = [0, 0, 1]\n"
+    for way in ([1, 0, 0], [0, 1, 0])
+)
+
+
+def states(text, gripper="", overrides=()):
+    scene = parse_scene(text.format(gripper=gripper), overrides=list(overrides))
+    return [unit.state for unit in decided(units(scene, lambda point: point.axis_symmetry))]
+
+
+def test_extremes_of_triangles_are_at_their_corners_and_where_they_leave_the_rectangle():
+    slope = np.array([[-1.0, -1.0, -1.0], [3.0, -1.0, 3.0], [-1.0, 3.0, -1.0]])  # z = x
+    assert extremes(slope, np.array([[0, 1, 2]]), (1.0, 0.5)) == pytest.approx((-0.5, 0.5))
+    tip = np.array([[0.01, 0.02, -7.0], [9.0, 0.0, 0.0], [-9.0, 9.0, 0.0], [-9.0, -9.0, 0.0]])
+    fan = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+    assert extremes(tip, fan, (0.1, 0.1))[0] == -7.0  # no grid would meet it
+    assert extremes(tip, fan, (0.001, 0.001))[0] > -7.0
+    assert extremes(tip + np.array([50.0, 0.0, 0.0]), fan, (0.1, 0.1)) == (np.inf, -np.inf)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.025, 0.035])
+def test_the_opening_round_a_ball_is_its_chord(shift):
+    radius = 0.04
+    ball = trimesh.creation.icosphere(5, radius)
+    fit = fit_of(np.asarray(ball.vertices) + np.array([shift, 0, 0]), np.asarray(ball.faces), Jaws(PAD, 8e6, 0.8, 5.0))
+    off = max(shift - PAD[0] / 2, 0.0)
+    assert fit.opening == pytest.approx(2 * np.sqrt(radius**2 - off**2), rel=1e-3)
+
+
+@pytest.mark.parametrize("scene", [GRID, POSES])
+def test_candidates_of_every_kind_are_too_wide_where_they_are(scene):
+    per = 2 if scene == GRID else 1
+    assert states(scene) == [MISSING] * 2 * per
+    assert states(scene, "max_opening_mm = 45") == [WIDE, MISSING] * per
+    assert states(scene, "max_opening_mm = 39") == [WIDE, WIDE] * per
+
+
+def test_what_rounding_decides_is_solved():
+    assert states(POSES, "max_opening_mm = 40") == [WIDE, MISSING]
+    assert states(POSES, "max_opening_mm = 39.999999999") == [WIDE, MISSING]
+
+
+def test_each_point_of_a_sweep_decides_for_itself():
+    scene = parse_scene(POSES.format(gripper="max_opening_mm = 45") + "[sweep]\n'object.semi_axis_a_mm' = [21, 25]\n")
+    found = make_plan(scene).units
+    assert [unit.state for unit in found] == [MISSING, MISSING, WIDE, MISSING]
+    assert [row for unit in found if unit.state for rows in unit.rows for row in rows] == [4, 5]
+
+
+def test_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
+    """A pad on the waist of a dumb-bell whose heads stand 20 mm above it."""
+    text = """
+[object]
+shape = "revolution"
+profile_mm = [[0, 40], [10, 40], [20, 40], [25, 30], [30, 20], [40, 20], [50, 20], [60, 20], [70, 20], [75, 30],
+              [80, 40], [90, 40], [100, 40]]
+[gripper]
+pad_length_mm = 20
+pad_thickness_mm = {gripper}
+[candidates]
+stations_mm = [50]
+[load]
+normal_force_n = [1]
+"""
+    finger = "\nfinger_size_mm = [70, 22]"
+    assert states(text, "15") == [MISSING]
+    assert states(text, f"15{finger}") == [COLLIDES]
+    assert states(text, f"25{finger}") == [MISSING]
+
+
+def test_a_finger_is_at_least_as_large_as_its_pad():
+    with pytest.raises(SceneError) as refused:
+        parse_scene(GRID.format(gripper="finger_size_mm = [40, 22]"))
+    assert refused.value.problems[0].key == "gripper.finger_size_mm"

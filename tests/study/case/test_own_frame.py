@@ -1,0 +1,88 @@
+"""Poses are those of the mesh's own file: a mesh that was moved and turned there has its grasps moved and turned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from softjaw.study import pipeline
+from softjaw.study.case.candidates import units
+from softjaw.study.result.read import open as open_dataset
+from softjaw.study.result.skeleton import create
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import parse_scene
+
+TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
+SHIFT = np.array([120.0, -45.0, 30.0])  # mm
+SCENE = """
+[object]
+shape = "mesh"
+mesh = "{mesh}"
+unit = "mm"
+axis = "{axis}"
+[gripper]
+elements = [4, 4, 2]
+{candidates}
+[load]
+normal_force_n = [2]
+"""
+GRID = "[candidates]\nstations_mm = [40]\nangles_deg = [0]"
+POSE = "[[candidates.poses]]\npoint_mm = {point}\napproach = {approach}\nlong_side = {long_side}"
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("meshes")
+    body = trimesh.creation.cylinder(radius=20, height=90, sections=48)
+    body.vertices *= [1.0, 0.8, 1.0]
+    body.apply_translation([0, 0, 45])
+    body.export(folder / "upright.stl")
+    moved = body.copy()
+    moved.vertices = body.vertices @ TURN.T + SHIFT
+    moved.export(folder / "moved.stl")
+    return folder
+
+
+def scene(files, name, candidates=GRID):
+    return parse_scene(SCENE.format(mesh=files / f"{name}.stl", axis="xz"[name == "upright"], candidates=candidates))
+
+
+def solved(found):
+    [unit] = units(found, lambda point: 1)
+    [(_, result)] = pipeline.solve_unit(unit)
+    return pipeline.image(result, unit, 0).values
+
+
+def explicit(turn, shift):
+    point, approach, long_side = turn @ [0.0, 0, 40] + shift, turn @ [-1.0, 0, 0], turn @ [0.0, 0, 1]
+    return POSE.format(point=point.tolist(), approach=approach.tolist(), long_side=long_side.tolist())
+
+
+def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved(files):
+    upright, moved = (solved(scene(files, name)) for name in ("upright", "moved"))
+    assert moved["maps/quality"] == pytest.approx(upright["maps/quality"], rel=1e-5)  # STL has single precision
+    assert moved["maps/payload"] == pytest.approx(upright["maps/payload"], rel=2e-3)
+    np.testing.assert_allclose(moved["fingers/pose_rotation"], TURN @ upright["fingers/pose_rotation"], atol=1e-6)
+    there = upright["fingers/pose_origin"] @ TURN.T + 1e-3 * SHIFT
+    np.testing.assert_allclose(moved["fingers/pose_origin"], there, atol=1e-7)
+    np.testing.assert_allclose(upright["fingers/pose_origin"], [[0.02, 0, 0.04], [-0.02, 0, 0.04]], atol=2e-5)
+
+
+def test_poses_of_a_scene_are_read_in_the_frame_of_the_file(files):
+    grid = solved(scene(files, "moved"))
+    posed = solved(scene(files, "moved", explicit(TURN, SHIFT)))
+    assert posed["maps/e_n"] == pytest.approx(grid["maps/e_n"], rel=1e-6)
+    np.testing.assert_allclose(posed["fingers/pose_origin"], grid["fingers/pose_origin"], atol=1e-7)
+
+
+def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
+    plan = make_plan(scene(files, "moved"))
+    create(tmp_path / "a.hdf", plan.layout, plan.header)
+    attributes = open_dataset(tmp_path / "a.hdf").attrs
+    np.testing.assert_array_equal(attributes["object_rotation"], TURN)
+    np.testing.assert_allclose(attributes["object_origin"], 1e-3 * SHIFT, atol=1e-6)
+    # the drawing in the file lies where the mesh does
+    low, high = plan.header.surface.points.min(axis=0), plan.header.surface.points.max(axis=0)
+    np.testing.assert_allclose(1e3 * low, np.add(SHIFT, (0, -20, -16)), atol=1e-2)
+    np.testing.assert_allclose(1e3 * high, np.add(SHIFT, (90, 20, 16)), atol=1e-2)
