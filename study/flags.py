@@ -59,14 +59,17 @@ class Flag(IntFlag):
     JUMPED = 1 << 18, "jumped", (
         "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"
     )  # fmt: skip
+    NOT_BORNE = 1 << 19, "no hold", "friction does not bear what the squeeze itself asks of it, so nothing is held", (
+        "the normal forces do not face each other: their couple, or their push to one side, comes before any load"
+    )  # fmt: skip
     # of no file: derived where a file holds the safe force range
-    TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's weight"
+    TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
 
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG
 BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
-LOST = Flag.SLIPS | Flag.COLLISION | BORNE  # of a grasp that does not hold, or does harm, as it was computed
+LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | BORNE  # of a grasp that does not hold, or does harm
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

@@ -19,9 +19,11 @@ AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
 STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips", "not among the best")
 MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
 NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
+RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
+BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "wall", "graspit", "two scores")
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "two scores")
 HELD = ("cor grid", "samples", "probes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
@@ -146,6 +148,13 @@ TABLE = (
              "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
              "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
              " as in the paper.", rank=1),
+    Quantity("payload", M, "kg", "mass that is held",
+             "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
+             " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
+             " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
+             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3),
+    Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
+             symbol="safety", needs="mass"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
              "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
              " many motions.", symbol="fitted", rank=9),
@@ -229,13 +238,8 @@ TABLE = (
                  needs="two meshes")
         for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_pcm_projected")
     ),
-    Quantity("safety_factor", M, "", "weight held over weight",
-             "How many times its own weight the object could have before the grasp, with the normal force of this "
-             "case on both fingers, lost it, with the hull of the sampled wrenches as limit surface (on the safe "
-             "side). Below 1 it cannot hold the object. The centre of mass is that of [task], or the middle of the "
-             "box round the object.", symbol="safety", needs="mass", rank=5),
     Quantity("indentation", (), "m", "indentation of the wall",
-             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=3),
+             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=5),
     Quantity("wall_stress", (), "Pa", "largest stress in the wall",
              "Largest von Mises stress on its two faces.", symbol="stress", needs="wall", rank=6),
     Quantity("wall_strain", (), "", "largest strain of the wall",
@@ -265,6 +269,11 @@ TABLE = (
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
              "Centre of the undeformed contact face at first touch, in the frame of the object's own file; under load "
              "the pad's back has moved on by the closing displacement, along its z axis.", "fingers"),
+    Quantity("pieces", F, "", "pieces of the contact",
+             "Connected parts of the loaded patch; faces that touch at a corner belong together.", "fingers"),
+    Quantity("holes", F, "", "holes of the contact", "Places without load that are surrounded by it.", "fingers"),
+    Quantity("rims", F, "", "rims of the pad under load",
+             "Sum of: 1 and 2 the pad's ends, at -x and +x; 4 and 8 its sides, at -y and +y.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
     Quantity("adhesion", F, "", "largest adhesion",

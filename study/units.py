@@ -42,6 +42,7 @@ UNITS = {  # by the suffix of a scene's key
 }
 SHOWN = {  # SI unit -> unit in tables and reports; other units are shown as they are
     "m": UNITS["mm"],
+    "kg": UNITS["g"],
     "rad": UNITS["deg"],
     "Pa": UNITS["kpa"],
     "m^2": Unit("m^2", 1, 1e6, "mm^2"),

@@ -57,6 +57,8 @@ class MeshObject:
         Triangles that close a large hole: they tell inside from outside, and no pad may stand on them.
     placed : Pose
         Where the object's frame lies in that of the mesh file [m].
+    crossing : str
+        The note on closed parts that cross each other; empty if there are none.
     """
 
     points: FloatArray
@@ -66,6 +68,7 @@ class MeshObject:
     crease_angle: float = CREASE_ANGLE
     lids: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     placed: Pose = field(default_factory=lambda: Pose(np.eye(3), np.zeros(3)))
+    crossing: str = ""
 
     def __post_init__(self) -> None:
         """Refuse a step that is no length."""
@@ -94,8 +97,8 @@ class MeshObject:
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
         points = np.ascontiguousarray(points - origin)
-        placed = Pose(turn, turn @ origin)
-        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, sound.lids, placed)
+        placed, lids = Pose(turn, turn @ origin), sound.lids
+        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, lids, placed, sound.crossing)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m] to the flat triangles, its unit gradient ``(n, 3)`` and a Hessian of zeros.

@@ -21,6 +21,7 @@ from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
+AT_ANGLE = 1e-5  # of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
 PARALLEL = 0.02  # sine of the angle below which two normals at a crease have no line in common
 FINEST = 8  # pieces of an edge
 MOST_PIECES = 250_000  # triangles of one refined sheet
@@ -127,7 +128,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     turn = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
     # an edge at the very angle is a crease, whatever rounding makes of it
-    crease = turn < np.cos(np.radians(crease_angle)) + 1e-9
+    crease = turn < np.cos(np.radians(crease_angle)) + AT_ANGLE
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(key), 2, 3))
     for end in (0, 1):

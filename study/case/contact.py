@@ -110,6 +110,13 @@ class Contact:
         return self.pose.rotation @ self.frame.axes[2]
 
     @property
+    def pressure_wrench(self) -> FloatArray:
+        """Force and torque ``(6,)`` of the pressure on the object, about its frame's origin [N, N m]."""
+        force = self.patch.load[:, None] * self.patch.normal @ self.pose.rotation.T
+        arm = self.pose.to_object(self.patch.centroid)
+        return np.concatenate([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
+
+    @property
     def loaded(self) -> NDArray[np.bool_]:
         """Which faces of the patch carry load ``(n,)``."""
         return self.patch.pressure > LOADED * self.patch.pressure.max(initial=0.0)

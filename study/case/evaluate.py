@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from softjaw.friction.motion import cor_grid
 from softjaw.friction.wrench import friction_wrench
@@ -25,10 +25,9 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
-from softjaw.scoring.task import hold_task, weight_wrench
-from softjaw.study.case.build import own_frame
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
+from softjaw.study.case.task import Task, payload_values, task_of
 from softjaw.study.flags import raised
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -55,8 +54,8 @@ class EvaluationSettings:
         Lengths by which arms of forces and torques about the normals are divided [m].
     surface : LimitSurface
         Section ``[limit_surface]`` of a scene.
-    weight : (6,) array, optional
-        Wrench of the object's weight [N, N m]; with it safety factors are computed.
+    task : Task, optional
+        What is to be held; with it the payload is computed.
     cor_grid : tuple
         Grid of centres of rotation whose wrenches are computed; none where it is empty.
     epsilon_everywhere, graspit, six, sampled : bool
@@ -66,7 +65,7 @@ class EvaluationSettings:
     arms: float
     torques: float
     surface: Choice = field(default_factory=Choice)
-    weight: ArrayLike | None = None
+    task: Task | None = None
     cor_grid: Any = ()
     epsilon_everywhere: bool = False
     graspit: bool = False
@@ -85,14 +84,8 @@ def lengths(scene: Scene, obj: Any) -> tuple[float, float]:
 
 def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
-    weight = None
-    if scene.object.mass is not None:
-        placed, centre = own_frame(scene.object), np.mean(obj.bounds, axis=0)
-        if scene.task.centre_of_mass:
-            centre = placed.to_pad(np.array(scene.task.centre_of_mass))
-        weight = weight_wrench(scene.object.mass, np.array(scene.task.weight_direction) @ placed.rotation, centre)
     return EvaluationSettings(
-        *lengths(scene, obj), scene.limit_surface, weight, scene.friction.cor_grid,
+        *lengths(scene, obj), scene.limit_surface, task_of(scene, obj), scene.friction.cor_grid,
         epsilon_everywhere=scene.score.epsilon == "everywhere", graspit=scene.score.graspit,
         six=scene.effects.wrench == "6-D", sampled=bool(scene.sampled),
     )  # fmt: skip
@@ -122,10 +115,12 @@ def evaluate(
     scores, best = _scores(contacts, fits, settings)
     values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.sampled, settings.six)
     values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
+    if settings.task:
+        held, flag = payload_values(contacts, fits, settings.task)
+        values |= held
+        values["maps/flags"] |= flag
     if settings.cor_grid:
         values["fingers/cor_wrench"] = _per_patch(contacts, lambda c: _cor_wrenches(c, settings.cor_grid))
-    if settings.weight is not None:
-        values["maps/safety_factor"] = _safety_factors(contacts, fits, settings.weight)
     return values, fits
 
 
@@ -328,23 +323,3 @@ def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], settings: Evalu
     """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
     middle = 0.5 * (contacts[0].origin + contacts[1].origin)
     return epsilon(soft(contacts, bodies), settings.arms, settings.torques, middle, tolerance=NEAR).upper
-
-
-def _safety_factors(contacts: Sequence[Contact], fits: Sequence[Fits], weight: ArrayLike) -> list[float]:
-    """Largest multiple of the object's weight that the grasp holds, for each friction model.
-
-    Each finger presses with at most the normal force of this case. Its friction is the hull of the sampled wrenches,
-    which lies inside the exact limit surface: the factor errs on the safe side, by about 1 % with 500 samples.
-    """
-    # Without friction, or with flat surfaces, the hulls are degenerate.
-    if contacts[0].mu == 0 or any(fit.surface.rank < 3 for own in fits for fit in own.values()):
-        return [np.nan] * len(MODELS)
-    grip = [c.limits[MODELS[0]].F_N for c in contacts]
-    factors = []
-    for m in MODELS:
-        # wrenches are for mu = 1 and the whole force; the task wants them per newton of grip
-        wrenches = [c.mu / c.limits[m].F_N * own[m].wrench[:, [0, 1, 5]] for c, own in zip(contacts, fits, strict=True)]
-        # A motion the other way gives the opposite wrench, which costs no further sample.
-        hulls = [PolytopeBody(np.vstack([wrench, -wrench])) for wrench in wrenches]
-        factors.append(hold_task(soft(contacts, hulls), grip, weight).safety_factor)
-    return factors

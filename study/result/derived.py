@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 LOW, HIGH = "force_low", "force_high"
+LOW_ERROR = f"{LOW}_error"
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 PREDICTED, MEASURED, HELD_OUT = "e_n_error_predicted", "e_n_error_on_probes", "e_n_error_held_out"
@@ -89,14 +90,18 @@ def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
 
 
 def _of_force_range(scene: Scene) -> list[Derived]:
-    """Bounds of the safe force range, as far as the scene asks for them."""
+    """Force to use and bounds of the safe force range, as far as the scene asks for them."""
     over = tuple(axis.name for axis in axes(scene)[:-1])
     found = []
     if scene.object.mass is not None:
         found.append(Derived(
-            LOW, "N", "smallest force that holds the object", "Normal force per finger at which safety_factor (CCM)"
-            " passes 1, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them holds it.",
-            over,
+            LOW, "N", "force to use", "Smallest normal force per finger that holds the object: at which safety_factor"
+            " (CCM) passes task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of"
+            " them holds it.", over,
+        ))  # fmt: skip
+        found.append(Derived(
+            LOW_ERROR, "N", "error of the force to use", "What the bend of safety_factor over the solved forces may"
+            " move it; NaN where fewer than two of them are solved up to it.", over,
         ))  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
         found.append(Derived(
@@ -117,7 +122,8 @@ def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
     done = writer.codes().reshape(writer.layout.shape) == DONE
     if LOW in wanted:
         factor = np.where(done, writer.read("safety_factor/ccm"), np.nan)
-        writer.write_derived(LOW, first_crossing(forces, factor, 1.0))
+        writer.write_derived(LOW, first_crossing(forces, factor, scene.task.safety))
+        writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety))
     if HIGH in wanted:
         writer.write_derived(HIGH, _largest(writer, scene, forces, done))
 
@@ -135,6 +141,37 @@ def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArr
     crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
     # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
     return np.fmin.reduce([solved, *crossings])
+
+
+def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
+    """Error of `first_crossing` [N]: that of a straight line in a curve that bends as much as the values beside it do.
+
+    Parameters
+    ----------
+    forces, values, limit
+        As for `first_crossing`; NaN where no three values, the one at no force counted, lie about the crossing.
+
+    Examples
+    --------
+    >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5).round(3).tolist()  # x^2, which passes at 1.581 and not at 1.5
+    [0.083]
+    """
+    x = np.concatenate([[0.0], np.asarray(forces, float)])
+    values = np.asarray(values, float)
+    y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
+    at = first_crossing(forces, values, limit)
+    if len(x) < 3:
+        return np.full(at.shape, np.nan)
+    step = np.diff(x)
+    slope = np.diff(y, axis=-1) / step
+    bend = np.abs(2 * np.diff(slope, axis=-1) / (step[1:] + step[:-1]))  # of every node but the first and the last
+    k = np.clip(np.searchsorted(x, at) - 1, 0, len(step) - 1)[..., None]  # interval of the crossing
+    # the ends of the interval that have a bend
+    ends = [np.take_along_axis(bend, np.clip(k + shift, 0, bend.shape[-1] - 1), -1)[..., 0] for shift in (-1, 0)]
+    k = k[..., 0]
+    rise = np.take_along_axis(slope, k[..., None], -1)[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.fmax(*ends) / 2 * (at - x[k]) * (x[k + 1] - at) / rise)
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:

@@ -119,10 +119,8 @@ class Scene(SceneSection):
 
     @property
     def axis_symmetry(self) -> int:
-        """Order of the symmetry about the axis of all that a case depends on: the object, and its weight if any."""
-        if self.object.mass is None:
-            return self.object.axis_symmetry
-        sideways = (*self.task.weight_direction[:2], *(self.task.centre_of_mass or (0.0, 0.0))[:2])
+        """Order of the symmetry about the axis of all that a case depends on: the object and its weight."""
+        sideways = (*(self.task.direction or (0.0, 0.0))[:2], *(self.task.centre_of_mass or (0.0, 0.0))[:2])
         # A weight off the axis makes angles differ that are alike for the object.
         return 1 if any(abs(v) > 1e-9 for v in sideways) else self.object.axis_symmetry
 

@@ -36,7 +36,7 @@ class Shape(SceneSection):
     if TYPE_CHECKING:
         shape: str  # a literal of each subclass
     name: Text = Field("", max_length=100, description="name for titles and tables")
-    mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the safety factor")
+    mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the force to use")
     mass: ClassVar[Any] = si("mass_g")
 
     @property

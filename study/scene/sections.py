@@ -226,15 +226,24 @@ class LimitSurfaceKeys(SceneSection):
 
 
 class TaskKeys(SceneSection):
-    """What the grasp has to hold: the object's weight, where ``object.mass_g`` gives its mass."""
+    """What the grasp has to hold: the object's weight, in any direction or in one."""
 
-    weight_direction: Direction = Field(
-        (0.0, 0.0, -1.0), description="direction of the weight in the frame of the object's own file"
+    weight_direction: Direction | Literal["worst"] = Field(
+        "worst", description="direction of the weight in the frame of the object's own file; worst: held in every one"
     )
     centre_of_mass_mm: Vector | Literal["auto"] = Field(
-        "auto", description="centre of mass [x, y, z] in the same frame; auto is the middle of the box round the object"
+        "auto", description="centre of mass [x, y, z] in the same frame; auto is the centroid of the object's volume"
+    )
+    safety: float = Field(2.0, ge=1, le=100, description="how many times object.mass_g the force to use has to hold")
+    drive: Literal["shared", "up_to", "fixed"] = Field(
+        "shared", description="what a load makes of the normal forces: their sum stays, each gives way, each stays"
     )
     centre_of_mass: ClassVar[Any] = si("centre_of_mass_mm")
+
+    @property
+    def direction(self) -> tuple[float, float, float] | None:
+        """Direction of the weight, None for every direction."""
+        return None if isinstance(self.weight_direction, str) else self.weight_direction
 
 
 class Effects(SceneSection):

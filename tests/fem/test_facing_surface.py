@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import facing_sheet
@@ -309,3 +310,12 @@ def test_nothing_is_seen_from_behind():
     pose = side(0.0, np.pi, -0.02)
     sheet = facing_sheet(mesh._smooth, mesh._tree, mesh.lids, pose, BOX + 0.001, 1e-3)
     assert len(sheet.sheet.triangles)
+
+
+def test_the_twelve_edges_of_a_cylinder_in_single_precision_are_all_creases():
+    """They turn by the crease angle itself, which rounding must not decide edge by edge."""
+    for turn in np.linspace(0.0, 0.5, 8):
+        body = trimesh.creation.cylinder(30.0, 100.0, sections=12)
+        body.apply_transform(trimesh.transformations.rotation_matrix(turn, [0.3, 0.2, 1.0]))
+        points = body.vertices.astype(np.float32).astype(float)
+        assert smooth_triangles(points, np.asarray(body.faces), 30.0).crease.sum() == 36

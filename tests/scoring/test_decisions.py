@@ -14,7 +14,6 @@ from softjaw.scoring.graspit import graspit_score, graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score
 from softjaw.scoring.rays import ray_volume
-from softjaw.scoring.task import hold_task, least_grip_force
 
 TURNS = 200
 ULP = np.finfo(float).eps
@@ -172,77 +171,3 @@ def test_epsilon_goes_to_zero_where_nothing_decides():
     contacts = pair((0.8, 0.6, 0.15), (0.8, 0.6, 0.15), np.arctan(0.6))
     found = outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4)
     assert found == {True: 4}
-
-
-# Tasks --------------------------------------------------------------------------------------------------------------
-
-PULL, DOWN, LIMIT = [3.0, 0, 0, 0, 0, 0], [0, 0, -8.0, 0, 0, 0], [0, 0, -16.0, 0, 0, 0]
-ASIDE, ASKEW = [0, -5.0, -5.0, 0, 0, 0], [0, 0, -8.0, 0.1, 0, 0]
-T, ROUND = (0.8, 0.6, 0.01), (0.7, 0.7, 0.01)
-X, Y, ABOUT, OFF, BACK, STILL = (
-    "slides along x", "slides along y", "turns about its normal", "lets go", "is pushed back along its normal",
-    "stays in place",
-)  # fmt: skip
-BELOW = [SoftContact([0, 0, 0], contact_axes([0, 0, 1], [1, 0, 0]), Ellipsoid(T))]
-BOTH = pytest.mark.parametrize("normal", ["up_to", "fixed"])
-
-
-def there(load, R, p):
-    force = R @ load[:3]
-    return np.concatenate([force, R @ load[3:] + np.cross(p, force)])
-
-
-def held(contacts, load, grip, normal, times=40):
-    """Whether a load is held, whether that is undecided, and what the contacts do."""
-
-    def decide(k, R, p):
-        found = hold_task(k, grip, there(np.array(load), R, p), normal)
-        return found.holds, found.at_limit, found.limits
-
-    ((outcome, count),) = outcomes(decide, contacts, times).items()
-    assert count == times
-    return outcome
-
-
-@BOTH
-def test_a_load_is_held_or_not_or_at_the_limit(normal):
-    """Margin 1e-6 of the load: one at the limit counts as held and says so."""
-    assert held(pair(T, T), DOWN, 10, normal) == (True, False, (X, X))
-    assert held(pair(T, T), LIMIT, 10, normal) == (True, True, (X, X))
-    assert held(pair(T, T), np.multiply(LIMIT, 1 + 1e-4), 10, normal) == (False, False, (X, X))
-    assert held(pair(graspit_vertices(T), graspit_vertices(T)), DOWN, 10, normal)[:2] == (True, False)
-    assert held(BELOW, [0, 0, -10.0, 0, 0, 0], 10, normal) == (True, True, (BACK,))
-
-
-@BOTH
-def test_motions_that_weigh_the_same_are_all_named(normal):
-    """Margin 1e-4 of the larger one."""
-    both, turning = f"{X} and {Y}", f"{X} and {ABOUT}"
-    assert held(pair(ROUND, ROUND), ASIDE, 10, normal) == (True, False, (both, both))
-    assert held(pair(T, T), ASKEW, 10, normal) == (True, False, (turning, turning))
-
-
-@BOTH
-def test_what_contacts_cannot_feel_does_not_move_them(normal):
-    """A torque that flat contacts cannot take, a weight that one cannot: what they feel of it is rounding."""
-    assert held(pair(FLAT, FLAT), ASKEW, 10, normal) == (False, False, (STILL, STILL))
-    assert held(pair(T, T)[:1], DOWN, 10, normal) == (False, False, (STILL,))
-
-
-def test_fixed_normal_forces_that_balance_one_load_balance_it_in_every_position():
-    assert held(pair(T, T), PULL, 10, "fixed") == (False, False, (OFF, BACK))
-    assert held(pair(T, T), [2.0, 0, 0, 0, 0, 0], [8, 10], "fixed") == (True, True, (OFF, BACK))
-    assert held(pair(T, T), [2.0, 0, -20.0, 0, 0, 0], [8, 10], "fixed")[0] is False
-
-
-@pytest.mark.parametrize(("contacts", "load", "up_to", "fixed"), [
-    (pair(T, T), PULL, 3.0, np.inf), (pair(BOX, BOX), PULL, 3.0, np.inf), (pair(FLAT, FLAT), ASKEW, np.inf, np.inf),
-    (pair(T, T)[:1], PULL, np.inf, np.inf), (pair(T, T), LIMIT, 10.0, 10.0),
-])  # fmt: skip
-def test_the_grip_force_is_finite_or_not(contacts, load, up_to, fixed):
-    """Margin 1e-9 of what the contacts bear: 1e17 N were asked for in 24 of 40 positions where nothing helps."""
-    for normal, force in (("up_to", up_to), ("fixed", fixed)):
-        found = outcomes(
-            lambda k, R, p, n=normal: round(least_grip_force(k, there(np.array(load), R, p), normal=n), 5), contacts, 40
-        )
-        assert found == {force: 40}

@@ -128,10 +128,11 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
     from softjaw.study.flags import Flag
     from softjaw.study.show.tables.ranking import judged
 
-    factor = moved([[1.0, 1.0, 0.9, 1.1]], seed)
+    factor = moved([[2.0, 2.0, 1.8, 2.2]], seed)
     over = ("angle", "normal_force")
     known = {"flags": (over, np.zeros((1, 4), np.int64)), "force_low": ("angle", [1.0])}
-    ds = xr.Dataset(known | {"safety_factor": ((*over, "model"), factor[..., None])}, {"model": ["ccm"]})
+    factors = {"safety_factor": ((*over, "model"), factor[..., None])}
+    ds = xr.Dataset(known | factors, {"model": ["ccm"]}, {"scene": "[task]\nsafety = 2.0"})
     assert (judged(ds) & Flag.TOO_WEAK > 0).tolist() == [[False, False, True, False]]
 
 

@@ -167,14 +167,21 @@ def test_a_plane_contact_resists_three_directions_and_a_curved_one_six(shape, ra
     assert (dropped > 1e-3) == (rank == 6)
 
 
-def test_the_safety_factor_is_friction_over_weight_where_the_weight_hangs_between_the_pads():
+def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the_pads():
     """Two pads hold mu F each along the plate; beside the centre of mass the weight turns the plate as well."""
-    mass = ("object.mass_g=500", "limit_surface.samples=100")
-    [above] = cases(PLATE, *mass, forces="[5]")
-    expected = 2 * MU * 5 / (0.5 * WEIGHT)
-    assert above["maps/safety_factor"] == pytest.approx([expected] * 3, rel=1e-3)
-    [beside] = cases(PLATE, *mass, "task.centre_of_mass_mm=[0, 30, 0]", forces="[5]")
-    assert 0 < beside["maps/safety_factor"][FLAT] < 0.9 * expected
-    [pulled] = cases(PLATE, *mass, "task.weight_direction=[1, 0, 0]", forces="[5]")  # onto one finger
-    assert pulled["maps/safety_factor"][CURVED] == pytest.approx(5 / (0.5 * WEIGHT), rel=1e-3)
-    assert "maps/safety_factor" not in cases(PLATE)[0]
+    few, down = "limit_surface.samples=100", "task.weight_direction=[0, 0, -1]"
+    [above] = cases(PLATE, few, down, "object.mass_g=500", forces="[5]")
+    expected = 2 * MU * 5 / WEIGHT
+    assert above["maps/payload"] == pytest.approx([expected] * 3, rel=1e-3)
+    assert above["maps/safety_factor"] == pytest.approx(np.divide(above["maps/payload"], 0.5), rel=1e-12)
+    [beside] = cases(PLATE, few, down, "task.centre_of_mass_mm=[0, 30, 0]", forces="[5]")
+    assert 0 < beside["maps/payload"][FLAT] < 0.9 * expected
+    assert "maps/safety_factor" not in beside
+    for drive, force in (("shared", 10), ("up_to", 5)):  # onto one finger
+        pull = "task.weight_direction=[1, 0, 0]"
+        [pulled] = cases(PLATE, few, pull, f"task.drive={drive}", forces="[5]")
+        assert pulled["maps/payload"][CURVED] == pytest.approx(force / WEIGHT, rel=1e-3)
+    [worst] = cases(PLATE, few, forces="[5]")
+    assert 0.95 * expected / np.hypot(1, MU) < worst["maps/payload"][CURVED] <= expected / np.hypot(1, MU)
+    assert not above["maps/flags"] & Flag.NOT_BORNE
+

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import Any
 
 import numpy as np
@@ -18,15 +19,20 @@ NOTHING = 1e-12  # of the largest value, below which a difference is none
 def judged(ds: Any) -> IntArray:
     """Flags of all cases, with `Flag.TOO_WEAK` and `Flag.TOO_STRONG` where a case lies outside its safe force range.
 
-    A force is too weak where the grasp does not hold the object's weight, and too strong above ``force_high``. Files
-    that derive no such range have their own flags only.
+    A force is too weak where the grasp does not hold the object with the safety that is asked for, and too strong above
+    ``force_high``. Files that derive no such range have their own flags only.
     """
     flags = ds["flags"].values.copy()
     if "force_low" in ds:
-        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < 1 - TIE)
+        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < safety_of(ds) * (1 - TIE))
     if "force_high" in ds:
         flags |= Flag.TOO_STRONG * (ds["normal_force"].values > ds["force_high"].values[..., None] * (1 + 1e-9))
     return flags
+
+
+def safety_of(ds: Any) -> float:
+    """How many times its mass the object has to be held, by its scene; 1 where that does not say it."""
+    return float(tomllib.loads(ds.attrs.get("scene", "")).get("task", {}).get("safety", 1.0))
 
 
 def falling(values: np.ndarray) -> np.ndarray:

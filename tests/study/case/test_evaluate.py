@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.scoring.payload import GRAVITY
+from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, mesh_errors, quality
+from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
+from softjaw.study.scene.objects import SphereShape
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
 
@@ -71,10 +76,35 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
 
 
 def test_a_weight_between_the_pads_is_held_by_their_friction():
-    """Along x both pads carry mu S together, here per newton of F_N."""
-    weight = np.array([-1.0, 0, 0, 0, 0, 0])
+    """Along x both pads carry mu S together."""
     contacts = pair()
     middle = np.add(contacts[0].origin, [0, 0, DISTANCE / 2])
-    weight[3:] = np.cross(middle, weight[:3])
-    values, _ = evaluate(contacts, replace(SETTINGS, weight=weight))
-    assert values["maps/safety_factor"][0] == pytest.approx(2 * MU * S, rel=2e-2)
+    values, _ = evaluate(contacts, replace(SETTINGS, task=Task(middle, (-1.0, 0, 0), mass=0.1)))
+    assert values["maps/payload"][0] * GRAVITY == pytest.approx(2 * MU * S, rel=2e-2)
+    assert values["maps/safety_factor"][0] == pytest.approx(values["maps/payload"][0] / 0.1, rel=1e-12)
+    assert not values["maps/flags"] & Flag.NOT_BORNE
+    assert "maps/payload" not in evaluate(contacts, SETTINGS)[0]
+
+
+@pytest.mark.parametrize(("share", "borne"), [(0.9, True), (1.1, False)])
+def test_a_couple_of_the_squeeze_comes_before_any_load(share, borne):
+    """Two forces F_N that pass each other by h make a couple F_N h along y; friction mu S along x, apart, takes it."""
+    one, two = pair()
+    passing = [share * MU * S / F_N * DISTANCE, 0.0, 0.0]
+    two = two.at(Pose(two.pose.rotation, two.pose.origin + passing))
+    assert one.pressure_wrench[2] == pytest.approx(F_N, rel=5e-5)
+    assert two.pressure_wrench[:3] == pytest.approx(-one.pressure_wrench[:3], abs=1e-9)
+    middle = (one.origin + two.origin) / 2
+    values, _ = evaluate((one, two), replace(SETTINGS, task=Task(middle)))
+    assert (values["maps/payload"][0] > 0) == borne
+    assert bool(values["maps/flags"] & Flag.NOT_BORNE) != borne
+
+
+def test_the_centre_of_mass_is_that_of_the_volume_in_its_own_frame():
+    """Of a tetrahedron the mean of its corners; that of its surface or of the box round it lies elsewhere."""
+    corners = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 5]]) * 0.01 + [0.1, 0.2, 0.3]
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    body = SimpleNamespace(points=corners, triangles=faces, bounds=np.array([corners.min(axis=0), corners.max(axis=0)]))
+    assert centre_of_volume(body) == pytest.approx(corners.mean(axis=0), rel=1e-12)
+    ball = build_object(SphereShape(shape="sphere", radius_mm=30))
+    assert centre_of_volume(ball) == pytest.approx([0, 0, 0], abs=1e-15)

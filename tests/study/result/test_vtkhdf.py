@@ -149,7 +149,7 @@ def test_the_result_file_itself_is_a_grid_over_the_forces(tmp_path):
     study(path, lost=[lost])
     first = pv.read(path)
     assert isinstance(first, pv.UnstructuredGrid)
-    assert set(first.cell_data) == {"part", "candidate", "status", "quality", "e_n", "tau_z_max", "pressure"}
+    assert set(first.cell_data) == {"part", "candidate", "status", "quality", "e_n", "payload", "tau_z_max", "pressure"}
     for k, (force, grid) in enumerate(steps_of(path)):
         assert force == (1.0, 5.0)[k]
         part, cell, area = grid["part"], grid["candidate"], grid.compute_cell_sizes()["Area"]

@@ -100,11 +100,13 @@ def test_a_force_between_the_levels_is_answered_with_the_nearest():
     assert best(study([[1.0]]), force=5.0).title.endswith("at 5 N")
 
 
-def test_the_safety_factor_has_a_column_where_the_mass_is_known():
-    assert "safety" not in as_text(best(study([[2.0], [1.0]])))
-    heavy = study([[2.0], [1.0]], needs=["mass"])
-    assert "safety" in as_text(best(heavy), 200).splitlines()[2]
-    assert "safety_factor" in as_csv(best(heavy)).splitlines()[0]
+def test_the_payload_has_a_column_in_grams():
+    table = best(study([[0.2], [0.1]]))
+    head, unit, first = as_text(table, 200).splitlines()[1:4]
+    assert "payload" in head
+    assert "[g]" in unit.split()
+    assert float(first.split()[4]) == 200
+    assert "payload [kg]" in as_csv(table).splitlines()[0]
 
 
 WIDE = ("mass", "wall", "two meshes", "two scores")

@@ -1,0 +1,284 @@
+"""How much a gripper holds: the largest force at the centre of mass that both contacts bear in every direction.
+
+The drive of a parallel gripper keeps the sum of both normal forces. A load along the closing axis shifts force from one
+finger to the other, ``F + s`` and ``F - s``, and the friction of each contact follows its normal force. With ``P_i``
+the wrench of finger i's pressure at the force ``F`` and ``B_i`` its limit surface there, the grasp answers with
+
+    W = 2 conv(A_1, A_2),    A_i = P_i + B_i          ("shared", the default),
+    W = conv(0, A_1) + conv(0, A_2)                   ("up_to": each finger gives way down to nothing),
+    W = A_1 + A_2                                     ("fixed": each keeps its force).
+
+The squeeze comes first: two forces that do not face each other make a couple, and unless 0 lies in W the grasp does not
+hold even itself. The forces without a torque about the centre of mass in W are a convex set ``K`` in space, and what
+is held in every direction is the radius of the largest ball round 0 in it.
+
+One direction of ``K`` is a linear programme with four rows, whose columns, points of the limit surfaces, are looked for
+where its multipliers ask (column generation). The points that several directions give span a polytope inside ``K``; the
+normals of its nearest facets are the next directions. Its nearest facet bounds the radius from below, the support of
+``K`` from above, for any direction, so that the answer knows its error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
+
+from softjaw.scoring.bodies import PolytopeBody
+from softjaw.scoring.contact import SoftContact
+
+FloatArray = NDArray[np.float64]
+GRAVITY = 9.80665
+KINDS = ("shared", "up_to", "fixed")
+GAP = 5e-4  # of the bounds, relative, at which the search ends
+NOTHING = 1e-7  # of the forces of the grasp, below which a force is rounding
+OFF = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
+PENALTY = 1e5  # of torques that no point takes, against forces
+PIVOTS = 400  # of one programme; ten are usual
+ROUNDS = 40  # of looking along facets; eight are usual
+
+
+@dataclass(frozen=True)
+class Payload:
+    """Largest force that is held.
+
+    Parameters
+    ----------
+    force : float
+        Of a load at the centre of mass [N], as proved; 0 where the squeeze itself is not borne.
+    upper : float
+        What it is at most [N].
+    direction : (3,) array
+        In which the load pulls then.
+    borne : bool
+        Whether friction bears the squeeze itself; at the limit, and without friction, it does not.
+    """
+
+    force: float
+    upper: float
+    direction: FloatArray
+    borne: bool
+
+
+def payload(
+    contacts: Sequence[SoftContact],
+    pressure: ArrayLike,
+    centre_of_mass: ArrayLike,
+    direction: ArrayLike | None = None,
+    kind: str = "shared",
+) -> Payload:
+    """Largest force at the centre of mass that two contacts hold, along ``direction`` or the worst of all.
+
+    Parameters
+    ----------
+    contacts : two SoftContact
+        With polytopes as limit surfaces, at the solved forces [N, N, N m].
+    pressure : (2, 6) array
+        Wrench of each finger's pressure on the object, torques about the origin [N, N m].
+    centre_of_mass : (3,) array
+        Where the load acts [m].
+    direction : (3,) array, optional
+        In which it pulls, of any length.
+    kind : str
+        What happens to the normal forces: one of `KINDS`.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind is {kind!r}: take one of {', '.join(KINDS)}")
+    if len(contacts) != 2 or not all(isinstance(c.body, PolytopeBody) for c in contacts):
+        raise ValueError("a payload takes two contacts with polytopes as limit surfaces")
+    centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
+    length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0
+    C = np.array([c.wrench_map(length, length, centre) for c in contacts])
+    C[:, :3, 0], C[:, 3:, 0] = P[:, :3], (P[:, 3:] - np.cross(centre, P[:, :3])) / length
+    size = float(np.linalg.norm(P[:, :3], axis=1).sum())
+    V1, V2 = (np.ascontiguousarray(getattr(c.body, "vertices").T) / size for c in contacts)  # noqa: B009
+    C[:, :, 0] /= size
+    grasp = _Grasp(C, V1, V2, KINDS.index(kind))
+    found = _along(grasp, _unit(direction)) if direction is not None else _worst(grasp)
+    return Payload(size * found.force, size * found.upper, found.direction, found.borne)
+
+
+@dataclass(frozen=True)
+class _Grasp:
+    """Both contacts, forces in units of that of the grasp: ``C (2, 6, 4)``, vertices ``(3, k)``, and the kind."""
+
+    C: FloatArray
+    V1: FloatArray
+    V2: FloatArray
+    kind: int
+
+    def begin(self, rows: FloatArray) -> FloatArray:
+        """Basis that fulfils the rows with the least that no point takes."""
+        m = len(rows) + 1
+        basis = np.zeros((m, 8))
+        # every row but the last, which counts the points, begins with a column of its own
+        basis[:, 7] = np.arange(1, m + 1)
+        first, _ = _farthest(self.C, self.V1, self.V2, self.kind, np.ones(6))
+        basis[-1, :6], basis[-1, 6:] = first, (1.0, 0.0)
+        off = OFF * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
+        basis[:-1, 6] = np.where(off < 0, -1.0, 1.0)
+        return basis
+
+    def farthest(self, along: FloatArray, rows: FloatArray, basis: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Support of the section, the point ``(6,)`` that it touches and its basis; -inf where the section is empty."""
+        new = basis.copy()
+        upper, point, missing = _programme(
+            self.C, self.V1, self.V2, self.kind, np.append(along, np.zeros(3)), rows, new
+        )
+        return (upper if missing < NOTHING else -np.inf), point, new
+
+
+def _along(grasp: _Grasp, d: FloatArray) -> Payload:
+    """Largest load along one direction."""
+    # the answer has no part across the load: two more rows
+    across = np.linalg.svd(d[None])[2][1:]
+    rows = np.zeros((5, 6))
+    rows[:3, 3:], rows[3:, :3] = np.eye(3), across
+    most, point, basis = grasp.farthest(-d, rows, grasp.begin(rows))
+    least = -grasp.farthest(d, rows, basis)[0]  # from which load on: 0 or less where none is needed
+    if most < -NOTHING or least > NOTHING:
+        return Payload(0.0, 0.0, d, False)
+    return Payload(max(float(-d @ point[:3]), 0.0), max(most, 0.0), d, True)
+
+
+def _worst(grasp: _Grasp) -> Payload:
+    """Largest load in every direction, and one in which a larger one is lost."""
+    rows = np.hstack([np.zeros((3, 3)), np.eye(3)])
+    begin = grasp.begin(rows)
+    search = _Search(grasp, rows)
+    for u in np.vstack([np.eye(3), -np.eye(3)]):
+        begin = search.look(u, begin)
+        if search.upper < -NOTHING:
+            return Payload(0.0, 0.0, -search.u, False)
+    # a set that is flat has no hull, and no ball round 0
+    thin = np.linalg.svd(search.found - search.found.mean(axis=0))[2][-1]
+    for u in (thin, -thin):
+        search.look(u, begin)
+    flat = np.linalg.svd(search.found - search.found.mean(axis=0))[1][-1] <= NOTHING
+    lower = 0.0 if flat or search.upper <= NOTHING else search.refine()
+    force = min(lower, search.upper) if lower > NOTHING else 0.0
+    return Payload(force, max(search.upper, 0.0), -search.u, search.upper >= -NOTHING)
+
+
+class _Search:
+    """Points of the section that directions have found, and the least support among them with its direction."""
+
+    def __init__(self, grasp: _Grasp, rows: FloatArray) -> None:
+        self.grasp, self.rows = grasp, rows
+        self.points: list[FloatArray] = []
+        self.bases: list[FloatArray] = []
+        self.upper, self.u = np.inf, np.zeros(3)
+
+    @property
+    def found(self) -> FloatArray:
+        """Forces ``(n, 3)`` of the points."""
+        return np.array(self.points)
+
+    def look(self, u: FloatArray, start: FloatArray) -> FloatArray:
+        """Add the point that is farthest in a direction; the basis it was found with."""
+        support, point, basis = self.grasp.farthest(u, self.rows, start)
+        self.points.append(point[:3])
+        self.bases.append(basis)
+        if support < self.upper:
+            self.upper, self.u = support, u
+        return basis
+
+    def refine(self) -> float:
+        """Distance of the nearest facet of the hull, after looking along all that are nearer than the least support."""
+        lower = -np.inf
+        for _ in range(ROUNDS):
+            hull = ConvexHull(self.found)
+            # several triangles may share one facet
+            planes, which = np.unique(np.round(hull.equations, 12), axis=0, return_index=True)
+            distance = -planes[:, 3]
+            lower = float(distance.min())
+            near = np.flatnonzero(distance < self.upper * (1.0 - GAP))
+            if self.upper < NOTHING or not len(near):
+                break
+            for k in near[np.argsort(distance[near], kind="stable")]:
+                if distance[k] < self.upper * (1.0 - GAP):
+                    self.look(planes[k, :3], self.bases[hull.simplices[which[k], 0]])
+        return lower
+
+
+def _unit(v: ArrayLike) -> FloatArray:
+    d = np.asarray(v, dtype=float)
+    return d / np.linalg.norm(d)
+
+
+@njit(cache=True)
+def _touching(C, V, q, out):
+    """Support of ``P + B`` along ``q (6,)``; its point goes into ``out (6,)``."""
+    t = C.T @ q
+    best, at = -np.inf, 0
+    for k in range(V.shape[1]):
+        h = V[0, k] * t[1] + V[1, k] * t[2] + V[2, k] * t[3]
+        if h > best:
+            best, at = h, k
+    for i in range(6):
+        out[i] = C[i, 0] + C[i, 1] * V[0, at] + C[i, 2] * V[1, at] + C[i, 3] * V[2, at]
+    return t[0] + best
+
+
+@njit(cache=True)
+def _farthest(C, V1, V2, kind, q):
+    """Point ``(6,)`` of W that is farthest along ``q``, and how far."""
+    one, two = np.empty(6), np.empty(6)
+    h1, h2 = _touching(C[0], V1, q, one), _touching(C[1], V2, q, two)
+    if kind == 0:
+        return (2.0 * one, 2.0 * h1) if h1 >= h2 else (2.0 * two, 2.0 * h2)
+    if kind == 1:
+        return one * (h1 > 0.0) + two * (h2 > 0.0), max(h1, 0.0) + max(h2, 0.0)
+    return one + two, h1 + h2
+
+
+@njit(cache=True)
+def _programme(C, V1, V2, kind, along, rows, basis):
+    """Largest ``along . x`` over points of W with ``rows . x = off``, by the revised simplex method.
+
+    ``basis (m, 8)`` is where it begins and ends: points ``(6,)``, then 1 and 0; or 0, a sign and the number of the row,
+    from 1, for a column that only fills a row. Returns a proved upper bound, the point reached, and what is filled.
+    """
+    m = len(basis)
+    B, cost, right = np.zeros((m, m)), np.zeros(m), np.ones(m)
+    for i in range(m - 1):
+        right[i] = OFF * np.sqrt(i + 2.0)
+    for k in range(m):
+        if basis[k, 7] > 0:
+            B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -PENALTY
+        else:
+            B[: m - 1, k] = rows @ basis[k, :6]
+            B[m - 1, k], cost[k] = 1.0, along @ basis[k, :6]
+    inverse = np.linalg.inv(B)
+    x = inverse @ right
+    upper, column = np.inf, np.ones(m)
+    for _ in range(PIVOTS):
+        y = cost @ inverse
+        point, support = _farthest(C, V1, V2, kind, along - y[: m - 1] @ rows)
+        bound = support + y[: m - 1] @ right[: m - 1]
+        upper = min(upper, bound)
+        if bound - cost @ x <= 1e-9 * (1.0 + abs(bound)):
+            break
+        column[: m - 1] = rows @ point
+        d = inverse @ column
+        out, most = -1, np.inf
+        for k in range(m):
+            if d[k] > 1e-11 and max(x[k], 0.0) < most * d[k]:
+                out, most = k, max(x[k], 0.0) / d[k]
+        if out < 0:
+            break
+        basis[out, :6], basis[out, 6], basis[out, 7], cost[out] = point, 1.0, 0.0, along @ point
+        inverse[out] /= d[out]
+        for k in range(m):
+            if k != out:
+                inverse[k] -= d[k] * inverse[out]
+        x = inverse @ right
+    point, missing = np.zeros(6), 0.0
+    for k in range(m):
+        point += x[k] * basis[k, :6]
+        missing += abs(x[k]) * (basis[k, 7] > 0)
+    return upper, point, missing

@@ -1,0 +1,85 @@
+"""What a grasp has to hold, and the mass that two contacts hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softjaw.scoring.bodies import PolytopeBody
+from softjaw.scoring.payload import GRAVITY, Payload, payload
+from softjaw.study.case.build import own_frame
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.limit_surface import SurfaceFit
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS
+from softjaw.study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a grasp has to hold.
+
+    Parameters
+    ----------
+    centre_of_mass : (3,) array
+        In the object's frame [m].
+    direction : (3,) array, optional
+        In which the weight pulls; None for every direction.
+    kind : str
+        What happens to the normal forces under load, of `scoring.payload.KINDS`.
+    mass : float, optional
+        Of the object [kg].
+    """
+
+    centre_of_mass: ArrayLike
+    direction: ArrayLike | None = None
+    kind: str = "shared"
+    mass: float | None = None
+
+
+def task_of(scene: Scene, obj: Any) -> Task:
+    """The task that a scene's sections ``[object]`` and ``[task]`` give."""
+    keys, placed = scene.task, own_frame(scene.object)
+    given = keys.centre_of_mass
+    centre = centre_of_volume(obj) if given is None else placed.to_pad(np.array(given))
+    direction = None if keys.direction is None else np.array(keys.direction) @ placed.rotation
+    return Task(centre, direction, keys.drive, scene.object.mass)
+
+
+def centre_of_volume(obj: Any) -> FloatArray:
+    """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
+    # a mesh that is decimated for display would move it
+    points, triangles = (obj.points, obj.triangles) if hasattr(obj, "triangles") else obj.surface()
+    middle = np.mean(obj.bounds, axis=0)
+    corners = np.asarray(points, float)[triangles] - middle
+    volume = np.einsum("ka,ka->k", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    return np.asarray(middle + volume @ corners.sum(axis=1) / (4 * volume.sum()))
+
+
+def payload_values(
+    contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], task: Task
+) -> tuple[dict[str, Any], Flag]:
+    """Maps of what the grasp holds, one value for each friction model, and whether it holds itself (curved model).
+
+    The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
+    found errs on the safe side, by about 1 % with 500 samples.
+    """
+    found = [_payload(contacts, [own[m] for own in fits], task) for m in MODELS]
+    mass = np.array([f.force for f in found]) / GRAVITY
+    values = {"maps/payload": mass.tolist()}
+    if task.mass is not None:
+        values["maps/safety_factor"] = (mass / task.mass).tolist()
+    return values, Flag(0) if found[0].borne else Flag.NOT_BORNE
+
+
+def _payload(contacts: Sequence[Contact], fits: Sequence[SurfaceFit], task: Task) -> Payload:
+    # a motion the other way gives the opposite wrench, which costs no further sample
+    both = [np.vstack([fit.wrench, -fit.wrench])[:, [0, 1, 5]] for fit in fits]
+    soft = [c.soft(PolytopeBody(c.mu * wrench)) for c, wrench in zip(contacts, both, strict=True)]
+    return payload(soft, [c.pressure_wrench for c in contacts], task.centre_of_mass, task.direction, task.kind)

@@ -1,0 +1,161 @@
+"""Payload of a gripper: closed forms, linear programmes over all points, and directions by brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
+from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.payload import GAP, payload
+
+F, MU, E, D = 5.0, 0.8, 0.006, 0.06
+AXES = F * np.array([MU, MU, MU * E])
+CORNERS = PolytopeBody(np.vstack([np.diag(AXES), -np.diag(AXES)]))  # friction along one axis at a time, or mixed
+SMOOTH = PolytopeBody(fibonacci_vertices(AXES, 1000))
+MIDDLE = (0.0, 0.0, 0.0)
+
+
+def pair(offset=0.0, body=CORNERS, tilt=0.0):
+    """Contacts at x = -D/2 and D/2 that press towards each other, ``offset`` apart along z, tilted about y [rad]."""
+    one = contact_axes([np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0])
+    two = contact_axes([-np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0])
+    return [
+        SoftContact(np.array([-D / 2, 0, offset / 2]), one, body),
+        SoftContact(np.array([D / 2, 0, -offset / 2]), two, body),
+    ]
+
+
+def pushes(contacts, force=F):
+    """Wrenches of a pressure along the contact normals, through the contacts' origins."""
+    return [np.append(force * c.axes[2], np.cross(c.position, force * c.axes[2])) for c in contacts]
+
+
+def held(contacts, centre=MIDDLE, direction=None, kind="shared"):
+    return payload(contacts, pushes(contacts), centre, direction, kind)
+
+
+@pytest.mark.parametrize(("kind", "along"), [("shared", 2 * F), ("up_to", F), ("fixed", 0.0)])
+def test_along_the_closing_axis_a_finger_takes_what_its_drive_allows(kind, along):
+    for sign in (1, -1):
+        assert held(pair(), direction=[sign, 0, 0], kind=kind).force == pytest.approx(along, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["shared", "up_to", "fixed"])
+def test_across_it_both_fingers_hold_by_friction(kind):
+    assert held(pair(), direction=[0, 0, -3], kind=kind).force == pytest.approx(2 * MU * F, rel=1e-6)
+
+
+def test_in_the_worst_direction_the_load_also_takes_force_from_a_finger():
+    """Friction has to stay even, or it would turn: |x| / 2F + (|y| + |z|) / (2 mu F) <= 1 is what is held."""
+    found = held(pair())
+    assert found.force == pytest.approx(2 * F / np.hypot(1, np.sqrt(2) / MU), rel=1e-6)
+    assert np.abs(found.direction) == pytest.approx(np.array([1, 1 / MU, 1 / MU]) / np.hypot(1, np.sqrt(2) / MU), 1e-3)
+    round_one = held(pair(body=SMOOTH))
+    assert round_one.force == pytest.approx(2 * MU * F / np.hypot(1, MU), rel=3e-3)
+    assert round_one.force <= round_one.upper <= round_one.force * (1 + 1.01 * GAP)
+
+
+@pytest.mark.parametrize("arm", [0.003, 0.02])
+def test_a_load_beside_the_contacts_tips_them(arm):
+    """Along y at an arm along z the torque about x is borne as torsion, which takes its share of friction."""
+    assert held(pair(), [0, 0, arm], [0, 1, 0]).force == pytest.approx(2 * MU * F / (1 + arm / E), rel=1e-6)
+    assert held(pair(), [0, 0, arm]).force <= 2 * MU * F / (1 + arm / E)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_a_couple_of_the_squeeze_uses_up_friction(share):
+    """Forces that pass each other by h make a couple F h; friction along z, at the arms D / 2, takes it."""
+    found = held(pair(share * MU * D), direction=[0, 1, 0])
+    assert found.force == pytest.approx(2 * MU * F * (1 - share), rel=1e-6)
+    assert found.borne
+
+
+def test_a_squeeze_that_is_not_borne_holds_nothing():
+    for direction in (None, [0, 0, -1], [1, 0, 0]):
+        found = held(pair(1.05 * MU * D), direction=direction)
+        assert (found.force, found.upper, found.borne) == (0.0, 0.0, False)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_squeeze_is_borne_or_not(seed):
+    """Margin 1e-7 of the forces: positions and rounding decide nothing 1e-6 away from the limit."""
+    turn = Rotation.random(random_state=seed).as_matrix()
+    for change, borne in ((-1e-6, True), (1e-6, False)):
+        contacts = [SoftContact(turn @ c.position, c.axes @ turn.T, c.body) for c in pair((1 + change) * MU * D)]
+        assert held(contacts).borne == borne
+
+
+def test_contacts_that_slip_out_of_a_wedge_hold_nothing():
+    assert held(pair(tilt=0.9 * np.arctan(MU))).force > 0
+    out = held(pair(tilt=1.1 * np.arctan(MU)))
+    assert (out.force, out.borne) == (0.0, False)
+
+
+def test_contacts_that_bear_no_torsion_hold_nothing_in_the_worst_direction():
+    flat = PolytopeBody(CORNERS.vertices * [1, 1, 0])
+    assert held(pair(body=flat)).force == pytest.approx(held(pair()).force, rel=1e-5)  # none is needed in the middle
+    assert held(pair(body=flat), [0, 0, 0.01]).force == pytest.approx(0, abs=1e-6)
+    assert held(pair(body=PolytopeBody(np.zeros((1, 3))))).force == 0
+
+
+def test_payload_grows_with_the_forces_and_does_not_depend_on_the_frame():
+    turn, shift = Rotation.random(random_state=3).as_matrix(), np.array([0.1, -0.2, 0.05])
+    contacts, com = pair(0.01, SMOOTH), np.array([0.004, 0.01, -0.02])
+    moved = [SoftContact(turn @ c.position + shift, c.axes @ turn.T, c.body) for c in contacts]
+    force = held(contacts, com).force
+    assert held(moved, turn @ com + shift).force == pytest.approx(force, rel=2 * GAP)
+    more = [SoftContact(c.position, c.axes, PolytopeBody(2 * SMOOTH.vertices)) for c in contacts]
+    assert payload(more, pushes(contacts, 2 * F), com).force == pytest.approx(2 * force, rel=1e-9)
+
+
+def lumpy(seed):
+    """A grasp without symmetry, and a centre of mass beside it."""
+    rng = np.random.default_rng(seed)
+    bodies = [PolytopeBody(np.vstack([v, -v])) for v in rng.normal(size=(2, 40, 3)) * AXES / 2]
+    contacts = [SoftContact(c.position, c.axes, b) for c, b in zip(pair(0.004, tilt=0.1), bodies, strict=True)]
+    return contacts, rng.normal(size=3) * 0.01, rng
+
+
+@pytest.mark.parametrize("kind", ["shared", "up_to"])
+def test_a_direction_is_a_linear_programme_over_all_points(kind):
+    contacts, com, rng = lumpy(1)
+    points = []
+    for c, push in zip(contacts, pushes(contacts), strict=True):
+        C = c.wrench_map(1.0, 1.0, com)
+        points.append(np.append(push[:3], push[3:] - np.cross(com, push[:3])) + c.body.vertices @ C[:, 1:].T)
+    n = len(points[0])
+    both = np.vstack(points) * (2 if kind == "shared" else 1)
+    for d in rng.normal(size=(5, 3)):
+        d = d / np.linalg.norm(d)
+        A, b = np.hstack([both.T, np.append(d, np.zeros(3))[:, None]]), np.zeros(6)
+        if kind == "up_to":
+            limits = {"A_ub": np.pad(np.kron(np.eye(2), np.ones(n)), ((0, 0), (0, 1))), "b_ub": np.ones(2)}
+        else:
+            A, b, limits = np.vstack([A, np.append(np.ones(2 * n), 0.0)]), np.append(b, 1.0), {}
+        exact = linprog(np.append(np.zeros(2 * n), -1.0), A_eq=A, b_eq=b, **limits)
+        found = held(contacts, com, d, kind)
+        assert found.borne
+        assert found.force == pytest.approx(exact.x[-1], rel=1e-5)
+        assert found.upper == pytest.approx(found.force, rel=1e-5)
+
+
+@pytest.mark.parametrize(("seed", "directions"), [(2, 2000), pytest.param(3, 100_000, marks=pytest.mark.long)])
+def test_no_direction_of_many_is_worse(seed, directions):
+    contacts, com, rng = lumpy(seed)
+    found = held(contacts, com)
+    least = min(held(contacts, com, d).force for d in rng.normal(size=(directions, 3)))
+    assert found.force <= least * (1 + 1e-6)
+    assert found.upper >= found.force * (1 - 1e-9)
+    assert least <= found.upper * (1 + 60 / np.sqrt(directions) / 10)
+    assert held(contacts, com, found.direction).force == pytest.approx(found.upper, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("body", "kind", "text"), [(CORNERS, "linf", "kind is 'linf'"), (object(), "shared", "polytopes")]
+)
+def test_what_cannot_be_computed_is_refused(body, kind, text):
+    with pytest.raises(ValueError, match=text):
+        held(pair(body=body), kind=kind)
