@@ -40,7 +40,7 @@ def spent() -> float:
 
 
 def spent_by(session: int) -> float:
-    """CPU time of the processes of a session that are there [s]: `mpirun` that is told to stop does not wait for all."""
+    """CPU time of the processes of a session [s]; `mpirun` that is told to stop does not wait for all of them."""
     total = 0
     for file in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
