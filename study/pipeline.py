@@ -14,12 +14,13 @@ import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
-from softjaw.study.case.build import build_object, own_frame
+from softjaw.study.case.build import build_object, own_frame, pad_shape
 from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, Solver, solver, state_flags
+from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
 from softjaw.study.scene import Scene
@@ -50,7 +51,7 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     start = time.perf_counter()
     fine = [c for c, *_ in outcome.contacts]
     values, fits = evaluate(fine, settings)
-    values |= _state_values(fine)
+    values |= _state_values(fine) | of_fingers(fine, pad_shape(scene.gripper).patch_faces)
     values["maps/flags"] |= state_flags(fine)
     values |= solving.wall_values(outcome)
     if outcome.grips:

@@ -19,6 +19,8 @@ AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
 STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips", "not among the best")
 MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
 NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
+RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
+BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "two scores")
@@ -267,6 +269,11 @@ TABLE = (
     Quantity("pose_origin", (*F, "component"), "m", "origin of the pad",
              "Centre of the undeformed contact face at first touch, in the frame of the object's own file; under load "
              "the pad's back has moved on by the closing displacement, along its z axis.", "fingers"),
+    Quantity("pieces", F, "", "pieces of the contact",
+             "Connected parts of the loaded patch; faces that touch at a corner belong together.", "fingers"),
+    Quantity("holes", F, "", "holes of the contact", "Places without load that are surrounded by it.", "fingers"),
+    Quantity("rims", F, "", "rims of the pad under load",
+             "Sum of: 1 and 2 the pad's ends, at -x and +x; 4 and 8 its sides, at -y and +y.", "fingers"),
     # checks of the contact solution
     Quantity("force_balance", F, "", "force balance", "Difference of contact force and load, over the load.", "checks"),
     Quantity("adhesion", F, "", "largest adhesion",

@@ -35,6 +35,7 @@ DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "(computed)": {"study/cli/__init__.py"},
     "h5py": {
+        "study/result/grow.py",
         "study/result/skeleton.py",
         "study/result/write.py",
         "study/result/guarded.py",

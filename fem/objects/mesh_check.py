@@ -28,6 +28,7 @@ DEBRIS = 0.02  # loose pieces below this share of the object's diagonal are drop
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
 FLAT = 1e-6  # volume of a piece over its area and size, below which it has no inside
 SURE = 1e-3  # winding numbers this close to 0 and 1 are those of points outside and inside; others lie on the surface
+MOSTLY = 0.9  # share of corners inside another piece from which a piece that crosses it counts as inside
 MOST_ASKED = 100  # corners of a piece that are asked whether they lie in another
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
@@ -116,21 +117,24 @@ class SoundMesh(NamedTuple):
         What was mended or tolerated, and where in the file's frame.
     lids : (l,) array of int
         Triangles that close a large hole.
+    crossing : str
+        The note on parts that cross each other; empty if there are none.
     """
 
     points: FloatArray
     triangles: IntArray
     notes: tuple[str, ...]
     lids: IntArray
+    crossing: str
 
 
 def sound_mesh(points: FloatArray, triangles: IntArray, unit: str = "m") -> SoundMesh:
     """Mesh in metres, points merged, closed, oriented outwards, and notes on what was mended or tolerated.
 
     Mended: doubled points and triangles, collapsed triangles, orientation, small holes, specks of debris, shells inside
-    the object. Tolerated: a few crossing triangles, larger holes, which get lids. Refused: all else that leaves inside
-    and outside undefined, also where they are undecided: pieces without volume, and pieces whose corners all lie on
-    another one.
+    the object. Tolerated: a few crossing triangles, closed parts that cross each other, larger holes, which get lids.
+    Refused: all else that leaves inside and outside undefined, also where they are undecided: pieces without volume,
+    and pieces whose corners all lie on another one.
 
     Parameters
     ----------
@@ -160,16 +164,44 @@ def sound_mesh(points: FloatArray, triangles: IntArray, unit: str = "m") -> Soun
     triangles, turned = _oriented(points, triangles, *neighbours)
     # the given triangles alone: those that close holes are not the user's to mend
     crossings = crossing_pairs(points, triangles[:given])
-    if len(crossings) > TOLERATED_CROSSINGS * given:
+    piece = _pieces(points, triangles)
+    apart = piece[crossings[:, 0]] != piece[crossings[:, 1]]
+    notes += _folded(points, triangles[:given], crossings[~apart])
+    parts = _crossing_parts(points, triangles, crossings[apart], piece)
+    points, triangles, lids, dropped = _outer_pieces(points, triangles, lids, piece, piece[crossings[apart]])
+    told = (*notes, *closed, *turned, *([parts] if parts else []), *dropped)
+    return SoundMesh(points, triangles, told, np.flatnonzero(lids), parts)
+
+
+def _pieces(points: FloatArray, triangles: IntArray) -> IntArray:
+    """Number ``(m,)`` of the connected piece of each triangle."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
+    return connected_components(links, directed=False)[1][triangles[:, 0]]
+
+
+def _folded(points: FloatArray, triangles: IntArray, crossings: IntArray) -> list[str]:
+    """A note on a few pairs ``(c, 2)`` that cross within one piece; more leave its inside undefined."""
+    if len(crossings) > TOLERATED_CROSSINGS * len(triangles):
         raise MeshError(
             f"the mesh intersects itself: {len(crossings)} pairs of triangles cross, the first near "
             f"{named_place(points[triangles[crossings[0, 0]]].mean(axis=0))}; unite its parts into one outer surface "
             "(a boolean union or remeshing does it)"
         )
-    if len(crossings):
-        notes.append(f"{len(crossings)} pairs among {given} triangles cross; tolerated")
-    points, triangles, lids, dropped = _outer_pieces(points, triangles, lids)
-    return SoundMesh(points, triangles, (*notes, *closed, *turned, *dropped), np.flatnonzero(lids))
+    return [f"{len(crossings)} pairs among {len(triangles)} triangles cross; tolerated"] if len(crossings) else []
+
+
+def _crossing_parts(points: FloatArray, triangles: IntArray, crossings: IntArray, piece: IntArray) -> str:
+    """A note on closed parts that cross at these pairs ``(c, 2)`` of triangles; empty without any.
+
+    Their inside is that of all together, and a finger sees what lies outside of all.
+    """
+    if not len(crossings):
+        return ""
+    return (
+        f"{len(np.unique(piece[crossings]))} closed parts cross each other, at {len(crossings)} pairs of triangles, the"
+        f" first near {named_place(points[triangles[crossings[0, 0]]].mean(axis=0))}; together they are the object"
+    )
 
 
 def _check_numbers(points: FloatArray, triangles: IntArray) -> None:
@@ -303,26 +335,28 @@ def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
 
 
 def _outer_pieces(
-    points: FloatArray, triangles: IntArray, lids: np.ndarray
+    points: FloatArray, triangles: IntArray, lids: np.ndarray, owner: IntArray, crossing: IntArray
 ) -> tuple[FloatArray, IntArray, np.ndarray, list[str]]:
-    """Mesh without debris and without shells inside another piece: the object is grasped from outside."""
-    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
-    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
-    count, label = connected_components(links, directed=False)
+    """Mesh without debris and without shells inside another piece: the object is grasped from outside.
+
+    ``owner`` ``(m,)`` numbers the pieces, of which ``crossing (c, 2)`` cross each other.
+    """
+    numbers, owner = np.unique(owner, return_inverse=True)
+    count, crossing = len(numbers), np.searchsorted(numbers, crossing)
     if count == 1:
         return points, triangles, lids, []
     if count > MOST_PIECES:
         raise MeshError(f"the mesh falls into {count} separate pieces; keep the object's outer surface only")
-    owner = label[triangles[:, 0]]
+    crosses = np.zeros((count, count), dtype=bool)
+    crosses[crossing[:, 0], crossing[:, 1]] = crosses[crossing[:, 1], crossing[:, 0]] = True
     pieces = [triangles[owner == k] for k in range(count)]
     size = np.array([np.linalg.norm(np.ptp(points[piece.ravel()], axis=0)) for piece in pieces])
     speck = size < DEBRIS * size.max()
-    inner = np.array(
-        [
-            any(_lies_inside(points, pieces[k], pieces[m]) for m in np.flatnonzero(~speck) if m != k)
-            for k in range(count)
-        ]
-    )
+
+    def inside(k: int, m: int) -> bool:
+        return (_lies_mostly_inside if crosses[k, m] else _lies_inside)(points, pieces[k], pieces[m])
+
+    inner = np.array([any(inside(k, m) for m in np.flatnonzero(~speck) if m != k) for k in range(count)])
     keep = ~speck & ~inner
     if not keep.any():
         raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
@@ -347,6 +381,13 @@ def _lies_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
         "two pieces of the mesh lie on each other: all corners of one are on the other; unite them into one surface, "
         "or leave one out"
     )
+
+
+def _lies_mostly_inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
+    """Whether a piece that crosses another lies inside it but for a few places, as the inner wall of a scan may."""
+    corners = np.unique(piece)
+    asked = points[corners[:: 1 + len(corners) // MOST_ASKED]]
+    return float(np.mean([winding_number(x, points, other) > 0.5 for x in asked])) > MOSTLY
 
 
 def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:

@@ -227,6 +227,8 @@ class Unit:
         Whether it is solved again with inputs changed, as `study.case.probing` does.
     state, reason : int, str
         One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
+    hopeless : bool
+        Whether a bed of springs says that it cannot hold, or bears on a pad's rim: it comes last in the order of work.
     """
 
     index: int
@@ -239,6 +241,7 @@ class Unit:
     probe: bool = False
     state: int = MISSING
     reason: str = ""
+    hopeless: bool = False
 
 
 def axes(scene: Scene) -> list[Axis]:

@@ -128,15 +128,24 @@ def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0
     hit = {name: far for name, far in reach.items() if far > jaws.pad[2] + doubt}
     if not hit:
         return Fit(opening)
-    far = " and ".join(f"{shown_text(v, 'm', DIGITS)} behind the face of its pad for {name}" for name, v in hit.items())
+    far = " and ".join(f"{shown_text(v, 'm', DIGITS)} beside that of {name}" for name, v in hit.items())
     thick, size = shown_text(jaws.pad[2], "m", DIGITS), " x ".join(shown_text(v, "m", DIGITS) for v in jaws.finger)
-    return Fit(opening, COLLIDES, f"the object reaches {far}, which begins {thick} behind it and is {size} large")
+    text = f"the object reaches past the pad's face, {far}; the finger, {size}, begins {thick} behind it"
+    return Fit(opening, COLLIDES, text)
 
 
 def stiffness(gripper: Gripper) -> float:
     """Modulus of confined compression over the pad's thickness [Pa/m]."""
     nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
     return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
+
+
+def bed_closing(height: FloatArray, wanted: float) -> float:
+    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
+    h = np.sort(height[np.isfinite(height)])
+    # for the k lowest springs in contact the closing is known; the largest k that touches is right
+    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
+    return float(closing[np.flatnonzero(closing >= h)[-1]])
 
 
 def jaws_of(scene: Scene) -> Jaws:

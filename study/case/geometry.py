@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.centre_line import CentreLine, centre_line
 from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
@@ -46,7 +47,10 @@ def stacked(surface: OuterSurface) -> GapObject:
 @lru_cache(maxsize=8)
 def traced_surface(shape: Mesh) -> tuple[TracedSurface, TraceReport]:
     """Smooth surface of a mesh's wall, and how far it is from the mesh."""
-    return traced(mesh_object(shape), shape.wall_heights)
+    mesh = mesh_object(shape)
+    if mesh.crossing:
+        raise MeshError(f"{shape.mesh}: {mesh.crossing}; a thin wall needs one surface: unite them in a mesh editor")
+    return traced(mesh, shape.wall_heights)
 
 
 def trace_warning(shape: Mesh) -> str:

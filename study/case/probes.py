@@ -13,8 +13,7 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.fit import stiffness
-from softjaw.study.case.sampler import bed_closing
+from softjaw.study.case.fit import bed_closing, stiffness
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper

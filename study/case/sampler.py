@@ -24,7 +24,7 @@ from softjaw.friction.patch import NoContactError
 from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import angle, slips
-from softjaw.study.case.fit import Jaws, fit_of, jaws_of
+from softjaw.study.case.fit import Jaws, bed_closing, fit_of, jaws_of
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
@@ -151,14 +151,6 @@ class Side:
         """Share of the pressure sum that acts along the approach: what curvature leaves of the normal force."""
         cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
         return float((self.pressure * cosine).sum() / self.pressure.sum())
-
-
-def bed_closing(height: FloatArray, wanted: float) -> float:
-    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
-    h = np.sort(height[np.isfinite(height)])
-    # for the k lowest springs in contact the closing is known; the largest k that touches is right
-    closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
-    return float(closing[np.flatnonzero(closing >= h)[-1]])
 
 
 class JawsOnSurface:
@@ -378,7 +370,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    return scene.model_copy(update={"candidates": Candidates(poses=poses)})
+    kept = {key: getattr(scene.candidates, key) for key in ("solve_best", "skip_hopeless")}
+    return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 
 def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from softjaw.study.flags import Flag
@@ -21,30 +22,35 @@ from softjaw.study.lookup.interpolation import (
     bends,
     blend,
     circle,
+    claims,
     corners,
     error,
     place,
     plain,
 )
-from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP, GraspPoint
+from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, turning
-from softjaw.study.quantities import MODELS
+from softjaw.study.quantities import BOTH_ENDS, MODELS
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.units import UNITS
+
+KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
 
 
 class GraspMap:
     """A result file as a function of station [m], angle [rad] and normal force [N].
 
     Values lie on straight lines between the solved cases around a point. A point has no value (NaN) outside the map,
-    beside a case that failed or is missing, and between a case before and one after the wall has snapped in. Angles
-    repeat after the period that the object's symmetry gives; half a turn exchanges the fingers.
+    beside a case that failed or is missing, between a case before and one after the wall has snapped in, and between
+    cases whose contacts differ in kind: in pieces, in holes, or in whether a pad bears on both of its ends.
+    `GraspPoint.nearest` is the nearest solved case. Angles repeat after the period that the object's symmetry gives;
+    half a turn exchanges the fingers.
 
     Parameters
     ----------
-    file : path
-        Result file; one that a run is still writing will do.
+    file : path or xarray.Dataset
+        Result file; one that a run is still writing will do. Or what `softjaw.open` gives, or a part of it.
     where : mapping, optional
         The point of a sweep: a value for each swept key, in the scene's words (``{"object.radius_mm": 20}``) or by the
         axis' name in SI units.
@@ -58,15 +64,17 @@ class GraspMap:
 
     Notes
     -----
-    The error of a value is that of a straight line through a curve with the largest second derivative that the
-    neighbouring cases show, added up over the three axes. It says nothing about the error of the cases themselves,
-    which ``e_n_error`` and others tell if the scene has ``accuracy.meshes = 2``. Along an axis of two values there is
-    no second derivative, and up to a quarter of their difference stands in. What is narrower than the spacing of the
-    candidates stays unseen.
+    The error of a value is that of a straight line through a curve with the largest second derivative that the cases
+    around show, with those beside them along stations and forces, added up over the three axes and doubled: a claim,
+    below which at least 95 % of the true errors of the main maps stay where that was measured. It says nothing about
+    the error of the cases themselves, which ``e_n_error`` and others tell if the scene has ``accuracy.meshes = 2``.
+    Along an axis of two values there is no second derivative, and half of their difference stands in. What is
+    narrower than the spacing of the candidates stays unseen.
     """
 
-    def __init__(self, file: str | Path, where: Mapping[str, Any] | None = None) -> None:
-        self.source: Source = Source(open_dataset(file), dict(where or {}))
+    def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:
+        ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
+        self.source: Source = Source(ds, dict(where or {}))
         station, angle, force = self.source.axes
         self.by_poses = not station.units
         period, half_turn = (2 * math.pi, False) if self.by_poses else turning(self.source)
@@ -76,6 +84,7 @@ class GraspMap:
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
         self.done = self._grid(self.source.status == DONE)
         self.snapped = self.done & (self._grid(self.source.read("flags")) & Flag.SNAPPED > 0)
+        self.kind = self._kinds()
         self._whole = self._whole_cells()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
@@ -105,12 +114,12 @@ class GraspMap:
         if self.by_poses:
             if candidate is None or not (station is angle is station_mm is angle_deg is None):
                 raise ValueError("the candidates of this map are explicit poses: give at(candidate=0, force=5)")
-            return self._point(candidate, 0.0, force)
+            return self.point(candidate, 0.0, force)
         if candidate is not None:
             raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
         along = _one(station, station_mm, "mm", "station")
         turn = _one(angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None)
-        return self._point(along, turn, force)
+        return self.point(along, turn, force)
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
@@ -128,7 +137,7 @@ class GraspMap:
             or not isinstance(angle, float | int)
             or not isinstance(force, float | int)
         ):
-            return self._point(station, angle, force).value(name, model)
+            return self.point(station, angle, force).value(name, model)
         one, two, three = self.axes
         a, b, c = place(one.quick, station), place(two.quick, angle), place(three.quick, force)
         if a is None or b is None or c is None:
@@ -137,7 +146,7 @@ class GraspMap:
         p = self.shape[2]
         n = (i * self.shape[1] + j) * p + k
         if not self._whole[n]:
-            return self._point(station, angle, force).value(name, model)
+            return self.point(station, angle, force).value(name, model)
         m, q = n + p, n + self.shape[1] * p
         u, z, y = q + p, 1.0 - t, 1.0 - s
         low = y * (z * table[n] + t * table[n + 1]) + s * (z * table[m] + t * table[m + 1])
@@ -148,7 +157,7 @@ class GraspMap:
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
     ) -> FloatArray | float:
         """Estimated error of `value` by the interpolation, in the quantity's unit; NaN where there is no value."""
-        return self._point(station, angle, force).error(name, model)
+        return self.point(station, angle, force).error(name, model)
 
     def table(self, name: str, model: str = "ccm") -> FloatArray:
         """Values of a quantity at the nodes, flat over station, angle (folded) and force; NaN for unsolved cases.
@@ -159,9 +168,7 @@ class GraspMap:
         if key not in self._tables:
             if model not in MODELS:
                 raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
-            grid = self._grid(self.source.read(name, model))
-            if "/" in name:
-                grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
+            grid = self._read(name, model)
             grid = np.where(_like(self.done, grid, 0), grid, np.nan)
             self._tables[key] = grid.reshape(-1, *grid.shape[3:])
         return self._tables[key]
@@ -175,17 +182,22 @@ class GraspMap:
         """Error of `interpolated` for a quantity of the case, at many points."""
         key = name, model
         if key not in self._bends:
-            self._bends[key] = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
+            found = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
+            self._bends[key] = claims(found, self.shape)
         return error(self._bends[key], at)
 
     def states(self, at: Corners) -> np.ndarray:
         """Position in `STATES` of many points."""
         used, done, snapped = at.weight > 0, self.done.ravel()[at.index], self.snapped.ravel()[at.index]
         across = (used & snapped).any(axis=1) & (used & ~snapped).any(axis=1)
-        kinds = [~at.inside.all(axis=1), (used & ~done).any(axis=1), across]
-        return np.select(kinds, [OUTSIDE, NO_RESULT, SNAP], INSIDE)
+        kind = self.kind.ravel()[at.index]
+        one = np.take_along_axis(kind, used.argmax(axis=1)[:, None], axis=1)
+        jump = (used & (kind != one)).any(axis=1)
+        kinds = [~at.inside.all(axis=1), (used & ~done).any(axis=1), across, jump]
+        return np.select(kinds, [OUTSIDE, NO_RESULT, SNAP, JUMP], INSIDE)
 
-    def _point(self, station: ArrayLike, angle: ArrayLike, force: ArrayLike) -> GraspPoint:
+    def point(self, station: ArrayLike, angle: ArrayLike, force: ArrayLike) -> GraspPoint:
+        """`at` in SI units, with the candidate's number as station where the map has explicit poses."""
         parts = np.broadcast_arrays(*(np.asarray(v, float) for v in (station, angle, force)))
         flat = np.stack([part.ravel() for part in parts], axis=-1)
         at = corners(self.axes, flat)
@@ -200,13 +212,28 @@ class GraspMap:
             values = np.take(values, nodes.take, axis=axis)
         return values
 
+    def _read(self, name: str, model: str = "ccm") -> FloatArray:
+        """A quantity at the nodes, that of the fingers exchanged where a turn exchanges them."""
+        grid = self._grid(self.source.read(name, model))
+        if "/" in name:
+            grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
+        return grid
+
+    def _kinds(self) -> np.ndarray:
+        """A number for each kind of contact at the nodes; 0 where a file does not tell."""
+        found = np.zeros(self.shape, np.int64)
+        for name, most in KINDS.items() if self.source.has("fingers/rims") else ():
+            values = np.nan_to_num(self._read(f"fingers/{name}")).astype(np.int64)
+            values = (values & BOTH_ENDS) == BOTH_ENDS if name == "rims" else np.minimum(values, most)
+            for finger in range(values.shape[-1]):
+                found = found * (most + 1) + values[..., finger]
+        return found
+
     def _whole_cells(self) -> list[bool]:
-        """Whether all corners of the cell above each node are solved and none is across a snap-in, flat."""
-        corner = np.stack([
-            np.roll(v, (-i, -j, -k), (0, 1, 2))
-            for v in (self.done & ~self.snapped, self.done & self.snapped) for i, j, k in np.ndindex(2, 2, 2)
-        ])  # fmt: skip
-        return (corner[:8].all(axis=0) | corner[8:].all(axis=0)).ravel().tolist()
+        """Whether all corners of the cell above each node are solved and of one kind, with no snap-in, flat."""
+        own = np.where(self.done, 2 * self.kind + self.snapped, -1)
+        corner = np.stack([np.roll(own, (-i, -j, -k), (0, 1, 2)) for i, j, k in np.ndindex(2, 2, 2)])
+        return ((corner == corner[0]).all(axis=0) & (own >= 0)).ravel().tolist()
 
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:

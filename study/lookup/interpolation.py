@@ -2,7 +2,9 @@
 
 Straight lines never overshoot and stay between the values of the nodes around a point. Between two nodes a distance
 ``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
-the three-point differences at both nodes, whichever is larger, and the errors along the axes add up.
+the three-point differences at both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts
+have kinks, which three nodes see or miss by chance: an estimate is the largest of a cell and those around it, times
+`SAFE`, which was measured on cases that a map does not hold.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ALIKE = 1e-9  # differences of coordinates that are only rounding, in units of their size
+SAFE = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
 WIDER = 1.5  # a gap that closes a circle may be this much wider than the others
 
 
@@ -153,7 +156,8 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
     """``|f'' / 2| h^2`` of every cell along each axis, at the cell's lower node, ``(3, k_1, k_2, k_3)``.
 
     Differences do not reach over values that are not there, nor from one ``side (k_1, k_2, k_3)`` of a jump to the
-    other. Where no three nodes are left, the difference of the cell's two values stands in: a guess.
+    other. Where no three nodes are left, the difference of the cell's two values stands in: a guess; across a jump,
+    where there is no value, it is 0.
     """
     found = np.zeros((3, *table.shape))
     for a, nodes in enumerate(axes):
@@ -171,8 +175,20 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
             h, f = h[1:-1], f[..., 1:-1]
         cell = np.fmax(half[..., :-1], half[..., 1:]) * h**2
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
+        across = np.moveaxis(side, a, -1)
+        cell[across[..., :-1] != across[..., 1:]] = 0.0
         np.moveaxis(found[a], a, -1)[..., :-1] = cell
     return found.reshape(3, -1)
+
+
+def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces, `SAFE`."""
+    found = np.nan_to_num(bend.reshape(3, *shape))
+    for axis in (1, 3):
+        wide = np.pad(found, [(1, 1) if i == axis else (0, 0) for i in range(4)])
+        beside = [np.take(wide, np.arange(found.shape[axis]) + k, axis=axis) for k in range(3)]
+        found = np.maximum.reduce(beside)
+    return SAFE * found.reshape(3, -1)
 
 
 def error(bend: FloatArray, at: Corners) -> FloatArray:

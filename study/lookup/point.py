@@ -9,7 +9,7 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
-from softjaw.study.quantities import FAILED, FORCE_RANGE, MAIN, MISSING
+from softjaw.study.quantities import BOTH_ENDS, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from softjaw.lsfit.surface import LimitSurface
     from softjaw.study.lookup import GraspMap
 
-STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall")
-INSIDE, OUTSIDE, NO_RESULT, SNAP = range(4)
+STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall", "across another contact")
+INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +36,29 @@ class GraspPoint:
 
     @property
     def state(self) -> Any:
-        """Position in `STATES`: 0 inside, 1 outside the map, 2 beside a case without result, 3 across a snap-in."""
+        """Position in `STATES`: 0 inside, 1 outside the map, 2 beside a case without result, 3 and 4 across a jump."""
         return self._shaped(self.states)
 
     @property
     def ok(self) -> Any:
         """Whether there are values."""
         return self._shaped(self.states == INSIDE)
+
+    @property
+    def nearest(self) -> GraspPoint:
+        """The solved cases that weigh most around the points; where there is none, the points themselves."""
+        at, axes = self.corners, self.map.axes
+        weight = np.where(self.map.done.ravel()[at.index], at.weight, 0.0)
+        node = np.take_along_axis(at.index, weight.argmax(axis=1)[:, None], axis=1)[:, 0]
+        cell = np.unravel_index(at.index[:, 0], self.map.shape)
+        moved = self.place.copy()
+        for a, i in enumerate(np.unravel_index(node, self.map.shape)):
+            x = axes[a].x
+            # By the difference: an angle keeps its turns, which tell whether the fingers are exchanged.
+            moved[:, a] += x[i] - (x[cell[a]] + at.share[:, a] * (x[cell[a] + 1] - x[cell[a]]))
+        moved = np.where((weight.any(axis=1) & (self.states != OUTSIDE))[:, None], moved, self.place)
+        parts = moved.reshape(*self.shape, 3)
+        return self.map.point(parts[..., 0], parts[..., 1], parts[..., 2])
 
     @property
     def reason(self) -> Any:
@@ -175,7 +191,25 @@ class GraspPoint:
                 f"no value: the wall snaps in between {source.case(before)} and {source.case(after)};"
                 " ask at one of the solved cases"
             )
+        if state == JUMP:
+            one, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in self._unlike(cases))
+            return f"no smooth value: the contact changes between {one} and {other}; take `nearest`, a solved case"
         return ""
+
+    def _unlike(self, cases: list[tuple[tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
+        """Two of the cases whose contacts differ in kind."""
+        kind = self.map.kind.ravel()
+        return [cases[0], next(case for case in cases if kind[case[1]] != kind[cases[0][1]])]
+
+    def _contact(self, node: int) -> str:
+        """The kind of contact of both fingers at a node, in words."""
+        found = [self.map.table(f"fingers/{name}")[node].astype(int) for name in ("pieces", "holes", "rims")]
+        words = []
+        for pieces, holes, rims in np.transpose(found).tolist():
+            hole = f", {holes} hole{'s' * (holes > 1)}" if holes else ""
+            ends = ", on both ends" if rims & BOTH_ENDS == BOTH_ENDS else ""
+            words.append(f"{pieces} piece{'s' * (pieces != 1)}{hole}{ends}")
+        return " and ".join(dict.fromkeys(words))
 
     def _outside(self, i: int) -> str:
         a = int(np.argmin(self.corners.inside[i]))

@@ -80,8 +80,9 @@ class Layout:
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
-    candidates ``probes``. ``surface`` counts the points and triangles of the
-    object, ``pad_faces`` the faces along and across a pad, as `study.result.vtkhdf` shows them, or zeros.
+    candidates ``probes``. ``surface`` counts the points and triangles of the object, ``pad_faces`` the faces along and
+    across a pad, as `study.result.vtkhdf` shows them, or zeros. ``added`` are the stations that each round of a
+    refinement added to those of the scene [mm].
     """
 
     axes: tuple[Any, ...]
@@ -98,6 +99,7 @@ class Layout:
     pad_faces: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
+    added: tuple[tuple[float, ...], ...] = ()
 
     @cached_property
     def parts(self) -> dict[str, tuple[int, ...]]:
@@ -221,7 +223,7 @@ class Layout:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
         names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface",
-                 "pad_faces", "probes", "variations")  # fmt: skip
+                 "pad_faces", "probes", "variations", *["added"] * bool(self.added))  # fmt: skip
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -247,8 +249,9 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
+        added = tuple(tuple(map(float, some)) for some in options.get("added", ()))
         return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
-                      pad_faces, probes, variations)  # fmt: skip
+                      pad_faces, probes, variations, added)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

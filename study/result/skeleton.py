@@ -71,6 +71,11 @@ def create(path: Path, layout: Layout, header: Header) -> None:
         if not isinstance(error, OSError) and "write" not in str(error):
             raise
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
+    put_in_place(part, path)
+
+
+def put_in_place(part: Path, path: Path) -> None:
+    """Give a file that is on disk its name, at once and for good."""
     part.replace(path)
     # The new name is on disk only when the folder is.
     folder = os.open(path.parent, os.O_RDONLY)

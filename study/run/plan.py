@@ -21,7 +21,9 @@ from softjaw.study.result.derived import derived
 from softjaw.study.result.grid_surface import surface_of
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.store import open_result
+from softjaw.study.run.estimate import START, estimated
 from softjaw.study.run.progress import duration
+from softjaw.study.run.refine import Rounds, added_cases, refined
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -57,19 +59,32 @@ class Plan:
         return sum(len(unit.rows) for unit in self.units)
 
 
-def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -> Plan:
-    """The plan of a scene; builds its objects, so a mesh is read here."""
+def make_plan(
+    scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False, rounds: Rounds = ()
+) -> Plan:
+    """The plan of a scene, with the stations that ``rounds`` of refinement added; builds its objects.
+
+    ``ordered`` marks units that come last.
+    """
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
+    digest, text = scene.digest, scene.effective_toml()
+    if rounds:
+        own = grasps.units(scene, lambda point: point.axis_symmetry) if scene.uncertainty.parts else []
+        scene = refined(scene, rounds, probe_candidates(scene, own))
     patches = scene.output.patches != "none"
     pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
     axes = tuple(grasps.axes(scene))
     surface, placed = surface_of(scene, axes), own_frame(scene.object)
-    units = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    if ordered or scene.candidates.solve_best is not None or scene.candidates.skip_hopeless:
+        from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
+
+        units = chosen(scene, units)
     probes = probe_candidates(scene, units)
     header = Header(
-        digest=scene.digest,
-        scene=scene.effective_toml(),
+        digest=digest,
+        scene=text,
         title=getattr(scene.object, "name", None) or Path(scene_file).stem,
         scene_file=scene_file,
         overrides=tuple(overrides),
@@ -93,6 +108,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = ()) -
         pad_faces,
         probes,
         changes(scene) if probes else (),
+        rounds,
     )
     return Plan(layout, header, with_probes(scene, units, probes))
 
@@ -114,6 +130,14 @@ def by_cost(costs: Sequence[float]) -> list[int]:
     [1, 2, 3, 0]
     """
     return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+
+
+def in_order(units: Sequence[Any]) -> list[int]:
+    """Positions in the order of work: the costliest first, so that no rank is alone with a long load path at the end.
+
+    What cannot hold comes after all others.
+    """
+    return sorted(by_cost([unit.cost for unit in units]), key=lambda i: units[i].hopeless)
 
 
 def makespan(costs: Sequence[float], ranks: int) -> float:
@@ -189,6 +213,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
         "no grasp": _no_grasps(plan),
+        "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
@@ -206,42 +231,66 @@ def _no_grasps(plan: Plan) -> str:
     for state in NO_GRASP:
         units = [unit for unit in plan.units if unit.state == state]
         count = sum(len(unit.rows) for unit in units)
-        found += [f"{count} of {plan.served} candidates {STATES[state]}: {units[0].reason}"] if units else []
+        found += [f"{count} of {plan.served} {STATES[state]}: {units[0].reason}"] if units else []
     return "; ".join(found)
+
+
+def _rounds(plan: Plan, scene: Any) -> str:
+    """What a refinement may add; empty without one."""
+    asked = scene.candidates.refine
+    if asked is None:
+        return ""
+    each = added_cases(plan.units, plan.layout)
+    text = f"up to {asked.budget // each} more stations, {each} cases each, until the best is known to"
+    return f"{text} {asked.best_within:.2g} of itself; not in the numbers above and below"
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     seconds = measured_seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        known = f"a few load paths are in {path}: start the run, then plan again"
-        wall = shells(scene)
-        return f"{_wall_time(plan, scene, ranks)}; known better when {known}" if wall else f"not known before {known}"
+        return f"{_estimated_time(plan, scene, ranks)}; known better when a few load paths are in {path}"
     whole = duration(makespan(expected, ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
 
 
-def _wall_time(plan: Plan, scene: Any, ranks: int) -> str:
-    """Rule of thumb for walls, between the cheapest and the costliest level of all candidates."""
-    wall = wall_size(scene)
+def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
+    """Time before anything is solved: of elements and springs, for walls the middle between their levels."""
+    on = f"on {ranks} rank{'s' * (ranks > 1)}"
+    times = _wall_seconds(plan, scene)
+    if not times:
+        repeats = 1 + len(plan.layout.variations)
+        seconds = [t * (repeats if u.probe else 1) for t, u in zip(estimated(plan.tried), plan.tried, strict=True)]
+        return f"about {duration(START + makespan(seconds, ranks))} {on}, estimated on a bed of springs"
+    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.tried)
+    low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
+    if low == high:
+        return f"about {duration(START + low)} {on} ({scene.effects.object.replace('_', ' ')})"
+    ends = f"{duration(low)} if all candidates are rigid, {duration(high)} if all take the costliest shell"
+    return f"about {duration(START + math.sqrt(low * high))} {on} ({ends})"
+
+
+def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
+    """Seconds of a force at the levels that a wall may be solved with, rising; empty where that is not known."""
+    wall = wall_size(scene) if plan.tried and shells(scene) else None
     if wall is None:
-        return "not known yet for this wall"
+        return []
     level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
-    times = sorted(level.get(scene.effects.object, wall.seconds))
-    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.units)
-    whole = [duration(each * makespan(paths, ranks)) for each in (times[0], times[-1])]
-    names = scene.effects.object.replace("_", " ")
-    names = "all candidates rigid, or all on the costliest shell" if len(times) > 1 else names
-    return f"very roughly {' to '.join(dict.fromkeys(whole))} on {ranks} ranks ({names})"
+    return sorted(level.get(scene.effects.object, wall.seconds))
 
 
 def measured_seconds(layout: Layout, path: Path) -> Any:
-    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file."""
+    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file.
+
+    Stations that a refinement added are left out.
+    """
     if not path.is_file():
         return None
     with open_result(path) as result:
+        own = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
+        seconds = result.read("work/seconds_total").take(own, axis=-3)
         # A file of another shape has other cases in the same places.
-        return result.read("work/seconds_total").ravel() if result.layout.shape == layout.shape else None
+        return seconds.ravel() if seconds.shape == layout.shape else None
 
 
 def _free(path: Path) -> int:

@@ -21,15 +21,17 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
+from softjaw.study.result.grow import grow
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create
-from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, settle
-from softjaw.study.run.plan import Plan, by_cost
+from softjaw.study.run.plan import Plan, in_order
 from softjaw.study.run.progress import Progress
+from softjaw.study.run.refine import Rounds
 from softjaw.study.run.schedule import Claims, LostRanks
 
 T = TypeVar("T")
@@ -80,8 +82,28 @@ def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
     return value
 
 
-def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bool = False) -> int:
+@dataclass(frozen=True)
+class Growth:
+    """How a study gets more stations while it runs.
+
+    Parameters
+    ----------
+    study : callable
+        ``study(rounds)`` gives plan and work with the stations that these rounds added; collective.
+    more : callable
+        ``more(result)`` gives the stations of the next round, from what is stored alone; none at the end.
+    """
+
+    study: Callable[[Rounds], tuple[Plan, Work]]
+    more: Callable[[Result], tuple[float, ...]]
+
+
+def run_study(
+    plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bool = False, growth: Growth | None = None
+) -> int:
     """Solve all missing cases of ``plan`` into ``path`` and return the exit code; collective over ``comm``.
+
+    With ``growth`` rounds of further stations follow, each in a file that takes the place of the one before.
 
     Raises
     ------
@@ -98,14 +120,14 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         # Only when all ranks hold the lock does nobody slip in between.
         comm.Barrier()
         on_rank0(comm, lock.confirm)
-        created, torn = on_rank0(comm, _prepare, path, plan)
-        writer = ResultWriter(path, plan.layout, comm)
-        # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
-        codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
-        session = Session(plan, work, writer, comm, codes)
-        if comm.rank == 0:
-            print(_begins(path, codes, len(torn), comm.size, created), flush=True)
-        code = session.solve()
+        rounds = on_rank0(comm, _rounds_in, path, plan) if growth else ()
+        if growth and rounds:
+            plan, work = growth.study(rounds)
+        code = _solve(plan, work, path, comm, retry_failed)
+        while growth and code != STOPPED and (added := on_rank0(comm, _next_round, path, growth)):
+            plan, work = growth.study((*plan.layout.added, added))
+            on_rank0(comm, grow, path, plan.layout, plan.header)
+            code = _solve(plan, work, path, comm, retry_failed=False)
         if comm.rank == 0:
             print_summary(work, path)
             # Removed while it is held: without it another run could take a file that is about to vanish.
@@ -116,6 +138,35 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         # Whatever happened: a process that lives on must not keep others out.
         lock.release()
     return code
+
+
+def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:
+    """Solve what is missing of a plan in its file, which is made if need be; the exit code."""
+    created, torn = on_rank0(comm, _prepare, path, plan)
+    writer = ResultWriter(path, plan.layout, comm)
+    # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
+    codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
+    session = Session(plan, work, writer, comm, codes)
+    if comm.rank == 0:
+        print(_begins(path, codes, len(torn), comm.size, created), flush=True)
+    return session.solve()
+
+
+def _rounds_in(path: Path, plan: Plan) -> Rounds:
+    """The rounds of a file that was made from this scene; none where `verify` will refuse it."""
+    with contextlib.suppress(StudyError), open_result(path) as result:
+        if result.digest == plan.header.digest:
+            return result.layout.added
+    return ()
+
+
+def _next_round(path: Path, growth: Growth) -> tuple[float, ...]:
+    with open_result(path) as result:
+        added, number = growth.more(result), len(result.layout.added) + 1
+    if added:
+        some = f"{len(added)} more station{'s' * (len(added) > 1)}"
+        print(f"round {number}: {some}, at {', '.join(f'{s:g}' for s in added)} mm", flush=True)
+    return added
 
 
 def _take(lock: Lock, path: Path) -> None:
@@ -152,8 +203,7 @@ class Session:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
         todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
-        # The costliest first, so that no rank is alone with a long load path at the end.
-        self._todo = [todo[i] for i in by_cost([unit.cost for unit in todo])]
+        self._todo = [todo[i] for i in in_order(todo)]
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
         if comm.rank == 0:
             writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))

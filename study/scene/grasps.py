@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
 from softjaw.study.scene.problems import Finding, closest, shown
@@ -58,6 +58,24 @@ class GraspPose(SceneSection):
         return max(passing)
 
 
+class Refinement(SceneSection):
+    """How the stations are refined once the scene's own are solved; `study.run.refine` says by which rule."""
+
+    best_within: float = Field(
+        0.02, ge=0.001, le=0.5, description="stop when no station is expected to beat the best by more than this share"
+    )
+    budget: int = Field(120, ge=1, le=100_000, description="cases that are solved at most beside the scene's own")
+
+
+def _switched(given: Any) -> Any:
+    """A table of defaults for true, nothing for false."""
+    return {} if given is True else None if given is False else given
+
+
+def _also_a_switch(schema: dict[str, Any]) -> None:
+    schema["anyOf"].append({"type": "boolean"})
+
+
 class Candidates(SceneSection):
     """Where to grasp: stations along the object's axis x angles about it, explicit poses, or sampled grasps."""
 
@@ -87,6 +105,16 @@ class Candidates(SceneSection):
     )
     count: int = Field(12, ge=1, le=1000, description="distinct grasps that the sampler gives at most")
     seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
+    refine: Annotated[Refinement | None, BeforeValidator(_switched)] = Field(
+        None,
+        description="solves further stations where the best grasp may lie between the given ones",
+        examples=[True],
+        json_schema_extra=_also_a_switch,
+    )
+    solve_best: int | None = Field(
+        None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
+    )
+    skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
 
     @property
@@ -136,6 +164,9 @@ class Candidates(SceneSection):
         for key in ("angles_deg", "roll_deg") if self.poses or self.sampler else ():
             if getattr(self, key) != Candidates.model_fields[key].default:
                 yield Finding((key,), f"{key} without stations", "it with stations only", "remove it")
+        if self.refine and (self.poses or self.sampler):
+            # Poses have no order, so nothing lies between two of them.
+            yield Finding(("refine",), "refine without stations", "it with stations only", "remove it")
         for i, pose in enumerate(self.poses):
             yield from (f.below("poses", i) for f in pose.findings())
 

@@ -123,8 +123,8 @@ def _place(loc: Sequence[str | int], table: Any, schema: dict[str, Any]) -> tupl
 
 
 def _options(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The alternatives of a key that is given; leaving it out is none of them."""
-    return [s for s in schema.get("anyOf", ()) if s.get("type") != "null"]
+    """The alternatives of a key that is given; leaving it out is none of them, nor is switching a table on."""
+    return [s for s in schema.get("anyOf", ()) if s.get("type") not in ("null", "boolean")]
 
 
 def _choices(schema: Mapping[str, Any]) -> list[str]:

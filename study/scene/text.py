@@ -137,14 +137,18 @@ def _value_lines(tokens: list[tuple[str, int]], path: KeyPath, lines: dict[KeyPa
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
-    """TOML text of the tables of a scene; None is left out."""
-    plain, tables = [], []
-    for key, value in data.items():
-        if isinstance(value, Mapping) and value:
-            tables.append(f"[{_key(key)}]\n{toml_text(value)}")
-        elif value is not None and not isinstance(value, Mapping):
-            plain.append(f"{_key(key)} = {_value(value)}\n")
-    return "".join(plain) + "".join("\n" + t for t in tables)
+    """TOML text of the tables of a scene, those within a table on a line; None is left out."""
+    plain = [_line(key, value) for key, value in data.items() if not isinstance(value, Mapping)]
+    tables = [
+        f"\n[{_key(key)}]\n{''.join(_line(*pair) for pair in value.items())}"
+        for key, value in data.items()
+        if isinstance(value, Mapping) and value
+    ]
+    return "".join([*plain, *tables])
+
+
+def _line(key: str, value: Any) -> str:
+    return "" if value is None else f"{_key(key)} = {_value(value)}\n"
 
 
 def _key(key: str) -> str:

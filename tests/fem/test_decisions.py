@@ -108,6 +108,7 @@ def volume(points, triangles):
 # --- meshes -----------------------------------------------------------------------------------------------------------
 
 TWO_TURNED = CUBE[0], np.concatenate([CUBE[1][:2, ::-1], CUBE[1][2:]])
+PIERCED = np.concatenate([[[0.2, 0.1, 0.9]], CUBE[0][1:]]), CUBE[1]  # a corner of the bottom, pushed through the top
 ACCEPTED = {  # mesh, and its volume
     "closed": (CUBE, 1.0),
     "two turned": (TWO_TURNED, 1.0),
@@ -117,13 +118,14 @@ ACCEPTED = {  # mesh, and its volume
     "two apart": (union(CUBE, shifted(CUBE, 0.5, [0.03, 0.02, 0.76])), 1.125),
     "standing on another": (union(CUBE, shifted(CUBE, 0.5, [0.03, 0.02, 0.75])), 1.125),
     "touching along an edge": (union(CUBE, shifted(CUBE, 0.5, [0.75, 0.75, 0.0])), 1.125),
+    "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), 2.0),
     "thin": ((CUBE[0] * [1, 1, 1e-4], CUBE[1]), 1e-4),
 }
 REFUSED = {  # mesh, and a word of the refusal
     "open": ((CUBE[0], CUBE[1][1:]), "closed"),
     "flat": (FLAT_PIECE, "volume"),
     "flat beside another": (union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])), "volume"),
-    "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), "intersects"),
+    "crossing itself": (PIERCED, "intersects"),
     "corners on another": (union(CUBE, shifted(OCTAHEDRON, 1.0)), "two pieces"),
     "face on a face": (union(CUBE, shifted(CUBE, 1.0, [0.0, 0.0, 1.0])), "manifold"),
 }

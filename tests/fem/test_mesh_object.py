@@ -14,6 +14,9 @@ from softjaw.fem.objects.mesh_check import crossing_pairs, sound_mesh, winding_n
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.shapes import Sphere
+from softjaw.study.case.geometry import traced_surface
+from softjaw.study.scene.objects import Mesh
+from tests.objects.bodies import mug
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
@@ -280,6 +283,13 @@ def moebius(n=12):
     return np.random.default_rng(0).uniform(0, 0.1, (n * n, 3)), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
 
 
+def pierced():
+    """A ball of which one corner is pushed through the far side."""
+    points, triangles = ball(2)
+    points[triangles[0, 0]] = np.array([-0.75, -0.45, -0.3]) @ points[triangles[0]]
+    return points, triangles
+
+
 def two(a, b):
     return np.concatenate([a[0], b[0]]), np.concatenate([a[1], b[1] + len(a[0])])
 
@@ -299,7 +309,7 @@ def spoilt(value):
     ((ball(2)[0], ball(2)[1] - 1), r"refers to point -1, but"),
     ((ball(2)[0] * 1e3, ball(2)[1]), r'an object of 60 m\? With unit = "m" .* the unit should be "mm" \(60 mm\)'),
     ((ball(2)[0] * 1e-3, ball(2)[1]), r"an object of 6e-05 m\?"),
-    (two(ball(2), ball(2, centre=(0.02, 0.003, 0.001))), r"intersects itself: \d+ pairs of triangles"),
+    (pierced(), r"intersects itself: \d+ pairs of triangles"),
     ((np.concatenate([ball(2)[0], [[0, 0, 0.05]]]), np.concatenate([ball(2)[1], [[*ball(2)[1][0, :2], 162]]])),
      r"not manifold: at 1 edges more than two"),
     (moebius(), "only one side"),
@@ -313,17 +323,17 @@ def test_meshes_that_make_no_object_are_refused(mesh, message):
 def test_orientation_is_repaired_and_said():
     points, triangles = ball(2)
     for flipped in (triangles[:, ::-1], np.where(np.arange(320)[:, None] < 5, triangles[:, ::-1], triangles)):
-        x, turned, notes, _ = sound_mesh(points, flipped)
+        x, turned, notes, *_ = sound_mesh(points, flipped)
         assert winding_number(np.zeros(3), x, turned) == pytest.approx(1)
         assert notes in (("turned 320 of 320 triangles outwards",), ("turned 5 of 320 triangles outwards",))
 
 
 def test_shells_inside_and_specks_are_dropped_and_separate_parts_are_kept():
     inner, speck = ball(2, (0.028,) * 3), ball(0, (2e-4,) * 3, centre=(0.05, 0, 0))
-    _, triangles, notes, _ = sound_mesh(*two(two(ball(2), inner), speck))
+    _, triangles, notes, *_ = sound_mesh(*two(two(ball(2), inner), speck))
     assert len(triangles) == 320
     assert notes == ("dropped 1 specks of debris", "dropped 1 shells inside the object")
-    _, triangles, notes, _ = sound_mesh(*two(ball(2), ball(2, centre=(0.07, 0, 0))))
+    _, triangles, notes, *_ = sound_mesh(*two(ball(2), ball(2, centre=(0.07, 0, 0))))
     assert len(triangles) == 640
     assert notes == ()
 
@@ -333,9 +343,30 @@ def test_few_crossing_triangles_are_tolerated_and_said():
     k = triangles[0]
     points[k[0]] += 1.2 * (points[k[1]] - points[k[0]])  # one corner pushed past its neighbour
     crossings = crossing_pairs(points, triangles)
-    _, _, notes, _ = sound_mesh(points, triangles)
+    _, _, notes, *_ = sound_mesh(points, triangles)
     assert 0 < len(crossings) <= 20
     assert "cross; tolerated" in notes[0]
+
+
+def test_parts_that_cross_are_one_object_and_no_thin_wall(tmp_path):
+    """A cup with a handle through its wall: a note says where, the handle stays, and a wall is refused."""
+    mug().export(tmp_path / "mug.stl")
+    obj = MeshObject.from_file(tmp_path / "mug.stl", "m")
+    assert obj.notes == (obj.crossing,)
+    assert "2 closed parts" in obj.crossing
+    assert obj.bounds[1, 0] == pytest.approx(0.064, abs=1e-3)
+    assert obj.distance(np.array([[obj.bounds[1, 0] + 0.01, 0.0, 0.0475]])) == pytest.approx(0.01, abs=1e-4)
+    walled = Mesh(shape="mesh", mesh=str(tmp_path / "mug.stl"), unit="m", wall_mm=1.0)
+    with pytest.raises(MeshError, match="cross each other"):
+        traced_surface(walled)
+
+
+def test_an_inner_wall_that_comes_through_the_outer_one_is_still_inside():
+    inner, triangles = ball(3, 3 * (0.93 * RADIUS,))
+    inner[triangles[0, 0]] = np.array([0.6, 0.35, 0.2]) @ inner[triangles[0]]
+    sound = sound_mesh(*two(ball(3), (inner, triangles)))
+    assert len(sound.triangles) == len(triangles)
+    assert sound.crossing
 
 
 def test_crossings_are_found_exactly():
@@ -417,6 +448,6 @@ def test_regions_that_make_no_sense_are_refused(flask):
 @pytest.mark.long
 def test_check_of_a_large_mesh_is_bounded():
     """80 000 triangles, checked for crossings in seconds."""
-    _, triangles, notes, _ = sound_mesh(*ball(6))
+    _, triangles, notes, *_ = sound_mesh(*ball(6))
     assert len(triangles) == 81_920
     assert notes == ()

@@ -33,6 +33,7 @@ REASONS = (
     Reason("force not reached", r"the force stays below"),
     Reason("stuck", r"stuck at"),
     Reason("outline refused", r"profile's curve swings to the axis", "scene"),
+    Reason("hole under a pad", r"has a hole under the pad"),
     Reason("mesh refused", r"holes|cross itself|crosses itself|open edges"),
 )
 OTHER = Reason("other", "")

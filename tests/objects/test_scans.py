@@ -7,12 +7,13 @@ import pytest
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.case.fit import Jaws
 from softjaw.study.case.sampler import antipodal_grasps
-from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, punctured, scan, spoiled
+from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan, spoiled
 
 JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)
 MADE = {
     "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
     "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
+    "mug": mug,
     "banana with holes": lambda: punctured(scan("banana"), 3),
     "spoiled drill": lambda: spoiled(scan("drill")),
     **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},

@@ -16,7 +16,7 @@ from tests.objects.found import LOST, SOLVED, TRIED, UNTRIED, Found, candidate_s
 from tests.objects.objects_page import SECONDS, SHARE, page, share
 from tests.objects.random_scenes import KINDS, random_scene
 from tests.objects.reasons import REASONS, reason_of
-from tests.objects.survey import survey_object, survey_random
+from tests.objects.survey import said, survey_object, survey_random
 from tests.objects.user_objects import user_objects
 
 SEED, SCENES = 3, 16
@@ -81,6 +81,15 @@ def test_what_was_found_is_kept(tmp_path):
     one.save(tmp_path / "one.json")
     assert Found.load(tmp_path / "one.json").states == WHOLE
     assert json.loads((tmp_path / "one.json").read_text())["seconds"] == 100.0
+
+
+@pytest.mark.launches
+def test_a_command_that_hangs_is_stopped(tmp_path):
+    assert said(["sleep", "60"], tmp_path, 0.1)[:2] == (None, "")
+    code, _, seconds = said(["sh", "-c", "while :; do :; done"], tmp_path, 0.4)
+    assert code is None
+    assert seconds > 0.05
+    assert said(["false"], tmp_path, 10.0)[:2] == (1, "")
 
 
 @pytest.mark.long

@@ -23,29 +23,53 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True, wide=-1):
-    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide."""
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=()):
+    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide.
+
+    Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
+    """
     from softjaw.study.quantities import WIDE
     from softjaw.study.result.layout import Derived, Header, Layout
     from softjaw.study.result.store import StoredAxis
     from softjaw.study.run.plan import Plan
 
+    own = np.linspace(0, 0.1, stations).tolist()
+    places = sorted([*own, *(1e-3 * mm for added in rounds for mm in added)])
     axes = (
-        StoredAxis("station", np.linspace(0, 0.1, stations), "m", "station along the object's axis"),
+        StoredAxis("station", np.array(places), "m", "station along the object's axis"),
         StoredAxis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
         StoredAxis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
     )
     slope = (Derived("slope", "m/N", "slope", "e_n over force", ("station",)),) if derived else ()
     units = []
-    for s in range(stations):
+    for s, place in enumerate(places):
+        # Named by what a study without rounds would call it, or by a number far from these.
+        name = own.index(place) if place in own else 1000 + round(1e6 * place)
         rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
-        for served in [tuple(rows)] if s % 2 == 0 else [(r,) for r in rows]:
-            units.append(SimpleNamespace(index=len(units), rows=served, cost=float(1 + s % 3), state=0, reason=""))
+        for a in [(0, 1)] if name % 2 == 0 else [(0,), (1,)]:
+            served = tuple(rows[i] for i in a)
+            unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
+            unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
+            units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"
-    labels = tuple(f"candidate {i}" for i in range(2 * stations))
+    labels = tuple(f"candidate {i}" for i in range(2 * len(places)))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
-    return Plan(Layout(axes, FACES, derived=slope), header, tuple(units))
+    return Plan(Layout(axes, FACES, derived=slope, added=rounds), header, tuple(units))
+
+
+def fake_growth(digest, stations, work):
+    """Rounds of further stations until a budget is spent, by the rule of a real study."""
+    from softjaw.study.run.refine import next_stations
+    from softjaw.study.run.session import Growth
+
+    given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
+    asked = SimpleNamespace(refine=SimpleNamespace(best_within=0.01, budget=36), station_values_mm=given)
+    scene = SimpleNamespace(candidates=asked)
+    return Growth(
+        lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
+        lambda result: next_stations(result, scene, 2 * FORCES),
+    )
 
 
 def fake_result(row):
@@ -65,7 +89,7 @@ def fake_path(options):
     from softjaw.study.case.result import CaseFailure
 
     def solve_unit(unit):
-        for k, row in enumerate(unit.rows[0]):
+        for k, row in enumerate(range(unit.first, unit.first + FORCES)):
             deadline = time.monotonic() + (60.0 if row == options.hang else options.delay)
             while time.monotonic() < deadline:
                 time.sleep(0.002)
@@ -104,6 +128,7 @@ def main():
     parser.add_argument("--limit", type=float, default=600.0)
     parser.add_argument("--memory", type=float, default=0.5)
     parser.add_argument("--stations", type=int, default=6)
+    parser.add_argument("--grow", action="store_true")
     for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args()
@@ -123,9 +148,10 @@ def main():
             return 1 / (unit.index - options.bug) and result
 
     work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
+    growth = fake_growth(options.digest, options.stations, work) if options.grow else None
     try:
         plan = fake_plan(options.digest, options.stations, wide=options.wide)
-        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed)
+        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed, growth=growth)
     except StudyError as error:
         return complain(error)
     except BaseException:

@@ -202,7 +202,7 @@ def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypat
     text = capsys.readouterr().out
     assert "12 = 3 x 2 x 2 (station, angle, normal_force)" in text
     assert "3 load paths of 2 forces, 3 candidates are images of others" in text
-    assert "not known before" in text
+    assert "a bed of springs" in text
     assert not target.parent.exists()
 
 

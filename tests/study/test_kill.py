@@ -64,11 +64,11 @@ def count_done(path):
         return int((result.status == DONE).sum())
 
 
-def killed_again_and_again(path, number, chance):
+def killed_again_and_again(path, number, chance, options=OPTIONS):
     """Kill a study several times, then let it finish; how many kills met it, and rows done when they did."""
     met, progress = 0, [set()]
     for k in range(KILLS):
-        process = start(2 + number % 2, path, *OPTIONS, "--delay", 0.12)  # six seconds of work
+        process = start(2 + number % 2, path, *options, "--delay", 0.12)  # six seconds of work
         if k or number % 3:  # in the middle of the work, else anywhere from the start on
             before = count_done(path)
             wait_for(lambda: process.poll() is not None or count_done(path) > before)  # noqa: B023
@@ -78,9 +78,32 @@ def killed_again_and_again(path, number, chance):
         met += kill(process, VICTIMS[(number + k) % 3], chance)
         wait_for(lambda: not holder(path))  # ranks outlive their mpirun
         progress.append(done_rows(path))
-    code, _, errors = study(0, path, *OPTIONS)
+    code, _, errors = study(0, path, *options)
     assert code == 0, errors
     return met, progress
+
+
+def test_no_kill_loses_a_result_of_a_study_that_gets_more_stations(once, shared_path):
+    """Rows have other numbers after each round, so only how many are done can be compared."""
+    options, whole = ("--stations", 5, "--grow", "--retry-failed"), shared_path / "whole.hdf"
+    code, _, errors = once(study, 0, whole, *options)
+    assert code == 0, errors
+    with open_result(whole) as result:
+        assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6
+    expected = once(contents, whole)
+
+    def campaign():
+        chance, met = random.Random(7), 0
+        for number in range(3):
+            path = shared_path / f"{number}.hdf"
+            hits, progress = killed_again_and_again(path, number, chance, options)
+            assert all(len(before) <= len(after) for before, after in pairwise(progress))
+            assert differing(path, expected) == []
+            assert not list(shared_path.glob("*.grown*"))
+            met += hits
+        return met
+
+    assert once(campaign) > 6
 
 
 def test_no_kill_loses_a_result(once, shared_path):

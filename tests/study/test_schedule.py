@@ -93,7 +93,7 @@ def test_more_ranks_than_load_paths_are_not_sensible():
 
 
 def test_times_of_unsolved_units_follow_from_their_cost():
-    units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c) for i, c in enumerate([1.0, 2.0, 4.0]))
+    units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c, state=0) for i, c in enumerate([1.0, 2.0, 4.0]))
     plan = Plan(None, None, units)
     assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == [6.0, 12.0, 24.0]
     assert unit_seconds(plan, np.full(6, np.nan)) == []

@@ -32,6 +32,7 @@ def scene_text(scene: Any, file: str) -> str:
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
         "cases": str(scene.cases),
+        "refinement": _refinement(c.refine),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
         "target": _target(scene),
@@ -43,6 +44,13 @@ def scene_text(scene: Any, file: str) -> str:
         "results": scene.output.file,
     }
     return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
+
+
+def _refinement(asked: Any) -> str:
+    """What a refinement may add; empty without one."""
+    if asked is None:
+        return ""
+    return f"at most {asked.budget} more cases, until the best is known to {asked.best_within:.2g} of itself"
 
 
 def limits_text(run: Any) -> str:

@@ -20,6 +20,7 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.answer import answer
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
+from softjaw.study.show.tables.status import no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -88,7 +89,7 @@ def best(
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
     errors = verdict(sure(ds, scored, k), holding, same, ds[scored].attrs.get("units", ""))
-    errors = " ".join(filter(None, [errors, _passed_over(score[done], flags[done])]))
+    errors = " ".join(filter(None, [errors, _passed_over(score[done], flags[done]), _left_out(ds, k)]))
     title = f"{what} at {forces[k]:g} N{why}{'' if rows else _solved_elsewhere(ds)}"
     first = (*(int(i) for i in np.unravel_index(order[0], shape)), k) if rows else None
     told = "" if first is None else answer(ds, first)
@@ -124,6 +125,12 @@ def _passed_over(score: np.ndarray, flags: np.ndarray) -> str:
         return ""
     count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
     return f"{count} higher but cannot be used and stand last: {why}"
+
+
+def _left_out(ds: xr.Dataset, k: int) -> str:
+    """Which candidates were not solved because they are no grasp."""
+    found = no_grasps(ds.status.values[..., k])
+    return f"not solved: {', '.join(found)}; 'softjaw status' says why" if found else ""
 
 
 def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:

@@ -16,6 +16,7 @@ from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STA
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
+from softjaw.study.run.refine import about
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
@@ -40,11 +41,13 @@ def status_text(result: Any, width: int = PAPER) -> str:
 def status_json(result: Any) -> str:
     """One object: counts, who is running, failed cases and notes on solved ones with their places (SI), sessions."""
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
-    about = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
-    about |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    about |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
-    about |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
-    return json.dumps(about, indent=2)
+    found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
+    found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
+    found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
+    found |= {"added_stations_mm": [list(some) for some in result.layout.added]}
+    found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
+    found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
+    return json.dumps(found, indent=2)
 
 
 def status_csv(result: Any) -> str:
@@ -78,12 +81,13 @@ def _place(result: Any, row: int) -> list[float]:
 
 
 def counts(result: Any) -> str:
-    """How many cases are in which state."""
+    """How many cases are in which state, and how many stations a refinement added."""
     title = f" ({result.title})" if result.title else ""
     states = [*(f"{int(np.sum(result.status == state))} {STATES[state]}" for state in (FAILED, MISSING)),
               *no_grasps(result.status)]  # fmt: skip
     done = f"{int(np.sum(result.status == DONE))} of {result.status.size} cases {STATES[DONE]}"
-    return f"{result.path}{title}:\n  {', '.join([done, *states])}"
+    stations = f"\n{wrapped(text, PAPER, '  ', '    ')}" if (text := about(result)) else ""
+    return f"{result.path}{title}:\n  {', '.join([done, *states])}{stations}"
 
 
 def no_grasps(codes: NDArray[np.integer]) -> list[str]:

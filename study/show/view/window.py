@@ -44,7 +44,10 @@ def plot(view: View, index: Index, quantity: str, motion: str, *, off_screen: bo
     solids.look(plotter, (0.8, -1.0, 0.55), (0, 0, 1), 0.95)
     plotter.subplot(0, 0)
     solids.look(plotter, *view.eye(index), 0.9)
-    plotter.add_axes(xlabel="x", ylabel="y", zlabel="z", color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
+    # the object is drawn with its axis upright; its file's own axes are named
+    named = ["xyz"[abs(column).argmax()] for column in view.placed.rotation.T]
+    labels = dict(zip(("xlabel", "ylabel", "zlabel"), named, strict=True))
+    plotter.add_axes(**labels, color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
     return plotter
 
 

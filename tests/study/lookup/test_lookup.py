@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.lookup import GraspMap
-from softjaw.study.lookup.point import INSIDE, NO_RESULT, OUTSIDE, SNAP
+from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
 from softjaw.study.result.store import StoredAxis
 from tests.study.formula_results import (
     ANGLES,
@@ -71,9 +71,9 @@ def test_the_estimate_covers_the_true_error_of_cases_left_out(tmp_path, along):
     true, estimate = np.abs(coarse.value("e_n", *grid) - smooth(*grid)), coarse.error("e_n", *grid)
     left_out = estimate > 0
     assert left_out.mean() > 0.4
-    assert (true <= 2 * estimate)[left_out].mean() >= 0.9
+    assert (true <= estimate)[left_out].mean() >= 0.95
     assert true[~left_out].max() < 1e-15
-    assert np.median(estimate[left_out]) < 3 * np.median(true[left_out])  # covers without crying wolf
+    assert np.median(estimate[left_out]) < 6 * np.median(true[left_out])  # covers without crying wolf
 
 
 def test_one_point_is_the_same_as_an_array_of_points(straight):
@@ -166,6 +166,43 @@ def test_nothing_is_interpolated_across_a_snap_in(tmp_path):
         assert (point.state, point.flags) == (INSIDE, sign)
         assert point.e_n == pytest.approx(jump(0.011, 0.1, force))
         assert point.error("e_n") == pytest.approx(0, abs=1e-15)
+
+
+def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
+    """From 20 mm on the pads bear on both ends, at 40 mm in two pieces; other rims are no change."""
+
+    def rims(values):
+        values[:2], values[2:] = 1, 15
+        return values
+
+    def pieces(values):
+        values[...] = 1
+        values[4] = 2
+        return values
+
+    two = {"fingers__rims": rims, "fingers__pieces": pieces, "fingers__holes": 0}
+    there = GraspMap(make(tmp_path / "a.hdf", **two))
+    found = there.at([0.005, 0.015, 0.025, 0.035, 0.03], 0.1, 2.5)
+    assert found.state.tolist() == [INSIDE, JUMP, INSIDE, JUMP, INSIDE]
+    assert np.isnan(found.e_n[[1, 3]]).all()
+    assert np.isnan(there.value("e_n", 0.015, 0.1, 2.5))
+    assert there.value("e_n", 0.025, 0.1, 2.5) == pytest.approx(linear(0.025, 0.1, 2.5))
+    assert "(1 piece) and " in found.reason[1]
+    assert "(2 pieces, on both ends)" in found.reason[3]
+    for place, (station, force) in (((0.0149, 0.1, 2.5), (0.01, 2.0)), ((0.036, 6.9, 3.9), (0.04, 4.0))):
+        point = there.at(*place)
+        assert point.nearest.ok
+        assert point.nearest.place[0, [0, 2]] == pytest.approx([station, force])
+        assert point.nearest.e_n == pytest.approx(linear(station, 0, force))
+    assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
+
+
+def test_a_dataset_and_a_part_of_it_can_be_looked_up(tmp_path):
+    import softjaw
+
+    whole = softjaw.open(make(tmp_path / "a.hdf"))
+    part = GraspMap(whole.isel(station=slice(None, None, 2)))
+    assert part.at(0.01, 0.1, 2).e_n == pytest.approx(GraspMap(whole).at(0.01, 0.1, 2).e_n)
 
 
 def test_angles_repeat_with_the_objects_symmetry(tmp_path):

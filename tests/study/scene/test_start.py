@@ -14,7 +14,7 @@ from softjaw.study.cli.options import KINDS
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
-from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, punctured, scan
+from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan
 from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
@@ -22,6 +22,7 @@ BODIES = {
     "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
     "flat bottle": lambda: hollow_bottle(0.1, 0.028, 0.02, 0.002),
     "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
+    "mug": mug,
     "banana with holes": lambda: punctured(scan("banana"), 3),
     **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
 }

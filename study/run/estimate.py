@@ -1,0 +1,102 @@
+"""Seconds that load paths will take, from a bed of springs and a calibration, before anything is solved.
+
+A force costs what its elements cost, whose number follows from symmetry, and symmetry from what the pads meet: heights
+of the object over a coarse grid on each pad, without compiled loops, because a plan answers at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import turn_of_pose
+from softjaw.study.case.fit import DRAWN, bed_closing, jaws_of
+
+FloatArray = NDArray[np.float64]
+GRID = (13, 7)  # points of a pad's face
+MOST = 40  # load paths that are looked at, evenly spread; the others take the time of the nearest one
+# Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2024.
+CASE, ELEMENT = 0.03, 2.5e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
+QUADRATIC = 10.0  # times as dear is a triquadratic element
+START = 0.3  # seconds until a rank has loaded what it solves with
+FIRST = 2.0  # times as long the first force takes, which begins with a coarse step
+REGION = 0.7  # seconds until the distance to a mesh is known round both pads
+DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
+
+
+def estimated(units: Sequence[Any]) -> list[float]:
+    """Expected time of each unit of work on objects without a wall [s]."""
+    step = -(-len(units) // MOST) if units else 1
+    surfaces: dict[Any, tuple[FloatArray, Any]] = {}
+    known = []
+    for unit in units[::step]:
+        shape = unit.scene.object
+        if shape not in surfaces:
+            surfaces[shape] = build_object(shape).surface()
+        known.append(_seconds(unit, *surfaces[shape]))
+    return [known[i // step] for i in range(len(units))]
+
+
+def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> float:
+    scene, gripper = unit.scene, unit.scene.gripper
+    pose, other = unit.candidate.poses
+    low, high = heights((points - pose.origin) @ pose.rotation, triangles, gripper.pad_size[:2])
+    doubt = DRAWN * float(np.linalg.norm(np.ptp(points, axis=0)))
+    fingers = 1 if turn_of_pose(pose, other, scene.object.axis_symmetry) is not None else 2
+    planes = _planes(scene, low, high, doubt)
+    kind = QUADRATIC if gripper.element == "hex27" else 1.0
+    elements = kind * fingers * math.prod(gripper.elements) / 2**planes
+    each = CASE + ELEMENT * elements * (1 + (scene.accuracy.meshes - 1) / 8)
+    jaws, cell = jaws_of(scene), math.prod(gripper.pad_size[:2]) / math.prod(GRID)
+    forces = scene.load.normal_force
+    times = [FIRST, *[1.0] * (len(forces) - 1)]
+    if np.isfinite(low).any():
+        bed = low - low.min()
+        shares = [bed_closing(bed, f / (jaws.stiffness * cell)) / gripper.pad_thickness for f in forces]
+        times = [t * (HARD if share > DEEP else 1.0) for t, share in zip(times, shares, strict=True)]
+    region = REGION if scene.object.shape == "mesh" else 0.0
+    return region + each * sum(times)
+
+
+def _planes(scene: Any, low: FloatArray, high: FloatArray, doubt: float) -> int:
+    """Planes of symmetry that the pads' meshes will use; what a mesh from a file holds is never quite symmetric."""
+    wanted = scene.effects.model_size
+    if wanted == "full" or scene.object.shape == "mesh":
+        return 0
+    found = 0
+    for axis in (0, 1):
+        even = scene.gripper.elements[axis] % 2 == 0
+        found += even and all(_alike(field, np.flip(field, axis), doubt) for field in (low, high))
+    return min(found, 1) if wanted == "half" else found
+
+
+def _alike(one: FloatArray, other: FloatArray, doubt: float) -> bool:
+    both = np.isfinite(one) & np.isfinite(other)
+    same_rim = np.mean(np.isfinite(one) != np.isfinite(other)) < 0.1  # rounding decides what a line at the rim meets
+    return bool(same_rim and np.abs(one[both] - other[both]).max(initial=0.0) <= doubt)
+
+
+def heights(
+    points: FloatArray, triangles: NDArray[np.int64], sides: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest z of triangles over a grid of `GRID` points in a rectangle about the origin; else infinite."""
+    x, y = np.meshgrid(*(side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip(sides, GRID, strict=True)),
+                       indexing="ij")  # fmt: skip
+    corners, half = points[triangles], 0.5 * np.array(sides)
+    near = (corners[..., :2].min(axis=1) <= half) & (corners[..., :2].max(axis=1) >= -half)
+    corners = corners[near.all(axis=1)]
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
+    dx, dy = x.ravel()[:, None] - a[:, 0], y.ravel()[:, None] - a[:, 1]
+    s, t = (dx * v[:, 1] - dy * v[:, 0]) / area, (u[:, 0] * dy - u[:, 1] * dx) / area
+    over = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1 + 1e-12)
+    z = a[:, 2] + s * u[:, 2] + t * v[:, 2]
+    low = np.where(over, z, np.inf).min(axis=1, initial=np.inf)
+    high = np.where(over, z, -np.inf).max(axis=1, initial=-np.inf)
+    return low.reshape(GRID), high.reshape(GRID)

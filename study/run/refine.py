@@ -1,0 +1,163 @@
+"""Further stations, in rounds: where the best grasp may still lie between two solved ones, by stored numbers alone.
+
+Between two stations a score is taken to rise no faster than `STEEPER` times the steepest slope of the interval and of
+the two beside it. Where that lets it pass the best one by more than the scene tolerates, the middle of the interval is
+solved. Poses have no order, so a scene of poses is not refined; nor are angles, of which every station has all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.case.result import MARGIN
+from softjaw.study.flags import LOST
+from softjaw.study.quantities import DONE, MISSING
+
+if TYPE_CHECKING:
+    from softjaw.study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+Rounds = tuple[tuple[float, ...], ...]  # stations that each round added [mm]
+STEEPER = 1.5  # how much steeper a score may be than its slopes between stations show
+FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
+TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
+
+
+def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
+    """The scene with the stations of all rounds as its own; ``probes`` are the numbers that the scene gives them."""
+    if not rounds:
+        return scene
+    where, given = scene.candidates, scene.candidates.station_values_mm
+    stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
+    numbers = _Renumbered(given, stations, len(where.angles_deg))
+    fixed: dict[str, Any] = {"stations": None, "station_range_mm": None, "stations_mm": stations, "refine": None}
+    # What was left out as not among the best stays so in the file; the added stations are all solved.
+    fixed["solve_best"] = None
+    parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
+    if not isinstance(names := scene.limit_surface.wrench_samples, str):
+        samples = numbers(where.numbers(names))
+        parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
+    if probes:
+        parts["uncertainty"] = scene.uncertainty.model_copy(update={"probes": numbers(probes)})
+    return scene.model_copy(update=parts)
+
+
+@dataclass(frozen=True)
+class _Renumbered:
+    """Numbers of candidates among more stations, from those among the given ones."""
+
+    given: tuple[float, ...]
+    stations: tuple[float, ...]
+    angles: int
+
+    def __call__(self, numbers: Sequence[int]) -> tuple[int, ...]:
+        places = [(self.stations.index(self.given[n // self.angles]), n % self.angles) for n in numbers]
+        return tuple(s * self.angles + a for s, a in places)
+
+
+def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], finest: float) -> FloatArray:
+    """By which share each interval between stations may beat the best grasp, at the force where that is most.
+
+    Parameters
+    ----------
+    stations : (s,) array
+        Rising.
+    score : (p, s, a, f) array
+        Of every case: points of a sweep, stations, angles, forces; NaN where there is none.
+    sound : (p, s, a, f) array
+        Whether the grasp can be used.
+    finest : float
+        Intervals that are not twice as wide are not divided, and have no chance.
+
+    Returns
+    -------
+    (s - 1,) array
+        0 where nothing is expected to be better.
+    """
+    h = np.diff(stations)
+    slope = np.abs(np.diff(score, axis=1)) / h[None, :, None, None]
+    # fmax: beside a case without a value, the slopes that are known count.
+    steepest = slope.copy()
+    steepest[:, 1:] = np.fmax(steepest[:, 1:], slope[:, :-1])
+    steepest[:, :-1] = np.fmax(steepest[:, :-1], slope[:, 1:])
+    middle = (score[:, 1:] + score[:, :-1]) / 2
+    most = middle + STEEPER * steepest * h[None, :, None, None] / 2
+    most[~(sound[:, 1:] | sound[:, :-1])] = np.nan
+    best = np.where(sound, score, -np.inf).max(axis=(1, 2))[:, None, None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.nan_to_num(np.where(best > 0, most / best - 1, 0.0), nan=0.0)
+    found = np.maximum(share.max(axis=(0, 2, 3)), 0.0)
+    return np.where(h >= 2 * finest * (1 - MARGIN), found, 0.0)
+
+
+def chances_in(result: Any, score: str = "quality") -> FloatArray:
+    """`chances` of a result file; ``score`` is the map that grasps are ranked by, CCM where it has several models."""
+    values = _cases(result, result.read(f"{score}/ccm"))
+    flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
+    done = _cases(result, result.status) == DONE
+    values = np.where(done, values, np.nan)
+    stations, added = result.axes[-3].values, sum(map(len, result.layout.added))
+    finest = FINEST * np.ptp(stations) / max(len(stations) - added - 1, 1)
+    return chances(stations, values, np.isfinite(values) & (flags & LOST == 0), finest)
+
+
+def _cases(result: Any, values: np.ndarray) -> np.ndarray:
+    """Values of all cases as points of the sweep, stations, angles, forces."""
+    return values.reshape(-1, *result.layout.shape[-3:])
+
+
+def added_cases(units: Sequence[Any], layout: Any) -> int:
+    """Cases that are solved at each station of a plan; images by symmetry lie at the station of what is solved."""
+    return len(units) * layout.shape[-1] // layout.shape[-3]
+
+
+def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
+    """Stations of the next round [mm], rising; none where the best is known well enough or the budget is spent.
+
+    ``each`` is the number of cases that are solved at a station.
+    """
+    asked = scene.candidates.refine
+    if asked is None:
+        return ()
+    given, added = scene.candidates.station_values_mm, [s for some in result.layout.added for s in some]
+    left = asked.budget // each - len(added)
+    chance = chances_in(result)
+    stations = sorted({*given, *added})
+    limit = max(asked.best_within * (1 + MARGIN), TOGETHER * float(chance.max(initial=0.0)) * (1 - MARGIN))
+    # Rounded, so that chances that are equal but for rounding come in the order of their stations.
+    order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
+    chosen = [i for i in order if chance[i] > limit][: max(left, 0)]
+    return tuple(sorted(_middle(stations[i], stations[i + 1]) for i in chosen))
+
+
+def _middle(low: float, high: float) -> float:
+    """Middle of an interval, with no more digits than tell it from the ends.
+
+    >>> _middle(64.70588235294117, 69.11764705882354)
+    66.912
+    """
+    return round((low + high) / 2, 3 - math.floor(math.log10(high - low)))
+
+
+def about(result: Any) -> str:
+    """What was added, and how well the best grasp is known, in a sentence; empty for a file without added stations."""
+    rounds = result.layout.added
+    if not rounds:
+        return ""
+    count, own = sum(map(len, rounds)), result.layout.shape[-3]
+    text = f"{own - count} stations of the scene and {count} added in {_counted(len(rounds), 'round')}"
+    if (result.status == MISSING).any():
+        return f"{text}, the last of which is not complete"
+    chance = float(chances_in(result).max(initial=0.0))
+    known = f"; between them the best may be beaten by {chance:.1%} at most, judged by the slopes beside"
+    return text + (known if chance > 0 else "; no station between them is expected to beat the best")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
