@@ -226,7 +226,7 @@ def least(names: Sequence[str]) -> list[str]:
     main = [name for name in reversed(MAIN[3:]) if name in names]
     errors = [f"{name}_error" for name in main if f"{name}_error" in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
-    last = [name for name in ("quality_error", MAIN[2]) if name in names]
+    last = [name for name in ("quality_error", f"{MAIN[2]}_error", MAIN[2]) if name in names]
     return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
 
 
