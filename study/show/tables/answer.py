@@ -10,6 +10,7 @@ from softjaw.study.ranking import task_keys
 from softjaw.study.show.grasps import Index, at, forces, number, place
 from softjaw.study.units import shown_text
 
+UNSEEN = 0.005  # of a force: an error below it is not seen in three digits
 PLAIN = {"\N{NO-BREAK SPACE}": " ", "\N{DEGREE SIGN}": " deg"}
 
 
@@ -47,7 +48,7 @@ def _press(ds: Any, index: Index) -> str:
     wanted = f"{safety:g} times the object's {_mass(1e-3 * mass)}"
     if not np.isfinite(low):
         return f"{here}: it then {now}, but no solved force holds {wanted}"
-    margin = f" +- {error:.2g}" if np.isfinite(error) else ""
+    margin = f" +- {error:.2g}" if error > UNSEEN * low else ""
     return f"press with {low:.3g}{margin} N per finger: it then holds {wanted} {every} ({_mass(held)} at {force:.3g} N)"
 
 
