@@ -30,6 +30,7 @@ from softjaw.fem.objects.triangle_tree import TriangleTree
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 STEPS_PER_BOX = 80  # grid where no element size is given: steps along the longest side of the box
 STEPS_PER_ELEMENT = 4
+FEWEST_FACETS = 4  # a round surface has more edges of one kind than a scan has by chance
 MARGIN = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
 MOST_CHOSEN = 1_000_000  # samples of a grid whose step is not the user's own
@@ -168,6 +169,22 @@ class MeshObject:
 
         mesh = pv.PolyData.from_regular_faces(self.points, self.triangles).decimate(1 - 10_000 / len(self.triangles))
         return np.asarray(mesh.points, dtype=float), mesh.regular_faces.astype(np.int64)
+
+    def sharp_facets(self, width: float) -> str:
+        """What there is to say of wide facets that stay sharp though they may be meant as round; mostly nothing.
+
+        ``width`` is that of a facet that a pad feels [m].
+        """
+        smooth = self._smooth
+        edges, off = smooth.doubtful(width)
+        if len(edges) < FEWEST_FACETS:
+            return ""
+        turn = np.degrees(smooth.turn[edges])
+        return (
+            f"{len(edges)} edges between wide facets turn by {turn.min():.3g} to {turn.max():.3g} degrees and stay"
+            f" sharp; if these are facets of a round surface, it lies up to {1e3 * off.max():.2g} mm outside them:"
+            f" raise object.crease_angle_deg above {np.ceil(turn.max()):.0f}, or export a finer mesh"
+        )
 
     @cached_property
     def _tree(self) -> TriangleTree:

@@ -21,6 +21,8 @@ from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
+AT_ANGLE = 1e-5  # of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
+SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
 PARALLEL = 0.02  # sine of the angle below which two normals at a crease have no line in common
 FINEST = 8  # pieces of an edge
 MOST_PIECES = 250_000  # triangles of one refined sheet
@@ -42,6 +44,8 @@ class SmoothTriangles:
         The two inner Bezier points of each edge [m].
     crease : (e,) array of bool
         Edges that turn by more than the crease angle.
+    turn : (e,) array
+        Angle between the two triangles of each edge [rad].
     """
 
     points: FloatArray
@@ -50,6 +54,22 @@ class SmoothTriangles:
     edge_of: IntArray
     inner: FloatArray
     crease: np.ndarray
+    turn: FloatArray
+
+    def doubtful(self, width: float) -> tuple[IntArray, FloatArray]:
+        """Creases that may be facets of a smooth surface: those ``(k,)`` below `SHARP` between wide triangles.
+
+        The second array ``(k,)`` is how far that surface would lie from the facets [m]. ``width`` is what both
+        triangles measure at least across their edge [m].
+        """
+        x = self.points[self.triangles]
+        area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+        length = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
+        narrower = np.full(len(self.edges), np.inf)
+        np.minimum.at(narrower, self.edge_of, 2.0 * area[:, None] / np.maximum(length[self.edge_of], 1e-300))
+        found = np.flatnonzero(self.crease & (self.turn < np.radians(SHARP)) & (narrower >= width))
+        # an arc over chords of this length that turn by this angle
+        return found, narrower[found] * self.turn[found] / 8.0
 
     def bulge(self, which: IntArray) -> FloatArray:
         """How far the middle of each edge of the triangles ``which`` lies from its chord, ``(k,)`` [m]."""
@@ -125,9 +145,9 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     a, b, c = points[triangles].transpose(1, 0, 2)
     area = np.cross(b - a, c - a)
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
-    turn = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
+    cosine = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
     # an edge at the very angle is a crease, whatever rounding makes of it
-    crease = turn < np.cos(np.radians(crease_angle)) + 1e-9
+    crease, turn = cosine < np.cos(np.radians(crease_angle)) + AT_ANGLE, np.arccos(np.clip(cosine, -1.0, 1.0))
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(key), 2, 3))
     for end in (0, 1):
@@ -136,7 +156,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
         own = np.where(starts, halves, _following(halves))
         p, q = points[ordered[first][:, end]], points[ordered[first][:, 1 - end]]
         inner[:, end] = p + _tangent(q - p, corner_normals[own[:, 0]], corner_normals[own[:, 1]]) / 3
-    return SmoothTriangles(points, triangles, ordered[first], edge.reshape(-1, 3), inner, crease)
+    return SmoothTriangles(points, triangles, ordered[first], edge.reshape(-1, 3), inner, crease, turn)
 
 
 def _following(halves: IntArray) -> IntArray:

@@ -19,6 +19,8 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import in_si
 
+FACET = 0.25  # of a pad's shorter side: narrower facets are hardly felt
+
 
 def geometry() -> Any:
     """The module that builds what needs compiled loops; most scenes are checked and planned without it."""
@@ -172,9 +174,11 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def told(scene: Scene) -> list[str]:
-    """Lines with all `warnings`, and notes on what of a mesh was mended or tolerated, which nobody need act on."""
-    meshes = dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh")
-    notes = [f"note: {shape.mesh}: {note}" for shape in meshes for note in geometry().mesh_object(shape).notes]
+    """Lines with all `warnings`, and notes on meshes: what was mended, tolerated, or may be meant otherwise."""
+    notes, width = [], FACET * min(scene.gripper.pad_size[:2])
+    for shape in dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh"):
+        mesh = geometry().mesh_object(shape)
+        notes += [f"note: {shape.mesh}: {text}" for text in (*mesh.notes, mesh.sharp_facets(width)) if text]
     return [*(f"warning: {text}" for text in warnings(scene)), *notes]
 
 

@@ -128,9 +128,10 @@ def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0
     hit = {name: far for name, far in reach.items() if far > jaws.pad[2] + doubt}
     if not hit:
         return Fit(opening)
-    far = " and ".join(f"{shown_text(v, 'm', DIGITS)} behind the face of its pad for {name}" for name, v in hit.items())
+    far = " and ".join(f"{shown_text(v, 'm', DIGITS)} beside that of {name}" for name, v in hit.items())
     thick, size = shown_text(jaws.pad[2], "m", DIGITS), " x ".join(shown_text(v, "m", DIGITS) for v in jaws.finger)
-    return Fit(opening, COLLIDES, f"the object reaches {far}, which begins {thick} behind it and is {size} large")
+    text = f"the object reaches past the pad's face, {far}; the finger, {size}, begins {thick} behind it"
+    return Fit(opening, COLLIDES, text)
 
 
 def stiffness(gripper: Gripper) -> float:

@@ -231,7 +231,7 @@ def _no_grasps(plan: Plan) -> str:
     for state in NO_GRASP:
         units = [unit for unit in plan.units if unit.state == state]
         count = sum(len(unit.rows) for unit in units)
-        found += [f"{count} of {plan.served} candidates {STATES[state]}: {units[0].reason}"] if units else []
+        found += [f"{count} of {plan.served} {STATES[state]}: {units[0].reason}"] if units else []
     return "; ".join(found)
 
 

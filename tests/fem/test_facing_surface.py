@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import facing_sheet
@@ -309,3 +310,28 @@ def test_nothing_is_seen_from_behind():
     pose = side(0.0, np.pi, -0.02)
     sheet = facing_sheet(mesh._smooth, mesh._tree, mesh.lids, pose, BOX + 0.001, 1e-3)
     assert len(sheet.sheet.triangles)
+
+
+def test_the_twelve_edges_of_a_cylinder_in_single_precision_are_all_creases():
+    """They turn by the crease angle itself, which rounding must not decide edge by edge."""
+    for turn in np.linspace(0.0, 0.5, 8):
+        body = trimesh.creation.cylinder(30.0, 100.0, sections=12)
+        body.apply_transform(trimesh.transformations.rotation_matrix(turn, [0.3, 0.2, 1.0]))
+        points = body.vertices.astype(np.float32).astype(float)
+        assert smooth_triangles(points, np.asarray(body.faces), 30.0).crease.sum() == 36
+
+
+@pytest.mark.parametrize(("sections", "told"), [(11, True), (12, True), (13, False), (48, False)])
+def test_wide_facets_that_stay_sharp_are_told_with_what_they_hide(sections, told):
+    body = trimesh.creation.cylinder(radius=0.025, height=0.1, sections=sections)
+    smooth = smooth_triangles(body.vertices, body.faces)
+    edges, off = smooth.doubtful(0.0055)
+    assert len(edges) == sections * told
+    if told:  # the arc over a chord
+        np.testing.assert_allclose(off, 0.025 * (1 - np.cos(np.pi / sections)), rtol=0.02)
+    assert bool(MeshObject(body.vertices, body.faces).sharp_facets(0.0055)) == told
+
+
+def test_edges_of_a_box_and_narrow_facets_are_not_told():
+    for body in (trimesh.creation.box((0.04, 0.06, 0.1)), trimesh.creation.cylinder(0.008, 0.1, sections=11)):
+        assert not len(smooth_triangles(body.vertices, body.faces).doubtful(0.0055)[0])

@@ -23,6 +23,11 @@ not among the best that the scene asks for. A candidate is solved if all its for
 and Model Set (see `tests/objects/scans`); with holes: three patches of triangles are missing; spoiled: one triangle
 in a hundred is flipped, some are doubled or degenerate, and no two share a vertex.
 """
+PICTURE = """![best grasps](objects.png)
+
+See-through blocks are the pads of the best grasp, their faces in the colours of the pressure; balls are where the
+fingers of all candidates first touch, in the colours of quality. A title has the middle between the pads, azimuth and
+elevation of the approach, and the quality."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -87,7 +92,7 @@ def page(objects: Sequence[Found], scenes: Sequence[Found], seed: int) -> str:
     return "\n".join([
         INTRODUCTION, share_line(objects), "",
         f"{len(objects) - len(slow)} of {len(objects)} maps took less than {SECONDS:g} s of CPU.", "",
-        table(HEAD, [object_row(f) for f in objects]), "", "![best grasps](objects.png)", "",
+        table(HEAD, [object_row(f) for f in objects]), "", PICTURE, "",
         f"## {len(scenes)} random scenes, seed {seed}", "", share_line(scenes), "",
         table(("kind", "scenes", "solved", "median CPU s", "longest"), kind_rows(scenes)), "",
         "## Failures", "",

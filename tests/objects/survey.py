@@ -17,6 +17,7 @@ import subprocess
 import sys
 from argparse import ArgumentParser, Namespace
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 from softjaw.study.messages import DONE, SOME_FAILED, StudyError
@@ -38,21 +39,32 @@ def spent() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def said(words: list[str], folder: Path, limit: float) -> tuple[int | None, str]:
-    """Exit code and output of a command; no code if it was stopped at the time limit [s], with all that it started."""
-    log = folder / "command.log"
+def spent_by(session: int) -> float:
+    """CPU time of the processes of a session [s]; `mpirun` that is told to stop does not wait for all of them."""
+    total = 0
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            fields = file.read_text().rpartition(")")[2].split()
+            total += sum(map(int, fields[11:13])) if int(fields[3]) == session else 0
+    return total / os.sysconf("SC_CLK_TCK")
+
+
+def said(words: list[str], folder: Path, limit: float) -> tuple[int | None, str, float]:
+    """Exit code, output and CPU time [s] of a command; no code if it was stopped at the time limit [s]."""
+    log, before = folder / "command.log", spent()
     with log.open("w") as out:
         process = subprocess.Popen(words, cwd=folder, stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
     try:
-        return process.wait(limit), log.read_text(errors="replace")
+        return process.wait(limit), log.read_text(errors="replace"), spent() - before
     except subprocess.TimeoutExpired:
-        process.terminate()  # alone: mpirun passes it on, and waits for its ranks
+        used = spent_by(process.pid)
+        process.terminate()  # alone: mpirun passes it on
     try:
         process.wait(GRACE)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    return None, log.read_text(errors="replace")
+    return None, log.read_text(errors="replace"), max(used, spent() - before)
 
 
 def file_name(name: str) -> str:
@@ -69,14 +81,14 @@ def survey_object(name: str, kind: str, make: Maker, options: Namespace) -> Foun
         old.unlink(missing_ok=True)
     init = [SOFTJAW, "init", "mesh", "--mesh", f"{file}.stl", "--unit", "m", "-o", file, "--force"]
     run = [*shlex.split(options.mpirun), SOFTJAW, "run", f"{file}.toml", "-o", result.name]
-    found, start = Found(name, kind), spent()
+    found = Found(name, kind)
     for words in (init, run):
-        code, text = said(words, folder, options.limit)
+        code, text, seconds = said(words, folder, options.limit)
+        found.seconds += seconds
         if code not in (DONE, SOME_FAILED):
             end = f"stopped at the time limit of {options.limit:g} s" if code is None else f"exit code {code}"
             found.refused = f"{end}: {text[-SAID:]}"
             break
-    found.seconds = spent() - start
     if result.exists():
         try:
             found.states, found.failures = of_file(result)
@@ -88,7 +100,7 @@ def survey_object(name: str, kind: str, make: Maker, options: Namespace) -> Foun
 
 def look_at(file: str, folder: Path, limit: float) -> str:
     """Show, report and view a result; what is said of its best grasp."""
-    code, text = said([SOFTJAW, "show", f"{file}.hdf", "--json", "--top", "1"], folder, limit)
+    code, text, _ = said([SOFTJAW, "show", f"{file}.hdf", "--json", "--top", "1"], folder, limit)
     said([SOFTJAW, "report", f"{file}.hdf", "-o", f"{file}.html"], folder, limit)
     said([SOFTJAW, "view", f"{file}.hdf", "--screenshot", f"{file}.png"], folder, limit)
     best = json.loads(text)["grasps"] if code == DONE else []

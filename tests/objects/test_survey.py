@@ -85,8 +85,11 @@ def test_what_was_found_is_kept(tmp_path):
 
 @pytest.mark.launches
 def test_a_command_that_hangs_is_stopped(tmp_path):
-    assert said(["sleep", "60"], tmp_path, 0.1) == (None, "")
-    assert said(["false"], tmp_path, 10.0) == (1, "")
+    assert said(["sleep", "60"], tmp_path, 0.1)[:2] == (None, "")
+    code, _, seconds = said(["sh", "-c", "while :; do :; done"], tmp_path, 0.4)
+    assert code is None
+    assert seconds > 0.05
+    assert said(["false"], tmp_path, 10.0)[:2] == (1, "")
 
 
 @pytest.mark.long

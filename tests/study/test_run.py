@@ -102,6 +102,9 @@ def test_what_is_no_grasp_is_never_solved_and_no_failure(once, shared_path):
     assert code == 0, errors
     wide = [i for i, s in enumerate(once(states, path)) if s == WIDE]
     assert len(wide) == 6
+    alone = shared_path / "wide-alone.hdf"
+    assert once(study, 0, alone, "--wide", 3)[0] == 0
+    assert once(differing, path, once(contents, alone)) == []
     assert once(study, 0, path, "--wide", 3, "--retry-failed")[0] == 0
     assert [i for i, s in enumerate(once(states, path)) if s != DONE] == wide
     with open_result(path) as result:

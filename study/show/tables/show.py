@@ -19,6 +19,7 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
 from softjaw.study.show.tables.ranking import borne_level, judged, nearest, passed_over, ranking
+from softjaw.study.show.tables.status import no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -79,7 +80,7 @@ def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines:
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
     answer = verdict(sure(ds, scored[0], k), holding, same, scored[1])
-    answer = " ".join(filter(None, [answer, _passed_over(score[done], flags[done])]))
+    answer = " ".join(filter(None, [answer, _passed_over(score[done], flags[done]), _left_out(ds, k)]))
     return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), answer)
 
 
@@ -98,6 +99,12 @@ def _passed_over(score: np.ndarray, flags: np.ndarray) -> str:
         return ""
     count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
     return f"{count} higher but cannot be used and stand last: {why}"
+
+
+def _left_out(ds: xr.Dataset, k: int) -> str:
+    """Which candidates were not solved because they are no grasp."""
+    found = no_grasps(ds.status.values[..., k])
+    return f"not solved: {', '.join(found)}; 'softjaw status' says why" if found else ""
 
 
 def _level(ds: xr.Dataset, flags: np.ndarray, force: float | None) -> tuple[int, str]:

@@ -45,6 +45,7 @@ def status_json(result: Any) -> str:
     found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
     found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"added_stations_mm": [list(some) for some in result.layout.added]}
+    found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
     return json.dumps(found, indent=2)
 
