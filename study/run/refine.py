@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[float, ...], ...]  # stations that each round added [mm]
+SCORE = "quality"  # the map that grasps are ranked by
 STEEPER = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
 TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
@@ -96,8 +97,8 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     return np.where(h >= 2 * finest * (1 - MARGIN), found, 0.0)
 
 
-def chances_in(result: Any, score: str = "quality") -> FloatArray:
-    """`chances` of a result file; ``score`` is the map that grasps are ranked by, CCM where it has several models."""
+def chances_in(result: Any, score: str = SCORE) -> FloatArray:
+    """`chances` of a result file by a map, CCM where it has several models."""
     values = _cases(result, result.read(f"{score}/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     done = _cases(result, result.status) == DONE
