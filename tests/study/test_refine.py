@@ -162,7 +162,7 @@ def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_p
         scene.write_text(SCENE)
         alone, _ = run("alone.hdf", 0)
         with open_result(alone) as result:
-            assert len(result.layout.added) == 3
+            assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6  # 12 cases on a round body
             best = result.read("quality/ccm")[..., -1].max()
         assert best > 0.6  # 0.19 at the scene's own stations
         expected = contents(alone)
@@ -171,7 +171,7 @@ def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_p
         # First without, then with refinement: what is solved stays.
         late, first = run("late.hdf", 2, "--set", "candidates.refine=false")
         assert "round" not in first
-        assert "8 of 28 cases to solve" in run("late.hdf", 2)[1]
+        assert "0 of 20 cases to solve" in run("late.hdf", 2)[1]
         assert differing(late, expected) == []
         assert "0 of 44 cases to solve" in run("alone.hdf", 2)[1]
 
