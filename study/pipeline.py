@@ -62,8 +62,14 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
     return CaseResult(
-        values, patch, flag_sentences(values["maps/flags"]), effects_of(Simulated(scene, fine, fits, solving))
+        values, patch, _notes(values["maps/flags"], fine), effects_of(Simulated(scene, fine, fits, solving))
     )
+
+
+def _notes(flags: int, contacts: Sequence[PressedContact]) -> str:
+    """What there is to know of a case: its flags, and what it took to solve it."""
+    own = dict.fromkeys(note for c in contacts for note in c.state.notes)
+    return "; ".join(text for text in (flag_sentences(flags), *own) if text)
 
 
 def _probed(result: CaseResult, probing: Probing, note: str) -> CaseResult:

@@ -154,7 +154,7 @@ TABLE = (
              " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
              " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3),
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
-             symbol="safety", needs="mass"),
+             symbol="safety", needs="mass", rank=13),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
              "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
              " many motions.", symbol="fitted", rank=9),
@@ -381,6 +381,7 @@ TABLE = (
 )  # fmt: skip
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
+RANKED_BY = ("payload", "quality", "e_n", "epsilon")  # what grasps can be ranked by
 FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
 

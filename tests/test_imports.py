@@ -50,7 +50,7 @@ DOORS = {
 # everything, and imports what a command needs when it runs.
 ORDER = (
     "messages", "units", "flags", "quantities", "pictures", "templates", "page",
-    "scene", "case", "pipeline", "result", "run", "accuracy", "lookup", "export", "patch", "show",
+    "scene", "case", "pipeline", "result", "ranking", "run", "accuracy", "lookup", "export", "patch", "show",
     "doctor", "cli",
 )  # fmt: skip
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from softjaw.study.messages import MEANING, first_rank
+from softjaw.study.quantities import RANKED_BY
 
 KINDS = {
     "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
@@ -190,8 +191,10 @@ def _add_result_options(made: dict[str, Any]) -> None:
         form = made[name].add_mutually_exclusive_group(required=name == "export")
         form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
         form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
-    made["show"].add_argument("--force", type=_positive, metavar="N", help="force level nearest to N [N] (default: the "
-                              "highest, or the highest that some grasp holds and its wall bears)")  # fmt: skip
+    made["show"].add_argument("--force", type=_positive, metavar="N", help="normal force [N], solved or between two "
+                              "solved ones (default: the lowest that holds the object, else the largest)")  # fmt: skip
+    made["show"].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where the "
+                              "scene has a mass or the direction of a weight, else quality)")  # fmt: skip
     made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
                                  "(default e_n)")  # fmt: skip
     for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):

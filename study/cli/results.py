@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.messages import OTHER_FILE, StudyError, write_file
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, write_file
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import dataset, open
 from softjaw.study.result.store import open_result, torn_rows
@@ -29,7 +29,11 @@ def watch(options: Namespace) -> int:
 
 def show(options: Namespace) -> str:
     """Print the best grasps."""
-    table = best(open(options.file), options.force, options.top, whole_lines=options.form is None)
+    whole = options.form is None
+    try:
+        table = best(open(options.file), options.force, options.top, whole, options.by)
+    except ValueError as error:
+        raise StudyError(USAGE, f"{options.file}: --force: {error}") from error
     forms = {"json": as_json, "csv": as_csv}
     return forms[options.form](table) if options.form else as_text(table, terminal_width())
 

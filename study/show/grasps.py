@@ -14,10 +14,10 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import BORNE, LOST, Flag, flags_in
+from softjaw.study.flags import LOST, Flag, flags_in
 from softjaw.study.quantities import MODELS
+from softjaw.study.ranking import judged, ranking, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.show.tables.ranking import borne_level, judged, ranking
 from softjaw.study.units import shown, shown_unit
 
 Index = tuple[int, ...]
@@ -52,20 +52,16 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
-    """The dataset with judged flags (`study.show.tables.ranking.judged`) and four decisions as attributes.
+    """The dataset with judged flags (`study.ranking.judged`) and five decisions as attributes.
 
-    ``score``: the map that grasps are ranked by; ``level``: the highest force level with a solved case that its wall
-    bears, if there is one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for.
+    ``score``: the map that grasps are ranked by; ``level`` and ``why``: the force level that is shown, and why it is
+    that one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for.
     """
-    flags, status = judged(ds), ds.status.values
+    flags = judged(ds)
     found = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
-    level = borne_level(status, flags) if (flags & BORNE).any() else None
-    # Where every force is too weak or too strong, the highest solved one is shown.
-    if level is None:
-        solved = np.flatnonzero((status == DONE).reshape(-1, status.shape[-1]).any(axis=0))
-        level = int(solved[-1]) if solved.size else status.shape[-1] - 1
-    about = {"title": ds.attrs["title"] or Path(ds.attrs["file"]).stem, "level": level, "chosen": chosen}
-    found = found.assign_attrs(about, score="e_n" if field(ds, "quality") is None else "quality")
+    level, why = shown_level(ds, flags)
+    about = {"title": ds.attrs["title"] or Path(ds.attrs["file"]).stem, "level": level, "why": why, "chosen": chosen}
+    found = found.assign_attrs(about, score=score_of(ds))
     return found.assign_attrs(best=next(iter(order(found, level)), None))
 
 

@@ -16,9 +16,9 @@ from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.quantities import MODELS
+from softjaw.study.ranking import largest
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, field
-from softjaw.study.show.tables.ranking import largest
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface
 PLANES = ((0, 1), (0, 2), (1, 2))

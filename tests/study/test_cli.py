@@ -218,7 +218,7 @@ def test_status_tells_counts_reasons_and_sessions(finished, capsys):
 def test_the_best_grasp_is_the_one_with_the_highest_quality(finished, capsys):
     rows = {i: fake_result(first) for unit in fake_plan().units for first, i in shared_rows(unit)}
     forces = fake_plan().layout.axes[-1].values
-    for force, k in ((5.0, 2), (1.9, 1)):
+    for force, k in ((5.0, 2), (2.0, 1)):
         quality = {i: r.values["maps/quality"][0] for i, r in rows.items() if i % 3 == k}
         expected = sorted(quality, key=lambda i: -quality[i])[:4]
         assert main(["show", str(finished), "--force", str(force), "--top", "4", "--json"]) == 0
@@ -245,9 +245,15 @@ def test_show_writes_a_table_that_programs_read(finished, capsys):
     assert (np.diff(quality) <= 0).all()
     assert main(["show", str(finished), "--force", "1", "--top", "0"]) == 0
     text = capsys.readouterr().out.splitlines()
-    assert text[0] == "best 11 of 11 solved candidates at 1 N"
+    text = text[text.index("") + 1 :]
+    assert text[0] == "best 11 of 11 solved candidates by quality at 1 N"
     assert text[1].split()[0] == "station"
     assert text[2].split()[:2] == ["rank", "[mm]"]
+    assert main(["show", str(finished), "--force", "0.5"]) == 2
+    assert "0.5 N was not solved" in capsys.readouterr().err
+    assert main(["show", str(finished), "--by", "e_n", "--json"]) == 0
+    e_n = [g["e_n"] for g in json.loads(capsys.readouterr().out)["grasps"]]
+    assert e_n == sorted(e_n, reverse=True)
 
 
 def test_schema_is_json(capsys):

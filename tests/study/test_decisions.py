@@ -42,7 +42,7 @@ def moved(values, seed):
 @tries
 @given(scores, seeds)
 def test_equal_grasps_keep_their_order(values, seed):
-    from softjaw.study.show.tables.ranking import falling, largest, ranking
+    from softjaw.study.ranking import falling, largest, ranking
 
     flags = np.random.default_rng(seed).choice([0, 1024], len(values))
     assert ranking(moved(values, seed), flags).tolist() == ranking(np.array(values), flags).tolist()
@@ -55,7 +55,7 @@ def test_equal_grasps_keep_their_order(values, seed):
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
     from softjaw.study.case.result import TIE
-    from softjaw.study.show.tables.ranking import falling
+    from softjaw.study.ranking import falling
 
     order = falling(np.array(values))
     assert sorted(order.tolist()) == list(range(len(values)))
@@ -66,7 +66,7 @@ def test_a_ranking_is_one(values):
 @tries
 @given(st.floats(0.1, 50.0), st.floats(1e-3, 10.0), seeds)
 def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
-    from softjaw.study.show.tables.ranking import nearest
+    from softjaw.study.ranking import nearest
 
     forces = low + step * np.arange(4)
     wanted = moved([low + 1.5 * step], seed)[0]
@@ -126,7 +126,7 @@ def test_a_window_ends_at_the_same_force(values, seed):
 @given(seeds)
 def test_a_grasp_that_just_holds_is_not_too_weak(seed):
     from softjaw.study.flags import Flag
-    from softjaw.study.show.tables.ranking import judged
+    from softjaw.study.ranking import judged
 
     factor = moved([[2.0, 2.0, 1.8, 2.2]], seed)
     over = ("angle", "normal_force")

@@ -379,7 +379,7 @@ def plane(x):
 
 shape = PadShape((0.05, 0.022, 0.015), (4, 4, 2), (1.0, 1.0, 1.0), "hex8")
 [state] = Press(Pad(shape, material("blatz_ko", 4e4), (True, True), "weighted"), plane).load_path([5.0])
-print(state.closing displacement)
+print(state.closing)
 """
 
 

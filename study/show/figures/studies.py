@@ -9,11 +9,11 @@ import xarray as xr
 
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
+from softjaw.study.ranking import largest
 from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.figures.contacts import outline
 from softjaw.study.show.grasps import WIDE, field, forces, number, place
-from softjaw.study.show.tables.ranking import largest
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View, read_scene
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study import pictures
+from softjaw.study.ranking import nearest
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.grasps import Index, at, axis_text, field, forces, number
 from softjaw.study.show.stored_surface import (
@@ -21,7 +22,6 @@ from softjaw.study.show.stored_surface import (
     sphere,
     stored_surface,
 )
-from softjaw.study.show.tables.ranking import nearest
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 from softjaw.study.page import Block, label, plot
 from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, NO_GRASP, PARTS, STATES
+from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
     Index,
@@ -27,7 +28,6 @@ from softjaw.study.show.grasps import (
     unravelled,
 )
 from softjaw.study.show.report.tables import note
-from softjaw.study.show.tables.ranking import largest
 
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",

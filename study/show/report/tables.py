@@ -11,6 +11,7 @@ from softjaw.study.flags import flags_in
 from softjaw.study.page import Block, bullets, details, table, text, verbatim
 from softjaw.study.quantities import DONE, EFFECTS, FAILED, MISSING, MODEL_NAMES, NO_GRASP, PARTS, REASONS
 from softjaw.study.quantities import STATES as OF_CASES
+from softjaw.study.ranking import largest
 from softjaw.study.run.progress import duration
 from softjaw.study.show.grasps import (
     ABOVE,
@@ -34,10 +35,9 @@ from softjaw.study.show.grasps import (
 )
 from softjaw.study.show.report.verdict import VALUES, listed, safe_range, value
 from softjaw.study.show.tables.overview import RULE, wall_text
-from softjaw.study.show.tables.ranking import largest
 
-HEADS = dict(zip(VALUES, ("quality", "quality, fitted", "e_n [mm]", "max f_x [N]", "max f_y [N]", "max tau_z [N mm]"),
-                 strict=True))  # fmt: skip
+HEADS = dict(zip(VALUES, ("payload [g]", "quality", "quality, fitted", "e_n [mm]", "max f_x [N]", "max f_y [N]",
+                          "max tau_z [N mm]"), strict=True))  # fmt: skip
 BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
 STATES = {DONE: "solved", FAILED: "failed", MISSING: "missing"} | {state: OF_CASES[state] for state in NO_GRASP}
@@ -69,7 +69,8 @@ def best_grasps(ds: xr.Dataset) -> list[Block]:
             shown.append(index)
             merged |= set(_turned(ds, index))
     rows = [[_with_angles(ds, index), *_row(ds, index)] for index in shown]
-    caption = f"Best grasps at {number(forces(ds)[k])} N per finger, candidates solved: {len(ranked)} (CCM)"
+    at_force = f"at {number(forces(ds)[k])} N per finger, candidates solved: {len(ranked)} (CCM)"
+    caption = f"Best grasps by {ds.attrs['score']} {at_force}"
     found = [table(caption, heads, rows, texts=(0,), wide=(len(heads) - 1,), first=True)]
     tops = [order(ds, level)[:1] for level in range(len(forces(ds)))]
     if len(tops) > 1:

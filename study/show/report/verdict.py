@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import xarray as xr
 
 from softjaw.study.flags import BORNE
 from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
+from softjaw.study.ranking import largest, passed_over
 from softjaw.study.show.grasps import (
     Index,
     at,
@@ -30,9 +32,9 @@ from softjaw.study.show.grasps import (
     spoken,
     unit_of,
 )
+from softjaw.study.show.tables.answer import answer, force_to_use
 from softjaw.study.show.tables.certainty import sure
 from softjaw.study.show.tables.certainty import verdict as judgement
-from softjaw.study.show.tables.ranking import largest, passed_over
 from softjaw.study.show.tables.show import as_text
 from softjaw.study.show.tables.show import best as best_table
 from softjaw.study.show.tables.status import no_grasps
@@ -51,7 +53,7 @@ WITH_INTERVALS = (
     "± is the half-width of the interval within which about 95 of 100 cases lie, in per cent of the value; it has the"
     " parts that [uncertainty] in the scene asks for."
 )
-VALUES = ("quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
+VALUES = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 # of the plain text in the file
 TOP, MOST_REASONS, MOST_PLACES, WIDTH = 5, 10, 3, 120
 READING = """How to read the file
@@ -90,7 +92,8 @@ def verdict(ds: xr.Dataset, mu: float | None) -> list[str]:
         cases = f"All {total} cases are solved." if total > 1 else "It is the only case of this study."
     if best is None:
         return [f"No grasp is solved. {cases}"]
-    first = [_best(ds, best), *_apart(ds, best), _carried(ds, best, mu), *_weight(ds, best)]
+    told = answer(ds, best)
+    first = [f"{told[0].upper()}{told[1:]}.", _best(ds, best), *_apart(ds, best), _carried(ds, best, mu)]
     wall = [text] if (text := wall_sentence(ds, best)) else []
     return [*first, *wall, *_planar(ds, best), *_passed_over(ds, best), *_other_force(ds, best), cases]
 
@@ -100,12 +103,14 @@ def key_values(ds: xr.Dataset) -> list[tuple[str, str]]:
     best = ds.attrs["best"]
     if best is None:
         return []
-    pairs = [("where", place(ds, best)), ("how hard", f"{_force(ds, best).replace(' ', NBSP)} per finger")]
+    low, error = force_to_use(ds, best)
+    hard = f"{number(low)}{f' ± {number(error, 2)}' * bool(np.isfinite(error))} N" if low > 0 else _force(ds, best)
+    pairs = [("where", place(ds, best)), ("how hard", f"{hard.replace(' ', NBSP)} per finger")]
     if np.isfinite(opening := at(ds, "opening", best)):
         pairs.insert(1, ("how wide (opening at first touch)", f"{number(1e3 * opening, 4)}\u00a0mm"))
     if "force_high" in ds:
         pairs.append(("safe forces [N]", safe_range(ds, best)))
-    names = {"quality": "grasp quality", "e_n": "e_n [mm]", "safety_factor": "safety factor"}
+    names = {"payload": f"holds at {_force(ds, best)} [g]", "quality": "grasp quality", "e_n": "e_n [mm]"}
     return pairs + [(text, value(ds, n, best, 3)) for n, text in names.items() if np.isfinite(at(ds, n, best))]
 
 
@@ -116,7 +121,7 @@ def _force(ds: xr.Dataset, index: Index) -> str:
 def _best(ds: xr.Dataset, best: Index) -> str:
     score, lengths = ds.attrs["score"], ds.status.shape
     what = f"quality {value(ds, 'quality', best, 3)}"
-    if score != "quality":
+    if score == "e_n":
         what = "ranked by e_n, for no quality is stored"
     if not np.isfinite(at(ds, score, best)):
         what = "which has no score"
@@ -125,7 +130,9 @@ def _best(ds: xr.Dataset, best: Index) -> str:
     swept = "Best point of the sweep" if max(lengths[:-3], default=1) > 1 else "The grasp"
     name = "Best grasp" if max(lengths[-3:-1]) > 1 else swept
     e_n = f"e_n {value(ds, 'e_n', best, 3)}{' mm' * bool(np.isfinite(at(ds, 'e_n', best)))}"
-    return f"{name} at {_force(ds, best)} per finger: {place(ds, best)}, {what}, {e_n}.{same}"
+    ranked = f"ranked by {score} at this force, {ds.attrs['why']}" * bool(score != "e_n")
+    text = f"{name} at {_force(ds, best)} per finger: {place(ds, best)}, {what}, {e_n}"
+    return f"{'; '.join(filter(None, [text, ranked]))}.{same}"
 
 
 def _carried(ds: xr.Dataset, best: Index, mu: float | None) -> str:
@@ -142,17 +149,8 @@ def _apart(ds: xr.Dataset, best: Index) -> list[str]:
     score, shape = ds.attrs["score"], ds.status.shape[:-1]
     usable = [candidate_of(ds, i) for i in order(ds, best[-1]) if not lost(ds, i) and np.isfinite(at(ds, score, i))]
     places = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    text = judgement(sure(ds, score, best[-1]), usable, places, "m" * (score == "e_n")).replace("+-", "±")
+    text = judgement(sure(ds, score, best[-1]), usable, places, ds[score].attrs.get("units", "")).replace("+-", "±")
     return [f"{text[0].upper()}{text[1:]}."] if text else []
-
-
-def _weight(ds: xr.Dataset, index: Index) -> list[str]:
-    """How many times its own weight the object could have, where its mass is known."""
-    factor = at(ds, "safety_factor", index)
-    if not np.isfinite(factor):
-        return []
-    what = f"The grasp holds {number(factor)} times the object's weight at this force (CCM)"
-    return [f"{what}." if factor >= 1 else f"{what}: it would lose the object."]
 
 
 def bounds(ds: xr.Dataset, index: Index) -> tuple[float | None, float]:
@@ -232,6 +230,8 @@ def _other_force(ds: xr.Dataset, best: Index) -> list[str]:
     if top[-1] == best[-1] or not at(ds, score, top) > at(ds, score, best) * (1 + 1e-3):
         return []
     _, unit, factor = quantity(ds, score)
+    if score == "payload":  # it grows with the force, which says nothing
+        return []
     what = "quality, a score per unit of normal force," if score == "quality" else score
     most = f"{number(at(ds, score, top) * factor)} {unit}".rstrip()
     return [f"Over all forces {what} is largest at {place(ds, top, force=True)}: {most}."]
@@ -312,14 +312,16 @@ def plain_report(ds: xr.Dataset, mu: float | None) -> str:
     """
     named, ds = ds.attrs["title"], judge(ds)
     size = subtitle(ds).partition(": ")[2]
-    table = [as_text(best_table(ds, top=TOP, whole_lines=True), WIDTH)] if ds.attrs["best"] else []
+    found = replace(best_table(ds, top=TOP, whole_lines=True), answer="")  # it stands above
+    table = [as_text(found, WIDTH)] if ds.attrs["best"] else []
     notes = "\n".join(line for state in (FAILED, *NO_GRASP, DONE) for line in _notes(ds, state))
     answer = "\n".join([*verdict(ds, mu), *warnings(ds), meaning(ds)]).strip()
     parts = [f"{named}: {size}" if named else size, answer, *table, notes, READING,
              CAVEAT.replace("the scene below", "/study/scene")]  # fmt: skip
-    lines = "\n\n".join(part for part in parts if part).replace("\xa0", " ").splitlines()
-    text = "\n".join(textwrap.fill(line, WIDTH) if len(line) > WIDTH else line for line in lines) + "\n"
-    return text.replace("\N{DEGREE SIGN}", " deg").replace("\N{MULTIPLICATION SIGN}", "x")  # h5dump escapes them
+    whole = "\n\n".join(part for part in parts if part).replace("\xa0", " ")
+    # h5dump escapes these signs; their names are longer, so they come before the lines are filled
+    whole = whole.replace("\N{DEGREE SIGN}", " deg").replace("\N{MULTIPLICATION SIGN}", "x")
+    return "\n".join(textwrap.fill(x, WIDTH) if len(x) > WIDTH else x for x in whole.splitlines()) + "\n"
 
 
 def _notes(ds: xr.Dataset, state: int) -> list[str]:

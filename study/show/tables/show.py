@@ -12,13 +12,14 @@ import numpy as np
 import xarray as xr
 from rich.cells import cell_len
 
-from softjaw.study.flags import BORNE, LOST, OF_FILE, flag_words, flags_in
+from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
+from softjaw.study.ranking import between, judged, passed_over, ranking, score_of, shown_level
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
+from softjaw.study.show.tables.answer import answer
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
-from softjaw.study.show.tables.ranking import borne_level, judged, nearest, passed_over, ranking
 from softjaw.study.show.tables.status import no_grasps
 from softjaw.study.units import shown, shown_unit
 
@@ -31,14 +32,16 @@ INTERVAL_MEANS = (
 )
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 FLAGS_WIDTH, LABEL_WIDTH = 18, 28
+RESERVED = {"map": 7, "flags": 13}  # characters of a column
 
 
 @dataclass(frozen=True)
 class Table:
-    """Grasps in the order of their quality at one force [N]: names and units of the columns, and the rows.
+    """Grasps from the best one downward at one force [N]: names and units of the columns, and the rows.
 
     An error stands behind the quantity it belongs to, relative unless the column has a unit; an interval is in the unit
-    of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors.
+    of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors, ``answer``
+    what to do with it.
     """
 
     title: str
@@ -46,20 +49,28 @@ class Table:
     rows: tuple[tuple[Any, ...], ...]
     force: float
     verdict: str = ""
+    answer: str = ""
 
 
-def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines: bool = False) -> Table:
-    """The ``top`` grasps (0: all) at the force level nearest to ``force`` [N].
+def best(
+    ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines: bool = False, by: str | None = None
+) -> Table:
+    """The ``top`` grasps (0: all) at a force [N], by default that of `study.ranking.shown_level`.
 
-    The default is the highest level, or the highest at which a grasp is within its safe force range where there is one.
-    With ``whole_lines`` images of one grasp, which share a line of `as_text`, count as one.
+    Between two solved forces values lie on straight lines. ``by`` names the map that grasps are ranked by. With
+    ``whole_lines`` images of one grasp, which share a line of `as_text`, count as one.
+
+    Raises
+    ------
+    ValueError
+        For a force outside of the solved ones.
     """
+    ds, k, why = _at(ds, force)
     axes, flags = axes_of(ds), judged(ds)
     forces, shape = axes[-1].values, ds.status.shape[:-1]
-    k, why = _level(ds, flags, force)
     maps = {(name, unit): found[..., k].ravel() for name, unit, found in _columns(ds)}
-    scored = next(c for c in (("quality", ""), ("e_n", "m")) if c[0] == "e_n" or np.isfinite(maps[c]).any())
-    score = maps[scored]
+    scored = score_of(ds, by)
+    score = values_of(ds, scored)[..., k].ravel()
     done = np.flatnonzero(ds.status.values[..., k].ravel() == DONE)
     flags = flags[..., k].ravel()
     order = done[ranking(score[done], flags[done])]
@@ -74,14 +85,29 @@ def best(ds: xr.Dataset, force: float | None = None, top: int = 10, whole_lines:
         return (rank, *place, *([str(labels[i])] * len(named)), *values, int(flags[i]))
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
-    what = f"best {len(rows)} of {len(done)} solved candidates" if rows else "no candidate is solved"
-    if not rows:
-        why += _solved_elsewhere(ds)
+    what = f"best {len(rows)} of {len(done)} solved candidates by {scored}" if rows else "no candidate is solved"
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    answer = verdict(sure(ds, scored[0], k), holding, same, scored[1])
-    answer = " ".join(filter(None, [answer, _passed_over(score[done], flags[done]), _left_out(ds, k)]))
-    return Table(f"{what} at {forces[k]:g} N{why}", titles, tuple(rows), float(forces[k]), answer)
+    errors = verdict(sure(ds, scored, k), holding, same, ds[scored].attrs.get("units", ""))
+    errors = " ".join(filter(None, [errors, _passed_over(score[done], flags[done]), _left_out(ds, k)]))
+    title = f"{what} at {forces[k]:g} N{why}{'' if rows else _solved_elsewhere(ds)}"
+    first = (*(int(i) for i in np.unravel_index(order[0], shape)), k) if rows else None
+    told = "" if first is None else answer(ds, first)
+    return Table(title, titles, tuple(rows), float(forces[k]), errors, told)
+
+
+def _at(ds: xr.Dataset, force: float | None) -> tuple[xr.Dataset, int, str]:
+    """The dataset at a force [N], the number of its level, and in words why it is that one."""
+    forces = ds.normal_force.values
+    if force is None:
+        k, why = shown_level(ds, judged(ds))
+        return ds, k, f", {why}"
+    near = np.flatnonzero(np.isclose(forces, force))
+    if near.size:
+        return ds, int(near[0]), ""
+    at = between(ds, force)
+    low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
+    return at, 0, f", by straight lines from {low:g} to {high:g} N"
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:
@@ -105,18 +131,6 @@ def _left_out(ds: xr.Dataset, k: int) -> str:
     """Which candidates were not solved because they are no grasp."""
     found = no_grasps(ds.status.values[..., k])
     return f"not solved: {', '.join(found)}; 'softjaw status' says why" if found else ""
-
-
-def _level(ds: xr.Dataset, flags: np.ndarray, force: float | None) -> tuple[int, str]:
-    """Number of the force level that is shown, and why where that is not plain."""
-    forces = ds.normal_force.values
-    if force is not None:
-        k = nearest(forces, force)
-        return k, "" if np.isclose(force, forces[k]) else f", the level nearest to {force:g} N"
-    borne = borne_level(ds.status.values, flags) if (flags & BORNE).any() else None
-    if borne is None or borne == len(forces) - 1:
-        return len(forces) - 1, ""
-    return borne, ", the highest that a grasp holds and its wall bears"
 
 
 def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
@@ -144,10 +158,10 @@ def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[
 
 
 def as_json(table: Table) -> str:
-    """One object with the title, the force [N], the units (SI) and a list of grasps; what is not there is null."""
+    """One object with answer, title, the force [N], the units (SI) and a list of grasps; what is not there is null."""
     names = [name for name, _ in table.columns]
     rows = [dict(zip(names, map(_plain, row), strict=True)) for row in table.rows]
-    record = {"title": table.title, "verdict": table.verdict, "force": table.force}
+    record = {"answer": table.answer, "title": table.title, "verdict": table.verdict, "force": table.force}
     record |= {"units": dict(table.columns), "grasps": rows}
     return json.dumps(record, indent=2)
 
@@ -184,13 +198,16 @@ def as_text(table: Table, width: int = PAPER) -> str:
     lines = aligned([heads[i] for i in kept], [[row[i] for i in kept] for row in body], left)
     hidden = [name for i, name in enumerate(names) if i not in kept]
     verdict = [wrapped(table.verdict, width, more="  ")] * bool(table.verdict)
-    return "\n".join([wrapped(table.title, width), *lines, *verdict, *_legend(displayed, hidden, width)])
+    told = [wrapped(table.answer, width, more="  "), ""] if table.answer else []
+    return "\n".join([*told, wrapped(table.title, width), *lines, *verdict, *_legend(displayed, hidden, width)])
 
 
 def _fitting(cells: Sequence[Sequence[str]], names: Sequence[str], width: int) -> list[int]:
     """Numbers of the columns that fit into ``width`` characters, without the least important ones where need be."""
-    columns = zip(*cells, strict=True)
-    sizes = [GAP + max(cell_len(line) for cell in column for line in cell.split("\n")) for column in columns]
+    # room for any number and for most flags, so that the columns are the same at every force
+    room = [RESERVED["flags"] if name == "flags" else RESERVED["map"] * (f"maps/{name}" in BY_KEY) for name in names]
+    columns = [[line for cell in column for line in cell.split("\n")] for column in zip(*cells, strict=True)]
+    sizes = [GAP + max(wide, *map(cell_len, column)) for wide, column in zip(room, columns, strict=True)]
     kept = list(range(len(names)))
     for name in least(names):
         if sum(sizes[i] for i in kept) <= width + GAP:
@@ -205,10 +222,11 @@ def least(names: Sequence[str]) -> list[str]:
     >>> least(["quality", "quality_error", "fit_error", "e_n", "e_n_error", "e_n_pcm", "f_x_max", "f_x_max_error"])
     ['fit_error', 'f_x_max_error', 'f_x_max', 'e_n_pcm', 'quality_error']
     """
-    main = [name for name in reversed(MAIN[2:]) if name in names]
+    main = [name for name in reversed(MAIN[3:]) if name in names]
     errors = [f"{name}_error" for name in main if f"{name}_error" in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
-    return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *(n for n in ("quality_error",) if n in names)]
+    last = [name for name in ("quality_error", MAIN[2]) if name in names]
+    return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
 
 
 def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:

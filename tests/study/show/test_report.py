@@ -321,10 +321,9 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     ("layout", "values", "expected"),
     [
         (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "does not pass its checks: min det f -0.1"),
-        (Layout(SMALL, 0, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "0.5 times the object's weight"),
-        (Layout(SMALL, 0, has=("mass",)), {"maps/safety_factor": [0.5] * 3}, "it would lose the object"),
+        (Layout(SMALL, 0), {"maps/payload": [0.25] * 3}, "press with 3 N per finger: it then holds 250 g"),
     ],
-    ids=["bad check", "weight", "too heavy"],
+    ids=["bad check", "payload"],
 )
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
     with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:

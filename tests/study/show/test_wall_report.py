@@ -16,6 +16,7 @@ from softjaw.study.case import model, wall
 from softjaw.study.case.build import build_object
 from softjaw.study.case.solving import solver
 from softjaw.study.flags import Flag
+from softjaw.study.ranking import borne_level, judged, ranking
 from softjaw.study.result import derived
 from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE, FAILED
@@ -28,7 +29,6 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.show.grasps import at, judge
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
-from softjaw.study.show.tables.ranking import borne_level, judged, ranking
 from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 from softjaw.study.show.view.model import View, read_scene, view_of
 from tests.study.sealing import sealed
@@ -141,14 +141,14 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
 
 def test_show_has_indentations_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
-        text = as_text(best(dataset(result)), 200)
+        text = as_text(best(dataset(result)), 200).partition("\n\n")[2]
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
     assert names.split()[-3:] == ["stress", "force", "range"]
     assert units.split()[-4:] == ["[mm]", "[kPa]", "[N]", "flags"]
     assert "payload" in names
-    assert text.splitlines()[0].endswith("at 1 N, the highest that a grasp holds and its wall bears")
+    assert text.splitlines()[0].endswith("at 1 N, the lowest solved force at which a grasp holds the object")
     assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
     assert "force range: normal forces" in text
     # 3 N dents both stations deeper than 1.5 mm

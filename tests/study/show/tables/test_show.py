@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,8 @@ from softjaw.study.flags import Flag, raised
 from softjaw.study.quantities import MODELS, quantities
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of
-from softjaw.study.show.tables.show import as_csv, as_text, best
+from softjaw.study.show.tables import show
+from softjaw.study.show.tables.show import as_csv, as_json, best
 from softjaw.study.show.tables.status import place, reasons
 
 FORCES = np.array([1.0, 5.0])
@@ -39,6 +41,11 @@ def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
     coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
     coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
     return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": ()})
+
+
+def as_text(table, width=80):
+    """The table below the answer."""
+    return show.as_text(table, width).partition("\n\n")[2]
 
 
 def stored(ds, message):
@@ -95,9 +102,74 @@ def test_a_force_that_is_none_is_bad_usage(force, capsys):
     assert "--force" in capsys.readouterr().err
 
 
-def test_a_force_between_the_levels_is_answered_with_the_nearest():
-    assert best(study([[1.0]]), force=400.0).title.endswith("at 5 N, the level nearest to 400 N")
-    assert best(study([[1.0]]), force=5.0).title.endswith("at 5 N")
+def rising(masses=None, safety=2, flags=0, **more):
+    """Two stations: payload 0.1 and 0.2 kg per newton at 1 and 5 N, quality the other way round."""
+    ds = study([[2.0], [1.0]], flags, needs=["mass"] if masses else (), **more)
+    held = np.array([0.1, 0.2])[:, None, None] * FORCES
+    ds["payload"] = (ds.payload.dims, np.repeat(held[..., None], 3, axis=-1), {"units": "kg"})
+    if masses:
+        ds["safety_factor"] = ds.payload / masses
+        over = ds.status.dims[:-1]
+        force = safety * masses / np.array([[0.1], [0.2]])
+        ds = ds.assign(force_low=(over, np.where(force <= 5, force, np.nan)), force_low_error=(over, 0.01 * force))
+        scene = f"[object]\nmass_g = {1e3 * masses}\n[task]\nsafety = {safety}\nweight_direction = 'worst'"
+        ds = ds.assign_attrs(scene=scene, has=("mass", "task"))
+    return ds
+
+
+def stations(table):
+    return [row[1] for row in table.rows]
+
+
+def test_a_force_between_two_solved_ones_lies_on_straight_lines():
+    names = [name for name, _ in best(rising()).columns]
+    for force, held in ((1.0, 0.2), (2.5, 0.5), (5.0, 1.0)):
+        table = best(rising(), force=force, by="payload")
+        assert table.force == force
+        assert [name for name, _ in table.columns] == names
+        assert table.rows[0][names.index("payload")] == pytest.approx(held, rel=1e-12)
+    for force in (0.9, 5.1):
+        with pytest.raises(ValueError, match=f"{force:g} N was not solved.*1, 5 N"):
+            best(rising(), force=force)
+
+
+def test_between_forces_a_case_needs_both_and_carries_the_flags_of_both():
+    ds = rising()
+    ds.status.values[0, 0, 1] = FAILED
+    ds.flags.values[1, 0, 0], ds.flags.values[1, 0, 1] = Flag.HOLE, Flag.COARSE
+    table = best(ds, force=2.0)
+    assert stations(table) == [1.0]
+    assert table.rows[0][-1] == Flag.HOLE | Flag.COARSE
+    ds.flags.values[1, 0, 1] = Flag.SNAPPED
+    assert not best(ds, force=2.0).rows
+
+
+def test_grasps_are_ranked_by_what_is_named_and_by_payload_where_there_is_a_task():
+    assert stations(best(rising())) == [0.0, 1.0]
+    assert stations(best(rising(), by="payload")) == [1.0, 0.0]
+    assert stations(best(rising(0.3))) == [1.0, 0.0]
+    assert stations(best(rising(0.3), by="quality", force=5.0)) == [1.0, 0.0]  # the other is too weak there
+    assert stations(best(rising(0.1), by="quality")) == [1.0, 0.0]
+    assert stations(best(rising(0.1), by="quality", force=5.0)) == [0.0, 1.0]
+
+
+def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():
+    assert best(rising()).force == 5.0
+    some = rising()
+    some.status.values[0, 0, 1] = FAILED
+    assert best(some).force == 1.0
+    assert best(rising(0.3)).force == 5.0
+    assert best(rising(0.1)).force == 1.0
+    assert best(rising(3.0)).force == 5.0  # none holds it
+
+
+def test_the_answer_says_how_hard_to_press_and_what_is_held():
+    held = best(rising(0.3)).answer
+    assert "press with 3 +- 0.03 N" in held
+    assert "2 times the object's 300 g" in held
+    assert "no solved force holds" in best(rising(3.0)).answer
+    assert "press with 5 N per finger: it then holds 500 g" in best(rising()).answer
+    assert json.loads(as_json(best(rising())))["answer"] == best(rising()).answer
 
 
 def test_the_payload_has_a_column_in_grams():
@@ -118,7 +190,8 @@ def test_a_table_fits_and_names_the_columns_that_it_leaves_out(width):
     table = best(walls)
     lines = as_text(table, width).splitlines()
     assert max(map(len, lines)) <= width
-    heads = f"{lines[1]} {lines[2]}".split()
+    first = next(i for i, line in enumerate(lines) if line.strip().startswith(("rank", "station")))
+    heads = f"{lines[first]} {lines[first + 1]}".split()
     hidden = " ".join(" ".join(lines).split()).partition(f"to fit {width} characters: ")[2]
     absent = hidden.partition(" (")[0].split(", ")
     for name in ("quality", "e_n", "flags", "station"):

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
-from softjaw.study.result.layout import DONE
+from softjaw.study.quantities import DONE, MISSING
 
 IntArray = NDArray[np.int64]
+LARGEST = "the largest that was solved"
 NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 
@@ -24,15 +25,17 @@ def judged(ds: Any) -> IntArray:
     """
     flags = ds["flags"].values.copy()
     if "force_low" in ds:
-        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < safety_of(ds) * (1 - TIE))
+        safety = task_keys(ds).get("safety", 1.0)
+        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < safety * (1 - TIE))
     if "force_high" in ds:
         flags |= Flag.TOO_STRONG * (ds["normal_force"].values > ds["force_high"].values[..., None] * (1 + 1e-9))
     return flags
 
 
-def safety_of(ds: Any) -> float:
-    """How many times its mass the object has to be held, by its scene; 1 where that does not say it."""
-    return float(tomllib.loads(ds.attrs.get("scene", "")).get("task", {}).get("safety", 1.0))
+def task_keys(ds: Any, section: str = "task") -> dict[str, Any]:
+    """Keys of a section of the scene, defaults filled in; nothing where there is no scene."""
+    found: dict[str, Any] = tomllib.loads(ds.attrs.get("scene", "")).get(section, {})
+    return found
 
 
 def falling(values: np.ndarray) -> np.ndarray:
@@ -97,6 +100,75 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
     better = [int(i) for i in order if flags[i] & LOST and score[i] > score[order[0]] * (1 + 1e-3)]
     marks = int(np.bitwise_or.reduce([int(flags[i]) & LOST for i in better])) if better else 0
     return better, " or ".join(flag.word for flag in flags_in(marks))
+
+
+def score_of(ds: Any, by: str | None = None) -> str:
+    """The map that grasps are ranked by: the one that is named, the payload where the scene has a task, else quality.
+
+    A file without a value of it is ranked by quality or e_n.
+    """
+    first = by or ("payload" if "task" in ds.attrs.get("has", ()) else "quality")
+    known = [n for n in (first, "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
+    return known[0] if known else "e_n"
+
+
+def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
+    """Number of the force level at which grasps are ranked, and in words why it is that one.
+
+    Where the object's mass is known the lowest at which a grasp holds it and does no harm; else the highest that most
+    of the solved candidates reached, or that some wall bears.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    flags : array of int
+        As `judged` gives them.
+    """
+    forces, done = ds["normal_force"].values, ds["status"].values == DONE
+    usable = np.flatnonzero(((flags & LOST == 0) & done).reshape(-1, len(forces)).any(axis=0))
+    if "force_low" in ds and len(usable):
+        return int(usable[0]), "the lowest solved force at which a grasp holds the object"
+    if flags[done].any() and (flags[done] & BORNE).any() and (k := borne_level(ds["status"].values, flags)) is not None:
+        return k, "the highest at which a grasp does no harm" if k < len(forces) - 1 else LARGEST
+    by_level = done.reshape(-1, len(forces))
+    if not by_level.any():
+        return len(forces) - 1, LARGEST
+    k = int(np.flatnonzero(by_level.any(axis=0))[-1])
+    # one failed case must not move all grasps to another force, nor a few that went far
+    shared = np.flatnonzero(2 * by_level.sum(axis=0) > by_level.any(axis=1).sum())
+    if len(shared) and shared[-1] < k:
+        return int(shared[-1]), "the largest that most candidates were solved at"
+    return k, LARGEST
+
+
+def between(ds: Any, force: float) -> Any:
+    """The dataset at one force [N] between two solved ones, by straight lines; flags of both.
+
+    A case beside one that is not solved has that one's state; so has one across a snap-in, which is "not computed".
+
+    Raises
+    ------
+    ValueError
+        For a force outside of the solved ones, with what they are.
+    """
+    forces = ds["normal_force"].values
+    if not forces[0] <= force <= forces[-1]:
+        solved = ", ".join(f"{f:g}" for f in forces)
+        raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
+    k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
+    share = (force - forces[k]) / (forces[k + 1] - forces[k])
+    low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
+    found = low.copy()
+    for name in (n for n, v in ds.data_vars.items() if "normal_force" in v.dims):
+        if ds[name].dtype.kind == "f":
+            found[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
+        elif name == "flags":
+            found[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
+    states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
+    across = (low["flags"].values ^ high["flags"].values) & Flag.SNAPPED > 0
+    found["status"] = (ds["status"].dims, np.where(across & (states == DONE), MISSING, states), ds["status"].attrs)
+    found["normal_force"].attrs.update(ds["normal_force"].attrs)
+    return found
 
 
 def borne_level(status: np.ndarray, flags: np.ndarray) -> int | None:
