@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from softjaw.study.case.bed import JawsOnSurface, height_fields
 from softjaw.study.case.fit import Jaws, fit_of
-from softjaw.study.case.sampler import (
-    JawsOnSurface,
-    antipodal_grasps,
-    axes_of,
-    height_fields,
-    same_grasp,
-    with_sampled_grasps,
-)
+from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import SceneError, parse_scene
