@@ -115,7 +115,6 @@ class Side:
         cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
         return float((self.pressure * cosine).sum() / self.pressure.sum())
 
-
     @property
     def bridging(self) -> float:
         """What bearing on the ends, or on several places, leaves of the arm: 1 where the centre of pressure bears too.
