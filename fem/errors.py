@@ -1,8 +1,21 @@
 """What can go wrong in a contact solve, each with a sentence a user can act on."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class ConvergenceError(RuntimeError):
-    """A nonlinear solve stopped without an answer."""
+    """A nonlinear solve stopped without an answer.
+
+    ``end``, where the residual did not fall any more: the last iterate and the norm of the residual there.
+    """
+
+    end: tuple[Any, float] | None = None
+
+
+class SpentError(RuntimeError):
+    """The Newton iterations that one state may take are spent."""
 
 
 class NotReachedError(ConvergenceError):

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import math
 import mmap
 import re
 import sys
@@ -30,7 +31,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from softjaw.fem.assembly import Pattern
-from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.errors import ConvergenceError, SpentError
 
 FloatArray = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -90,6 +91,7 @@ PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 NEAR, FAST = 1e5, 0.05  # see NonlinearSolver
+STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
 RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors
 PRINTING = re.compile("monitor|view|converged_reason")
 
@@ -152,6 +154,11 @@ class NonlinearSolver:
     problem : Problem
     options : dict
         PETSc options with the prefix, as ``{"contact_snes_max_it": 50}``; they override the defaults.
+
+    Attributes
+    ----------
+    left : float
+        Newton iterations that further solves may take in all, failed ones too; a caller sets it.
     """
 
     problem: Problem
@@ -161,7 +168,7 @@ class NonlinearSolver:
     def __post_init__(self) -> None:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
-        self.seconds, self.thrifty = Seconds(), True
+        self.seconds, self.thrifty, self.left = Seconds(), True, math.inf
         self._pattern = self.problem.pattern
         self._stored = self._pattern.start
         self._norms: list[float] = []  # of the residual, at every step of this solve
@@ -220,9 +227,13 @@ class NonlinearSolver:
         ------
         ConvergenceError
             When the solver stops for any other reason.
+        SpentError
+            When none of the iterations that the caller allows is left.
         MemoryError
             When there is no memory for the factors.
         """
+        if self.left <= 0:
+            raise SpentError
         snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
         _, _, _, limit = snes.getTolerances()
         # relative and step tolerances are off, so a solve ends by the force out of balance alone
@@ -240,6 +251,7 @@ class NonlinearSolver:
             ) from error
         finally:
             snes.setTolerances(max_it=limit)
+            self.left -= max(1, snes.getIterationNumber())
             # unknown until this solve has converged: a failed one leaves no solution to start from
             self._end = None
             self.seconds.total += time.perf_counter() - start
@@ -250,12 +262,20 @@ class NonlinearSolver:
             snes.getKSP().getPC().reset()
             raise MemoryError(f"for the factors of {self.problem.size} unknowns")
         if reason <= 0:
-            raise ConvergenceError(
+            failed = ConvergenceError(
                 f"the {self.prefix.rstrip('_')} solve stopped with {REASONS.get(reason, reason)} after {done} "
                 f"iterations at residual {snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
             )
+            if self._stalls():
+                failed.end = self._x.array.copy(), snes.getFunctionNorm()
+            raise failed
         self._end = self._x.array.copy()
         return self._end.copy(), done
+
+    def _stalls(self) -> bool:
+        """Whether the residual has not fallen any more for some iterations, as where an active set alternates."""
+        before, after = self._norms[:-STALLED], self._norms[-STALLED:]
+        return len(before) >= STALLED and min(after) > FAST * min(before)
 
     def _out_of_memory(self) -> bool:
         factors = self._snes.getKSP().getPC()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -102,12 +103,17 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
     return better, " or ".join(flag.word for flag in flags_in(marks))
 
 
+def asked_score(has: Collection[str]) -> str:
+    """The map that grasps are ranked by unless another is named, from what the scene asks for (`quantities.NEEDS`)."""
+    return "payload" if "task" in has else "quality"
+
+
 def score_of(ds: Any, by: str | None = None) -> str:
     """The map that grasps are ranked by: the one that is named, the payload where the scene has a task, else quality.
 
     A file without a value of it is ranked by quality or e_n.
     """
-    first = by or ("payload" if "task" in ds.attrs.get("has", ()) else "quality")
+    first = by or asked_score(ds.attrs.get("has", ()))
     known = [n for n in (first, "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
     return known[0] if known else "e_n"
 

@@ -11,8 +11,10 @@ from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
 from softjaw.fem.pad.foam import FloatArray, Foam
 
 BALANCE = 1e-8  # of the normal force
-PENETRATION = 1e-9  # of an element's size
-ADHESION = COMPLEMENTARITY = 1e-8  # of the largest pressure, of that times an element's size
+# of an element's size, of the largest pressure, of their product: a hundred times what the tolerance of the solve
+# leaves at the smallest contacts of practice, and far below what a result can show
+PENETRATION = ADHESION = COMPLEMENTARITY = 1e-6
+NEAR = 1e-4  # the same four where the nodes in contact alternate for ever: still far below the error of any mesh
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
 TOO_MUCH = 0.7  # strain beyond which not the contact is what fails
 MOST_FALL = 0.05  # of the closing displacement from one force to the next: weighted and nodal gaps differ by less
@@ -41,7 +43,7 @@ class Checks:
 
 def check(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
-    residual: float,
+    residual: float, slack: float = 0.0,
 ) -> Checks:  # fmt: skip
     """Measures of a pad's state ``x`` at a normal force [N] on the whole pad.
 
@@ -56,6 +58,8 @@ def check(
         Largest force out of balance at a node, of the whole pad [N].
     force, residual : float
         The normal force [N], and the part of it that a node may be out of balance.
+    slack : float
+        What every law of the contact may be off by at least, `NEAR` or nothing.
 
     Raises
     ------
@@ -80,13 +84,19 @@ def check(
         ellipticity=ellipticity,
     )
     for kept, broken in (
-        (checks.force_balance <= BALANCE, f"force balance is off by {checks.force_balance:.1e} of the force"),
-        (checks.adhesion <= ADHESION, f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
-        (checks.penetration <= PENETRATION, f"the pad penetrates the object by {-gap.min():.3g} m"),
-        (checks.complementarity <= COMPLEMENTARITY, "pressure and gap are both positive at a node"),
+        (
+            checks.force_balance <= max(BALANCE, slack),
+            f"force balance is off by {checks.force_balance:.1e} of the force",
+        ),
+        (checks.adhesion <= max(ADHESION, slack), f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
+        (checks.penetration <= max(PENETRATION, slack), f"the pad penetrates the object by {-gap.min():.3g} m"),
+        (checks.complementarity <= max(COMPLEMENTARITY, slack), "pressure and gap are both positive at a node"),
         (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
         # a caller that loosens the tolerance of the solve loosens this check with it, and no other
-        (left_over <= max(BALANCE, residual) * force, f"a node of the foam is out of balance by {left_over:.3g} N"),
+        (
+            left_over <= max(BALANCE, residual, slack) * force,
+            f"a node of the foam is out of balance by {left_over:.3g} N",
+        ),
     ):
         if not kept:
             raise CheckError(f"the state at {force:.4g} N converged but is wrong: {broken}")

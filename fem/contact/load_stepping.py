@@ -30,9 +30,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.checks import BALANCE
+from softjaw.fem.contact.checks import BALANCE, NEAR
 from softjaw.fem.contact.problem import ContactProblem, Control
-from softjaw.fem.errors import ConvergenceError, NotReachedError
+from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
@@ -41,6 +41,7 @@ MOST_STEPS = 60  # under displacement control, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
 MOST_FAILURES = 20  # under displacement control, for one force
 FIRST_TRIES = 12
+DROP = 0.5  # of the force: what is left of it less than that after a step of closing has jumped
 FALL = 1e-6  # of the force: less is the rounding of a plateau, see `falls`
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
 LONGEST = 0.2  # foretold closing displacement of one step
@@ -99,11 +100,11 @@ class LoadPath(ABC):
         """Make `solver` for the problem as it is now."""
 
     def _start_again(self) -> None:
-        """Set up another solver after a change of the problem; its clock continues."""
-        seconds = self.solver.seconds
+        """Set up another solver after a change of the problem; clock and iterations that are left go on."""
+        seconds, left = self.solver.seconds, self.solver.left
         self.solver.destroy()
         self._set_up()
-        self.solver.seconds = seconds
+        self.solver.seconds, self.solver.left = seconds, left
 
     def _stopwatch(self) -> Callable[[], Seconds]:
         """Where the time goes from now on."""
@@ -155,6 +156,10 @@ class Stepping:
         Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
     watch : callable
         Called with every new state and its force [N]; what it raises ends the load path.
+    near : callable
+        Whether the iterate that a failed solve ended at keeps the laws of contact to `NEAR` and may pass as a state.
+    deepest : float
+        Closing displacement at which the backing plate would be in a rigid object [m].
     """
 
     problem: DrivenProblem
@@ -167,7 +172,11 @@ class Stepping:
     floor: float = 0.0
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
+    near: Callable[[FloatArray], bool] = lambda x: False
+    deepest: float = np.inf
     jumped: bool = False  # whether a step is known to have left the path of equilibria
+    off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
+    closed: bool = False  # whether displacement control was needed
 
     def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
@@ -175,13 +184,23 @@ class Stepping:
         scale = control.force if control.force is not None else self.force_scale(control.closing)
         self.solver.thrifty = self.floor <= BALANCE * scale * self.share  # or states would fail their checks
         work.steps += 1
+        self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
             x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor), most)
-        except ConvergenceError:
+            work.iterations += iterations
+        except ConvergenceError as error:
+            x, self.off = error.end or (x, np.inf)
+            self.off /= scale * self.share
+            # `not <=`: a residual that is not a number is not near
+            if not self.off <= NEAR or not self.near(x):
+                work.halvings += 1
+                raise
+        closing = self.problem.closing(x)
+        # in equilibrium, but no pad has come there
+        if closing >= self.deepest:
             work.halvings += 1
-            raise
-        work.iterations += iterations
+            raise ConvergenceError(f"the backing plate would be in the object, {1e3 * closing:.4g} mm from first touch")
         return x
 
     def step_to(
@@ -214,9 +233,10 @@ class Stepping:
 
         The forces of the steps are appended to ``forces``.
         """
-        problem, failures = self.problem, 0
+        problem, failures, self.closed = self.problem, 0, True
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
         step, low = min(0.02 * self.thickness, longest), (x, problem.normal_force(x))
+        peak = low[1], problem.closing(x)
         shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
         for _ in range(MOST_STEPS):
             try:
@@ -225,15 +245,33 @@ class Stepping:
                 # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
                     return self._land(low, high, force, work)
+                if high[1] < DROP * low[1]:
+                    raise ConvergenceError(f"the pad jumps to a state of {high[1]:.4g} N")
                 self.watch(*high)
                 if forces is not None:
                     forces.append(high[1])
-                low, step = high, min(1.5 * step, longest)
+                low, step, peak = high, min(1.5 * step, longest), max(peak, (high[1], problem.closing(high[0])))
+            except SpentError:
+                if falls([peak[0], low[1]]):
+                    raise self._limit(peak, low, force) from None
+                raise
             except ConvergenceError as error:
                 step, failures = 0.5 * step, failures + 1
                 if step < shortest or failures > MOST_FAILURES:
+                    if falls([peak[0], low[1]]):
+                        raise self._limit(peak, low, force) from error
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
+        if falls([peak[0], low[1]]):
+            raise self._limit(peak, low, force)
         raise NotReachedError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {MOST_STEPS} steps")
+
+    def _limit(self, peak: tuple[float, float], low: State, force: float) -> NotReachedError:
+        """What to say where the force has a maximum: its force [N] and closing displacement [m], and the last state."""
+        return NotReachedError(
+            f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement of "
+            f"{1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * self.problem.closing(low[0]):.4g} mm, a "
+            "limit point of the pad on this mesh; whether a finer mesh moves it was not tried"
+        )
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
         """State at ``force`` between two on the path; Newton's method may jump to one further on, which is refused."""

@@ -2,9 +2,10 @@
 
 A force that Newton's method does not reach in one step is approached by step halving, then by displacement control
 until the force is bracketed. Where that fails and a fallback pad with other gaps is given, the load path continues with
-that one, from first contact. A pad with weighted gaps leaves its path to one with nodal gaps sooner, before
-displacement control and where it jumps: weighted gaps couple neighbouring pressures, and a pad's rim on a steep slope
-can fold or make their active set cycle for ever. Every state that is passed on has converged and has been checked.
+that one, from first contact: nodal gaps let a small object slip between the nodes, so that the force stays low. A pad
+with weighted gaps leaves its path to one with nodal gaps sooner, before displacement control and where it jumps: they
+couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever. Every
+state that is passed on has converged and has been checked. One force gets no more than `MOST_ITERATIONS` in all.
 """
 
 from __future__ import annotations
@@ -16,15 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.checks import Checks, check, explained, refuse_fall
+from softjaw.fem.contact.checks import NEAR, Checks, check, explained, refuse_fall
 from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap, SpringBed
-from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
+MOST_ITERATIONS = 300  # of Newton's method for one force, all attempts together; usual ones take 6 to 15
+AGREE = 0.1  # of the closing displacement: the other pad's path is not the same one where they differ by more
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class Pressed:
         Whether the pad has jumped before: another load path may lead to another state.
     instead : bool
         Whether the fallback pad was taken.
+    notes : tuple of str
+        Which means beside Newton's method on steps of the force it took.
     """
 
     force: float
@@ -65,19 +70,21 @@ class Pressed:
     seconds: Seconds
     path_dependent: bool = False
     instead: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def pressed(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
     settings: Settings, work: Work, seconds: Seconds, path_dependent: bool = False, instead: bool = False,
+    notes: tuple[str, ...] = (), slack: float = 0.0,
 ) -> Pressed:  # fmt: skip
     """State of one pad that has passed its checks; parameters as in ``fem.contact.checks.check``."""
     pad, (pressure, _, points) = foam.pad, state
-    checks = check(foam, x, state, left_over, force, settings.residual)
+    checks = check(foam, x, state, left_over, force, settings.residual, slack)
     contact_face = (pad.nodes + pad.displacement(x))[pad.contact_nodes]
     return Pressed(
         force, float(x[pad.closing_dof]), x, pad, pressure, contact_face, points, checks, work.iterations, work.steps,
-        work.halvings, seconds, path_dependent, instead,
+        work.halvings, seconds, path_dependent, instead, notes,
     )  # fmt: skip
 
 
@@ -114,7 +121,7 @@ class Press(LoadPath):
 
     def __post_init__(self) -> None:
         """Set up the solver."""
-        self._wanted = self.pad
+        self._wanted, self._last = self.pad, (np.zeros(self.pad.size), 0.0)
         super().__post_init__()
 
     @property
@@ -128,12 +135,33 @@ class Press(LoadPath):
         self.solver = NonlinearSolver(self.problem, self.options)
         self._stepping = self.stepping(
             self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
-            self._bed.force_scale, self.pad.rounding, watch=self._remember,
+            self._bed.force_scale, self.pad.rounding, watch=self._remember, near=self._near,
+            deepest=self.pad.shape.size[2],
         )  # fmt: skip
 
+    def _near(self, x: FloatArray) -> bool:
+        """Whether an iterate that no solve has ended at keeps all laws of contact to `NEAR`."""
+        # vinewtonrsls has another residual, which says nothing of pressures at their bounds
+        if self.problem.complementarity or not np.isfinite(left_over := self._left_over(x)):
+            return False
+        force, state = self.problem.normal_force(x), self.problem.contact_state(x)
+        if not force > 0.0:
+            return False
+        try:
+            check(self.problem.foam, x, state, left_over, force, self.settings.residual, NEAR)
+        except CheckError:
+            return False
+        return True
+
+    def _left_over(self, x: FloatArray) -> float:
+        """Largest force out of balance at a node, of the whole pad [N]."""
+        # rows of displacements and closing alone; those of pressures are judged as gap and adhesion
+        return float(np.abs(self.problem.residual(x)[: self.pad.closing_dof + 1]).max() / self.pad.share)
+
     def _remember(self, x: FloatArray, force: float) -> None:
-        """Keep the last state in equilibrium, which shows why there is none beyond."""
-        self._last = x, force
+        """Keep the state of the largest force in equilibrium, which shows why there is none beyond."""
+        if force >= self._last[1]:
+            self._last = x, force
         self.problem.accept(x)
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Pressed]:
@@ -147,42 +175,87 @@ class Press(LoadPath):
         x, reached = None, 0.0
         for force in forces:
             work, elapsed, below = Work(), self._stopwatch(), x
+            self._stepping.closed = False
             try:
-                x = self._step_to(x, reached, force, work)
-            except ConvergenceError:
-                if self.fallback is None:
-                    raise
-                # the path of one pad does not lead to states of the other, so it starts afresh
-                x = self._from_first_contact(self.fallback, force, work)
+                x = self._next(x, reached, force, work)
+            except SpentError as error:
+                spent = f"given up after {MOST_ITERATIONS} Newton iterations"
+                text = f"stuck at {self._last[1]:.4g} N of {force:.4g} N: {spent}"
+                raise self._explained(ConvergenceError(text)) from error
             # the solver cannot see this: both states are in equilibrium and may pass their own checks
             if below is not None:
                 refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
-            # rows of displacements and closing alone; those of pressures are judged as gap and adhesion
-            left_over = np.abs(self.problem.residual(x)[: self.pad.closing_dof + 1]).max() / self.pad.share
-            state = self.problem.contact_state(x)
+            steps, state = self._stepping, self.problem.contact_state(x)
             yield pressed(
-                self.problem.foam, x.copy(), state, left_over, force, self.settings, work, elapsed(),
-                self._stepping.jumped, self.pad is not self._wanted,
+                self.problem.foam, x.copy(), state, self._left_over(x), force, self.settings, work, elapsed(),
+                steps.jumped, self.pad is not self._wanted, self._notes(), NEAR if steps.off else 0.0,
             )  # fmt: skip
 
-    def _from_first_contact(self, other: Pad, force: float, work: Work) -> FloatArray:
-        """State at ``force`` of the other pad, else of one with weighted gaps beyond a jump, from first contact on.
+    def _notes(self) -> tuple[str, ...]:
+        """Which means beside Newton's method on steps of the force the last state took."""
+        steps, notes = self._stepping, []
+        if self.pad is not self._wanted:
+            notes.append(f"solved with {self.pad.contact} gaps, {self._wanted.contact} ones had no solution")
+        if steps.closed:
+            notes.append("reached by displacement control")
+        if steps.off:
+            notes.append(f"nodes in contact alternate, taken at a residual of {steps.off:.1e} of the force")
+        return tuple(notes)
 
-        All forces that follow keep to the pad that was found to serve.
+    def _explained(self, error: ConvergenceError) -> ConvergenceError:
+        """The error, or one that names the foam's state in the last equilibrium where that is the reason."""
+        return explained(error, self.problem.foam, *self._last)
+
+    def _next(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
+        """State at ``force`` from the one at ``reached`` [N]."""
+        self.solver.left = MOST_ITERATIONS
+        if self.fallback is None:
+            return self._step_to(x, reached, force, work)
+        # half of the iterations is for the other means
+        self.solver.left -= MOST_ITERATIONS // 2
+        try:
+            return self._step_to(x, reached, force, work)
+        except (ConvergenceError, SpentError) as error:
+            self.solver.left += MOST_ITERATIONS // 2
+            below = None if x is None else (reached, self.problem.closing(x))
+            # the path of one pad does not lead to states of the other, so it starts afresh
+            return self._from_first_contact(below, force, work, error)
+
+    def _from_first_contact(
+        self, below: tuple[float, float] | None, force: float, work: Work, failed: Exception
+    ) -> FloatArray:
+        """State at ``force`` of the other pad, else of the pad itself beyond a jump, from first contact on.
+
+        All forces that follow keep to the pad that was found to serve. ``below`` are force [N] and closing displacement
+        [m] of the last state, which the path has to meet, or it is another one.
         """
         # no fallback from here on, so that displacement control may take over and jumps are passed
-        pads = (other,) if self._leads else (other, self.pad)
-        self.fallback, errors = None, []
+        pads = (self.fallback,) if self._leads else (self.fallback, self.pad)
+        self.fallback, errors = None, [failed]
         for pad in pads:
+            assert pad is not None
             self.pad = pad
             self._start_again()
             try:
-                return self._step_to(None, 0.0, force, work)
+                return self._through(below, force, work)
             except ConvergenceError as error:
                 errors.append(error)
-        # the other pad's: what failed for the pad itself has failed once before
-        raise errors[0]
+        # a limit that was seen is the reason; else what stopped the other pad
+        limits = [error for error in errors if isinstance(error, NotReachedError)]
+        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps lead further, a finer mesh was not tried"
+        raise (NotReachedError if limits else ConvergenceError)(text) from errors[1]
+
+    def _through(self, below: tuple[float, float] | None, force: float, work: Work) -> FloatArray:
+        """State at ``force`` [N] from first contact on, through the force of the state ``below``."""
+        if below is None:
+            return self._step_to(None, 0.0, force, work)
+        reached, closing = below
+        x = self._step_to(None, 0.0, reached, work)
+        differs = abs(self.problem.closing(x) - closing) > AGREE * closing
+        x = self._step_to(x, reached, force, work)
+        self._stepping.jumped |= differs
+        return x
 
     def _step_to(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
@@ -197,4 +270,4 @@ class Press(LoadPath):
                 x, reached = self._stepping.step_to(x, reached, goal, work, by_displacement=self._leads), goal
             return x
         except ConvergenceError as error:
-            raise explained(error, self.problem.foam, *self._last) from error
+            raise self._explained(error) from error

@@ -62,7 +62,7 @@ class ContactPoints:
     position, normal : (faces, points, 3) arrays
         Deformed points [m] and the object's outward normals there.
     depth : float
-        How far the deepest Gauss point of the contact face is inside the object [m]; the solve keeps the nodes outside,
+        How far the deepest Gauss point of the contact face is inside the object [m]; the solve keeps nodes outside,
         each by itself or with the weighted mean round it, not every point.
     load : (faces, points) array
         Contact pressure times reference area [N].
@@ -324,7 +324,7 @@ class ContactProblem(PressedPad):
         weighted_gap = self._contact(x, tangent=False)
         pressure = borne(self.pressure(x), self.active(x[self.pressures], weighted_gap))
         # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
-        between = self.gap(self.points(x, self.pad.gauss_N).reshape(-1, 3))[0]
+        between = self.gap(self.points(x, self.pad.between_N).reshape(-1, 3))[0]
         depth = max(0.0, -float(between.min()))
         points = ContactPoints(self._points, self._normal, depth, self.loads(pressure))
         return pressure, weighted_gap / self.area, points

@@ -60,8 +60,8 @@ class Pad:
         Nodes of the facets of the contact face.
     face_N, face_area : (points, face nodes), (m, points) arrays
         Shape functions and reference areas [m^2] at the quadrature points of the contact face.
-    gauss_N : (points, face nodes) array
-        Shape functions at the Gauss points of the contact face, which are those above where gaps are weighted.
+    between_N : (points, face nodes) array
+        Shape functions where the contact face may be inside the object although the solve has closed its gaps.
     side_weights : (points along a side,) array
         Weights of that quadrature along one side of a face.
     """
@@ -138,7 +138,8 @@ class Pad:
         area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
         self.contact = contact
         self.face_N, self.side_weights = _face_rule(per_side, contact)
-        self.gauss_N, _ = _face_rule(per_side, "weighted")
+        # at the same places whatever the rule, so that the depths of both compare
+        self.between_N, _ = _face_rule(per_side, "weighted")
         self.face_area = np.outer(area, np.outer(self.side_weights, self.side_weights))
         self.node_area = np.bincount(
             self.pressure_index[self.face_nodes].ravel(),

@@ -63,9 +63,13 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
         Length and width of the rectangle, along x and y [m].
     """
     half = 0.5 * np.array(sides)
-    corners = points[triangles]
-    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-    corners = corners[((low <= half) & (high >= -half)).all(axis=1)]
+    # side by side of the rectangle: most triangles are off one of them, and need not be gathered
+    near = np.ones(len(triangles), dtype=bool)
+    for k in (0, 1):
+        for beyond in (points[:, k] > half[k], points[:, k] < -half[k]):
+            a, b, c = triangles.T
+            near &= ~(beyond[a] & beyond[b] & beyond[c])
+    corners = points[triangles[near]]
     z = np.concatenate([_inside(corners, half), _on_sides(corners, half), _on_corners(corners, half)])
     return (float(z.min()), float(z.max())) if z.size else (math.inf, -math.inf)
 

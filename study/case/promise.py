@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import NoContactError
+from softjaw.study.case.bed import JawsOnSurface
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import STANDOFF, Unit
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import jaws_of
-from softjaw.study.case.sampler import JawsOnSurface, judged
 from softjaw.study.quantities import MISSING, SLIPS, WORSE
 from softjaw.study.scene import Scene
 
@@ -26,7 +26,7 @@ MOST_JUDGED = 2000  # units whose order of work is looked at where the scene doe
 
 @dataclass(frozen=True)
 class Promise:
-    """What a bed of springs says of a grasp: torque arm of the weaker finger [m], lean of the contacts' line [rad].
+    """What a bed of springs says of a grasp: `bed.JawsOnSurface.quality` [m], lean of the contacts' line [rad].
 
     ``rim`` tells whether a pad bears on its rim alone.
     """
@@ -44,7 +44,7 @@ def promise(surface: Any, unit: Unit) -> Promise | None:
         grip = JawsOnSurface(surface, point, pose.rotation, jaws)
         _, lean = grip.misalignment
         centres = np.abs([side.centre for side in grip.sides]) / jaws.pad[:2]
-        return Promise(judged(grip).quality, lean, bool((centres > RIM).any()))
+        return Promise(grip.quality, lean, bool((centres > RIM).any()))
     except NoContactError:
         return None
 

@@ -1,9 +1,5 @@
 """Antipodal grasps of any triangle surface: sampled, set straight, ranked on a spring foundation, thinned.
 
-A gripper closes along a line, so what each pad meets is a height field over its face: of every line along the approach
-the first point of the object from one side and from the other. Both fields come from one pass over the triangles. They
-need no closed mesh and no normals, and inner walls or thin parts behind do not count.
-
 From points of the surface the gripper is turned and shifted until both pads meet the object squarely and in their
 middles. A bed of springs gives the pressures that rank them; nothing is solved. What is wider than the opening, runs
 into the fingers or slips comes with that state.
@@ -16,15 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NoContactError
+from softjaw.study.case.bed import JawsOnSurface, Side
 from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.candidates import across, pad_axes
-from softjaw.study.case.contact import angle, slips
-from softjaw.study.case.fit import Jaws, bed_closing, fit_of, jaws_of
+from softjaw.study.case.contact import slips
+from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
@@ -33,7 +29,6 @@ from softjaw.study.units import converted
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-GRID = (25, 11)  # points of a pad's face along length and width
 SAMPLES = 300  # points of the surface from which grasps are looked for
 TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
@@ -41,8 +36,7 @@ CENTRED = 5e-4  # shift between two rounds that ends them [m]
 FLATTEST = 0.05  # relative difference of principal curvatures below which the long side follows the object's own axes
 APART = 0.25  # of the pad's length: grasps that are nearer, and alike in direction, are one
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
-STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
-WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of a grasp
+LEAST = 0.02  # of the best grasp's quality, below which a grasp is not proposed
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,7 @@ class SampledGrasp:
     opening : float
         Distance of the pads' faces at first touch [m].
     quality : float
-        Torque arm of the weaker finger, less what curvature and misalignment take, for ranking [m].
+        `bed.JawsOnSurface.quality`, for ranking [m].
     state : int
         Why it is not worth a solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
     """
@@ -71,128 +65,11 @@ class SampledGrasp:
     state: int = MISSING
 
 
-@njit(cache=True)
-def height_fields(points, triangles, x, y):
-    """Lowest and highest z of a surface over the grid ``x (m,)`` times ``y (n,)``: two ``(m, n)`` arrays.
-
-    Infinite (positive in the lowest, negative in the highest) where a line along z misses every triangle. ``points
-    (k, 3)`` are in the frame of the grid, whose steps are even.
-    """
-    m, n = len(x), len(y)
-    low, high = np.full((m, n), np.inf), np.full((m, n), -np.inf)
-    dx, dy = x[1] - x[0], y[1] - y[0]
-    for t in range(len(triangles)):
-        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-        left, right = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
-        near, far = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-        if right < x[0] or left > x[-1] or far < y[0] or near > y[-1]:
-            continue
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area == 0.0:  # seen from its edge: its neighbours have the line
-            continue
-        first, last = max(0, math.ceil((left - x[0]) / dx)), min(m - 1, math.floor((right - x[0]) / dx))
-        start, stop = max(0, math.ceil((near - y[0]) / dy)), min(n - 1, math.floor((far - y[0]) / dy))
-        for i in range(first, last + 1):
-            for j in range(start, stop + 1):
-                u = ((b[0] - x[i]) * (c[1] - y[j]) - (b[1] - y[j]) * (c[0] - x[i])) / area
-                v = ((c[0] - x[i]) * (a[1] - y[j]) - (c[1] - y[j]) * (a[0] - x[i])) / area
-                w = 1.0 - u - v
-                if u >= -1e-12 and v >= -1e-12 and w >= -1e-12:
-                    z = u * a[2] + v * b[2] + w * c[2]
-                    low[i, j], high[i, j] = min(low[i, j], z), max(high[i, j], z)
-    return low, high
-
-
 def axes_of(approach: FloatArray, along: FloatArray) -> FloatArray:
     """`pad_axes`; where ``along`` is the approach itself, the long side follows the axis that lies most across it."""
     if np.linalg.norm(along - (along @ approach) * approach) < 1e-6:
         along = np.eye(3)[np.argmin(np.abs(approach))]
     return pad_axes(approach, across(approach, along))
-
-
-class Side:
-    """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
-
-    def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
-        self.touch = float(np.min(height))
-        self.height = height - self.touch
-        self.x, self.y = np.meshgrid(x, y, indexing="ij")
-        self.cell = (x[1] - x[0]) * (y[1] - y[0])
-        depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
-        self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
-        filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
-        self.slope = np.stack(np.gradient(filled, x, y), axis=-1)
-        # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
-        edge = np.abs(self.slope).max(axis=-1) > STEEPEST
-        self.slope[edge] = 0.0
-
-    @property
-    def centre(self) -> FloatArray:
-        """Centre of pressure on the face ``(2,)`` [m]."""
-        total = self.pressure.sum()
-        return np.array([(self.pressure * self.x).sum(), (self.pressure * self.y).sum()]) / total
-
-    @property
-    def normal(self) -> FloatArray:
-        """Mean direction into the object in the pad's frame, weighted by pressure; z is the approach ``(3,)``."""
-        mean = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
-        # the height grows where the surface recedes: its outward normal leans towards that side
-        direction = np.array([-mean[0], -mean[1], 1.0])
-        return direction / np.linalg.norm(direction)
-
-    @property
-    def arm(self) -> float:
-        """Mean distance of the pressure from its centre: e_n of a planar contact [m]."""
-        cx, cy = self.centre
-        return float((self.pressure * np.hypot(self.x - cx, self.y - cy)).sum() / self.pressure.sum())
-
-    @property
-    def kept(self) -> float:
-        """Share of the pressure sum that acts along the approach: what curvature leaves of the normal force."""
-        cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
-        return float((self.pressure * cosine).sum() / self.pressure.sum())
-
-
-class JawsOnSurface:
-    """Both pads on a surface, in one pose of the gripper."""
-
-    def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
-        self.point, self.axes, self.jaws = point, axes, jaws
-        length, width, _ = jaws.pad
-        x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
-        local = (surface[0] - point) @ axes
-        self.local, self.triangles = np.ascontiguousarray(local), surface[1]
-        low, high = height_fields(self.local, self.triangles, x, y)
-        if not np.isfinite(low).any():
-            raise NoContactError("the pad passes the object")
-        # finger 2 looks against the approach, with its short side reversed
-        self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
-
-    @property
-    def opening(self) -> float:
-        """Distance of the pads' faces at first touch [m]."""
-        return -self.sides[0].touch - self.sides[1].touch
-
-    @property
-    def tilt(self) -> FloatArray:
-        """Approach that meets both contacts squarely, in the frame of the gripper ``(3,)``."""
-        one, two = (side.normal for side in self.sides)
-        mean = one + np.array([two[0], -two[1], two[2]]) * [-1.0, -1.0, 1.0]
-        return mean / np.linalg.norm(mean)
-
-    @property
-    def shift(self) -> FloatArray:
-        """From the middle of the pads to the middle of both centres of pressure ``(2,)`` [m]."""
-        one, two = (side.centre for side in self.sides)
-        return 0.5 * (one + two * [1.0, -1.0])
-
-    @property
-    def misalignment(self) -> tuple[float, float]:
-        """Angle between one contact normal and the other reversed, and of their line to a normal [rad]."""
-        one, two = self.sides[0].normal, self.sides[1].normal * [1.0, -1.0, -1.0]
-        (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
-        line = np.array([u - x, -v - y, self.opening])
-        return angle(one, -two), max(angle(one, line), angle(-two, line))
 
 
 def straightened(
@@ -314,33 +191,46 @@ def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
 
 
 def judged(grip: JawsOnSurface) -> SampledGrasp:
-    """State and rank of a grasp: the weaker finger's torque arm, less what curvature and misalignment take."""
-    normals, line = grip.misalignment
-    quality = min(side.arm * side.kept for side in grip.sides) * max(0.0, 1.0 - normals / WORST)
+    """State of a grasp on a bed of springs, with its quality there."""
+    _, line = grip.misalignment
     state = fit_of(grip.local, grip.triangles, grip.jaws).state
     if not state and slips(line, grip.jaws.mu):
         state = SLIPS
-    return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, quality, state)
+    return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, grip.quality, state)
 
 
 def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[SampledGrasp]:
-    """The best ``count`` distinct grasps, worth a solve first; of those that are not, as many at most."""
+    """The best ``count`` distinct grasps, worth a solve first; of those that are not, as many at most.
+
+    Each grasp that is kept makes others at its place count for less, so that one place does not take all.
+    """
+    best = max((g.quality for g in seen if not g.state), default=0.0)
     kept: list[SampledGrasp] = []
     for good in (True, False):
+        left = [g for g in seen if (not g.state) is good and (g.state or g.quality >= LEAST * best)]
+        left = [g for g in left if not any(same_grasp(g, other, length) for other in kept)]
         chosen: list[SampledGrasp] = []
-        for grasp in sorted((g for g in seen if (not g.state) is good), key=lambda g: -g.quality):
-            if len(chosen) == count:
-                break
-            if not any(same_grasp(grasp, other, length) for other in (*kept, *chosen)):
-                chosen.append(grasp)
-        kept += chosen
+        crowd = np.zeros(len(left))
+        while left and len(chosen) < count:
+            i = int(np.argmax([g.quality / (1.0 + n) for g, n in zip(left, crowd, strict=True)]))
+            grasp = left[i]
+            chosen.append(grasp)
+            apart = np.array([not same_grasp(g, grasp, length) for g in left])
+            left, crowd = [g for g, far in zip(left, apart, strict=True) if far], crowd[apart]
+            crowd += [same_point(g, grasp, length) for g in left]
+        kept += sorted(chosen, key=lambda g: -g.quality)
     return kept
+
+
+def same_point(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
+    """Whether two grasps have their middles at one place."""
+    return float(np.linalg.norm(one.point - other.point)) < APART * length
 
 
 def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
     """Whether two grasps are alike in place, approach and roll; the fingers may change places."""
     return (
-        float(np.linalg.norm(one.point - other.point)) < APART * length
+        same_point(one, other, length)
         and abs(float(one.approach @ other.approach)) > math.cos(ALIKE)
         and abs(float(one.long_side @ other.long_side)) > math.cos(ROLLED)
     )

@@ -66,7 +66,9 @@ class PressedContact(Contact):
         (n, m, _), k = shape.elements, shape.per_side
         loaded = self.loaded.reshape(n, k, m, k)
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
-        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) < NARROW
+        # a single line of nodes loads the elements on both sides of it
+        shared = self.state.pad.contact == "nodal"
+        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) - shared < NARROW
         overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
         # Trilinear elements alone lock when the foam is nearly incompressible.
         return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))

@@ -11,6 +11,8 @@ from scipy import ndimage
 
 from softjaw.study.quantities import RIMS
 
+NOTHING = 1e-6  # of the largest pressure, up to which a face is not loaded: rounding must not make pieces
+
 
 def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
     """Pieces, holes and loaded rims of a patch.
@@ -18,7 +20,7 @@ def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
     Parameters
     ----------
     pressure : (n,) array
-        Of all faces of the pad, those across its width running fastest; a face without pressure is not loaded.
+        Of all faces of the pad, those across its width running fastest; without pressure a face is not loaded.
     faces : (int, int)
         Faces along the pad's length and across its width.
 
@@ -33,7 +35,8 @@ def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
     >>> topology([1, 1, 1, 1, 0, 1, 1, 1, 1, 0, 0, 0], (4, 3))
     {'pieces': 1, 'holes': 1, 'rims': 13}
     """
-    loaded = np.asarray(pressure).reshape(faces) > 0
+    p = np.asarray(pressure, float).reshape(faces)
+    loaded = p > NOTHING * p.max()
     pieces = ndimage.label(loaded, np.ones((3, 3)))[1]
     # Padded, so that all that is not loaded and reaches a rim is one region, which is no hole.
     holes = ndimage.label(np.pad(~loaded, 1, constant_values=True))[1] - 1

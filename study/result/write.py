@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -73,9 +74,9 @@ class ResultWriter:
         """Store a solved case; ``values`` as from ``record``."""
         self._store(row, values, DONE)
 
-    def fail(self, row: int, message: str, state: int = FAILED) -> None:
-        """Store why a case has no result: it failed, or is one of `study.quantities.NO_GRASP`."""
-        self._store(row, blank(self.layout, message), state)
+    def fail(self, row: int, message: str, state: int = FAILED, seconds: float = math.nan) -> None:
+        """Store why a case has no result: it failed after ``seconds``, or is one of `study.quantities.NO_GRASP`."""
+        self._store(row, blank(self.layout, message, seconds), state)
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
@@ -161,9 +162,10 @@ def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarra
     dataset.id.write(h5py.h5s.create_simple(count), place, np.ascontiguousarray(value).reshape(count))
 
 
-def blank(layout: Layout, message: str = "") -> list[np.ndarray]:
-    """A row without values, as a case without a result leaves it."""
-    row = [np.full(c.shape, c.fill, c.dtype) for c in layout.columns]
+def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[np.ndarray]:
+    """A row without values, as a case without a result leaves it; ``seconds`` is what was spent on it."""
+    spent = {"work/seconds_total": seconds}
+    row = [np.full(c.shape, spent.get(c.key, c.fill), c.dtype) for c in layout.columns]
     row[-1] = np.array(text_bytes(message, MESSAGE), layout.columns[-1].dtype)
     return row
 

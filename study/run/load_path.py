@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
@@ -103,7 +104,7 @@ class PathSolver:
                 # What was given up for a signal stays not computed, so that resume solves it.
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
-                self._fail(pending, _sentence(error, stopper.limit))
+                self._fail(pending, _sentence(error, stopper.limit), time.perf_counter() - clock)
                 break
             finally:
                 # Also after a failure, or this rank would be taken for one that hangs.
@@ -126,17 +127,17 @@ class PathSolver:
         for c, row in served:
             if isinstance(result, CaseFailure):
                 with self._state.writing():
-                    self._writer.fail(row, result.message)
+                    self._writer.fail(row, result.message, seconds=math.nan if c else seconds)
                 continue
             mine = self._image(result, unit, c) if self._image else result
             values = record(self._writer.layout, _with_work(mine, c, seconds))
             with self._state.writing():
                 self._writer.write(row, values)
 
-    def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
+    def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str, seconds: float) -> None:
         self._begun = []
         with self._state.writing():
-            fail_from(self._writer, pending, message)
+            fail_from(self._writer, pending, message, seconds)
         pending.clear()
 
     def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
@@ -162,12 +163,16 @@ def give_up(writer: Any, unit: Any, patience: float) -> None:
     fail_from(writer, _pending(unit, writer.codes()), HUNG.format(patience=patience))
 
 
-def fail_from(writer: Any, pending: dict[int, list[tuple[int, int]]], message: str) -> None:
-    """Store why the lowest of the pending forces failed, and that the forces above it were not tried."""
+def fail_from(
+    writer: Any, pending: dict[int, list[tuple[int, int]]], message: str, seconds: float = math.nan
+) -> None:
+    """Store why the lowest of the pending forces failed, after ``seconds``, and that those above were not tried."""
     lowest = min(pending, default=0)
     for k, served in pending.items():
-        for _, row in served:
-            writer.fail(row, message if k == lowest else NOT_TRIED.format(text=message))
+        for n, (_, row) in enumerate(served):
+            first = k == lowest and n == 0  # the time is spent once for all candidates that are served
+            text = message if k == lowest else NOT_TRIED.format(text=message)
+            writer.fail(row, text, seconds=seconds if first else math.nan)
 
 
 def _pending(unit: Any, codes: np.ndarray) -> dict[int, list[tuple[int, int]]]:

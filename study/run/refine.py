@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
+from softjaw.study.ranking import asked_score
 
 if TYPE_CHECKING:
     from softjaw.study.scene import Scene
@@ -96,9 +97,9 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     return np.where(h >= 2 * finest * (1 - MARGIN), found, 0.0)
 
 
-def chances_in(result: Any, score: str = "quality") -> FloatArray:
-    """`chances` of a result file; ``score`` is the map that grasps are ranked by, CCM where it has several models."""
-    values = _cases(result, result.read(f"{score}/ccm"))
+def chances_in(result: Any) -> FloatArray:
+    """`chances` of a result file, by the map that its grasps are ranked by, CCM."""
+    values = _cases(result, result.read(f"{asked_score(result.layout.has)}/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     done = _cases(result, result.status) == DONE
     values = np.where(done, values, np.nan)

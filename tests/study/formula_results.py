@@ -49,14 +49,16 @@ def quartic(x, y, t):
     return found
 
 
-def make(path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(), labels=(), **datasets) -> Path:
+def make(
+    path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(), labels=(), added=(), **datasets
+) -> Path:
     """A file with ``e_n`` of all models and friction limits by ``formula(*coordinates)``, everything done.
 
     ``datasets`` are put in last, by their path below ``/study`` with ``__`` for ``/``: arrays, or functions that change
     what is there.
     """
     axes = axes or grid_axes()
-    layout = Layout(axes, 0, meshes, patches=False, derived=derived)
+    layout = Layout(axes, 0, meshes, patches=False, derived=derived, added=added)
     kind = f"{[(axis.long_name, axis.values.tolist(), axis.options) for axis in axes]}{layout.options()}{scene}{labels}"
     if kind not in SKELETONS:
         create(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pathlib
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -72,9 +74,9 @@ def test_friction_that_acts_back_moves_what_auto_leaves_out():
 def test_claims_of_the_lookup_hold(tmp_path):
     """Between the stations and forces of the bottle's map, on cases that it does not hold."""
     import softjaw
+    from softjaw.study.doctor import launch_environment
     from softjaw.study.lookup import GraspMap
     from softjaw.study.quantities import MAIN
-    from tests.study.launching import launch
 
     own = np.linspace(25, 175, 35)
     between = ((own[1:] + own[:-1]) / 2).round(6).tolist()
@@ -83,8 +85,8 @@ def test_claims_of_the_lookup_hold(tmp_path):
     for name, stations, forces in (("map", own.tolist(), more[::2]), ("held", between[::2], more)):
         scene = re.sub(r"stations = 35.*", f"stations_mm = {stations}", text)
         (tmp_path / f"{name}.toml").write_text(scene.replace("[load]", f"[load]\nnormal_force_n = {forces}"))
-        code, _, errors = launch(0, "-m", "softjaw", "run", tmp_path / f"{name}.toml", "-o", tmp_path / f"{name}.hdf")
-        assert code == 0, errors
+        words = [sys.executable, "-m", "softjaw", "run", tmp_path / f"{name}.toml", "-o", tmp_path / f"{name}.hdf"]
+        subprocess.run(words, env=launch_environment(), check=True, stdout=subprocess.DEVNULL, timeout=1200)
     held = softjaw.open(tmp_path / "held.hdf").isel(angle=0)
     table = GraspMap(tmp_path / "map.hdf")
     station, force = np.meshgrid(held.station.values, held.normal_force.values, indexing="ij")

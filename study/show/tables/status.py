@@ -135,6 +135,7 @@ def time_split(result: Any) -> list[str]:
     if not total:
         return []
     shares = {part: float(np.nansum(result.read(f"work/seconds_{part}"))) / total for part in PARTS}
+    shares["failed cases"] = float(np.nansum(result.read("work/seconds_total")[result.status == FAILED])) / total
     words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
     return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
 

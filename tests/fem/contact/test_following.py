@@ -6,7 +6,7 @@ import pytest
 from softjaw.fem.contact.load_stepping import Following, Settings, Stepping, Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.errors import ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Revolution, Sphere
 from softjaw.fem.pad.mesh import Pad
@@ -196,6 +196,46 @@ def test_an_unstable_start_is_noted():
     assert steps.jumped
 
 
+def test_a_maximum_of_the_force_is_named_and_the_plate_stays_out_of_the_object():
+    """The force has a maximum of 2.5 N at 1 mm; the object's nearest point is 2.1 mm from the backing plate."""
+    steps = following(Curve())
+    steps.deepest = 2.1 * MM
+    with pytest.raises(NotReachedError, match=r"maximum of 2\.(49\d*|5) N at a closing displacement of (0\.9|1)"):
+        steps.displacement_control(np.array([0.5 * MM]), 3.0, Work(), 0.02 * MM)
+    with pytest.raises(ConvergenceError, match="the backing plate would be in the object"):
+        steps.solve(np.array([0.5 * MM]), Control(closing=2.2 * MM), Work())
+
+
+def test_a_force_that_takes_too_many_iterations_is_given_up(monkeypatch):
+    monkeypatch.setattr("softjaw.fem.contact.press.MOST_ITERATIONS", 8)
+    with pytest.raises(ConvergenceError, match=r"of 60 N: given up after 8 Newton iterations"):
+        last(press_of(), [60])
+
+
+@pytest.mark.parametrize(("scatter", "passes"), [(1e-7, True), (1e-2, False)])
+def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, passes):
+    """An iterate beside the state, as a solve that does not end leaves it; the residual is told, and noted."""
+    press = press_of()
+    known = last(press_of(), [5])
+    proper = press.solver.solve
+
+    def stalls(x, tolerance, iterations=None):
+        if press.problem.control.force is None:
+            return proper(x, tolerance, iterations)
+        error = ConvergenceError("alternates")
+        error.end = known.unknowns * (1 + scatter), 1e-5
+        raise error
+
+    press.solver.solve, press.fallback = stalls, None
+    if passes:
+        state = last(press, [5])
+        assert state.closing == pytest.approx(known.closing, rel=1e-6)
+        assert ["residual" in note for note in state.notes] == [True]
+    else:
+        with pytest.raises(ConvergenceError):
+            last(press, [5])
+
+
 # -- a jump of weighted gaps, where nodal ones know of none ------------------------------------------------------------
 
 NECK = np.array([
@@ -210,8 +250,10 @@ def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
     """Travels of 9.85 and 15.24 mm, 9.95 and 12.45 mm, 8.34 and 9.27 mm at 13 N came of these lists."""
     from softjaw.study.case.candidates import axis_poses
     from softjaw.study.case.model import approach
+    from softjaw.study.scene.sections import Gripper
 
-    finger = approach(Revolution(MM * NECK), axis_poses(station * MM, 0.0, 0.0)[0], SIZE)
+    pads = Gripper(pad_length_mm=50, pad_width_mm=22, pad_thickness_mm=15, elements=(20, 10, 6))
+    finger = approach(Revolution(MM * NECK), axis_poses(station * MM, 0.0, 0.0)[0], pads)
     states = []
     for forces in ([1, 13], [1, 2, 4, 7, 10, 13]):
         states.append(last(press_of(BLATZ_KO, finger.gap, (False, True), (20, 10, 6)), forces))

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from softjaw.study.case.bed import CRUSHED, JawsOnSurface, height_fields
 from softjaw.study.case.fit import Jaws, fit_of
-from softjaw.study.case.sampler import (
-    JawsOnSurface,
-    antipodal_grasps,
-    axes_of,
-    height_fields,
-    same_grasp,
-    with_sampled_grasps,
-)
+from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import SceneError, parse_scene
+from tests.objects.bodies import hollow_bowl
 
 PAD = (0.05, 0.022, 0.015)
 JAWS = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0)
@@ -109,6 +104,64 @@ def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():
         np.testing.assert_array_equal(a.approach, b.approach)
     for i, a in enumerate(one):
         assert not any(same_grasp(a, b, PAD[0]) for b in one[:i] if a.state == b.state)
+
+
+def at_origin(body, jaws=JAWS):
+    return JawsOnSurface(body, np.zeros(3), np.eye(3), jaws)
+
+
+def test_a_pad_inside_a_bowl_bears_on_its_ends_and_comes_after_one_outside():
+    bowl = surface(hollow_bowl(0.04, 0.003, 0.045))
+    grasps = antipodal_grasps(bowl, NARROW, 6, samples=80)
+    assert min(g.opening for g in grasps if not g.state) > 0.07
+    pinch = JawsOnSurface(bowl, np.array([0.0, 0.0, 0.0015]), np.eye(3), JAWS)
+    outside, inside = pinch.sides
+    assert outside.bridging == 1.0
+    assert inside.bridging < 0.3
+    assert inside.arm > 0.02  # which alone would make it the best there is
+    assert inside.peak < 0.6 * outside.peak
+
+
+def test_a_flat_face_loses_nothing():
+    grip = at_origin(box(0.2, 0.2, 0.05))
+    side = grip.sides[0]
+    assert side.kept == side.bridging == pytest.approx(1.0)
+    strain = JAWS.force / (PAD[0] * PAD[1] * JAWS.stiffness * PAD[2])
+    assert side.peak == pytest.approx(1.0 / (1.0 + (strain / CRUSHED) ** 2))
+    assert side.worth == pytest.approx(side.arm * side.peak)
+    assert grip.quality == pytest.approx(side.worth)  # at an opening of one length of the pad
+    thin = at_origin(box(0.2, 0.2, 0.025))
+    assert thin.quality == pytest.approx(0.25 * grip.quality)
+
+
+def test_a_contact_frame_stands_where_the_centre_of_pressure_is():
+    """Two ridges of unequal slopes: the mean normal looks between them, that of the frame follows its own facet."""
+    x = np.array([-0.03, -0.005, 0.005, 0.03])
+    z = np.array([0.004, 0.0, 0.001, 0.002])
+    points = np.array([[a, b, c] for a, c in zip(x, z, strict=True) for b in (-0.03, 0.03)])
+    strip = np.array([[2 * i + k for k in f] for i in range(3) for f in ((0, 1, 2), (1, 3, 2))])
+    back = points * [1, 1, 0] + [0, 0, 0.05]
+    grip = at_origin((np.concatenate([points, back]), np.concatenate([strip, strip + 8])))
+    side = grip.sides[0]
+    assert -0.005 < side.centre[0] < 0.005
+    assert np.arctan2(-side.facing[0], side.facing[2]) == pytest.approx(np.arctan(0.1), abs=0.03)
+    assert abs(side.normal[0]) < 0.5 * abs(side.facing[0])
+    assert grip.frames_misalignment[0] > grip.misalignment[0]
+
+
+def test_a_pad_over_a_hole_of_the_surface_is_worth_nothing():
+    points, triangles = box(0.2, 0.2, 0.05)
+    front = (points[triangles][:, :, 2] < 0).all(axis=1)
+    assert at_origin((points, triangles)).quality > 0.0
+    assert at_origin((points, triangles[~front])).quality == 0.0
+
+
+def test_grasps_are_spread_over_the_places_of_an_object():
+    can = surface(trimesh.creation.cylinder(0.03, 0.2, sections=96))
+    heights = sorted(g.point[2] for g in antipodal_grasps(can, NARROW, 8, samples=150) if not g.state)
+    assert len(heights) == 8
+    assert heights[-1] - heights[0] > 0.09
+    assert max(np.diff(heights)) < 0.05
 
 
 SCENE = """

@@ -49,6 +49,22 @@ def watched(run, stream):
     return watch(run.path, 3.0, stream, run.sleep), stream.getvalue()
 
 
+def test_a_round_of_further_stations_is_another_file_with_more_cases(tmp_path, monkeypatch):
+    path, steps = tmp_path / "a.hdf", [1]
+    make(path, axes=grid_axes(np.arange(4) * 0.01))
+    monkeypatch.setattr(view, "holder", lambda _: "host node7, 8 ranks" if steps else "")
+
+    def grow(_):
+        steps.clear()
+        make(path, axes=grid_axes([0, 0.01, 0.015, 0.02, 0.03]), added=((15.0,),))
+
+    stream = io.StringIO()
+    assert watch(path, 3.0, stream, grow) == 0
+    assert "96/96 done" in stream.getvalue()
+    assert "120/120 done, round 1 of further stations" in stream.getvalue()
+    assert main(["status", str(path)]) == 0
+
+
 def test_a_finished_run_ends_the_view_with_its_exit_code(tmp_path, monkeypatch):
     run = Run(tmp_path / "a.hdf", [(40, DONE), (0, DONE), (SIZE - 40, DONE)], monkeypatch)
     code, text = watched(run, io.StringIO())

@@ -1,0 +1,209 @@
+"""Both pads on a bed of springs over any triangle surface: what each meets, and what the grasp promises.
+
+A gripper closes along a line, so what each pad meets is a height field over its face: of every line along the approach
+the first point of the object from one side and from the other. Both fields come from one pass over the triangles. They
+need no closed mesh and no normals, and inner walls or thin parts behind do not count.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from softjaw.friction.patch import NoContactError
+from softjaw.study.case.contact import angle
+from softjaw.study.case.fit import Jaws, bed_closing
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+GRID = (25, 11)  # points of a pad's face along length and width
+STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
+WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of a grasp
+MIDDLE = 2e-3  # reach of the weights round the centre of pressure [m]: about a cell, or a face of a pad's usual mesh
+CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
+BRIDGED = 0.25  # what is left of a grasp whose pad bears on its ends, with nothing under the centre of pressure
+THROUGH = 1e-9  # [m]: a line that meets the surface only once passes through a hole
+
+
+@njit(cache=True)
+def height_fields(points, triangles, x, y):
+    """Lowest and highest z of a surface over the grid ``x (m,)`` times ``y (n,)``: two ``(m, n)`` arrays.
+
+    Infinite (positive in the lowest, negative in the highest) where a line along z misses every triangle. ``points
+    (k, 3)`` are in the frame of the grid, whose steps are even.
+    """
+    m, n = len(x), len(y)
+    low, high = np.full((m, n), np.inf), np.full((m, n), -np.inf)
+    dx, dy = x[1] - x[0], y[1] - y[0]
+    for t in range(len(triangles)):
+        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
+        left, right = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
+        near, far = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        if right < x[0] or left > x[-1] or far < y[0] or near > y[-1]:
+            continue
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if area == 0.0:  # seen from its edge: its neighbours have the line
+            continue
+        first, last = max(0, math.ceil((left - x[0]) / dx)), min(m - 1, math.floor((right - x[0]) / dx))
+        start, stop = max(0, math.ceil((near - y[0]) / dy)), min(n - 1, math.floor((far - y[0]) / dy))
+        for i in range(first, last + 1):
+            for j in range(start, stop + 1):
+                u = ((b[0] - x[i]) * (c[1] - y[j]) - (b[1] - y[j]) * (c[0] - x[i])) / area
+                v = ((c[0] - x[i]) * (a[1] - y[j]) - (c[1] - y[j]) * (a[0] - x[i])) / area
+                w = 1.0 - u - v
+                if u >= -1e-12 and v >= -1e-12 and w >= -1e-12:
+                    z = u * a[2] + v * b[2] + w * c[2]
+                    low[i, j], high[i, j] = min(low[i, j], z), max(high[i, j], z)
+    return low, high
+
+
+class Side:
+    """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
+
+    def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
+        self.jaws = jaws
+        self.touch = float(np.min(height))
+        self.height = height - self.touch
+        self.x, self.y = np.meshgrid(x, y, indexing="ij")
+        self.cell = (x[1] - x[0]) * (y[1] - y[0])
+        depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
+        self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
+        filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
+        self.slope = np.stack(np.gradient(filled, x, y), axis=-1)
+        # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
+        edge = np.abs(self.slope).max(axis=-1) > STEEPEST
+        self.slope[edge] = 0.0
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """Centre of pressure on the face ``(2,)`` [m]."""
+        total = self.pressure.sum()
+        return np.array([(self.pressure * self.x).sum(), (self.pressure * self.y).sum()]) / total
+
+    @property
+    def normal(self) -> FloatArray:
+        """Mean direction into the object in the pad's frame, weighted by pressure; z is the approach ``(3,)``."""
+        mean = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
+        return _direction(mean)
+
+    @cached_property
+    def _middle(self) -> FloatArray:
+        """Weights ``(m, n)`` of the loaded cells round the centre of pressure, or next to it where it is free."""
+        away = (self.x - self.centre[0]) ** 2 + (self.y - self.centre[1]) ** 2
+        loaded = self.pressure > 0.0
+        weight = np.where(loaded, np.exp(-0.5 * (away - away[loaded].min()) / MIDDLE**2), 0.0)
+        return weight / weight.sum()
+
+    @property
+    def facing(self) -> FloatArray:
+        """Normal as `normal`, but of the surface round the centre of pressure, where a contact frame has its origin."""
+        return _direction((self._middle[..., None] * self.slope).sum(axis=(0, 1)))
+
+    @property
+    def arm(self) -> float:
+        """Mean distance of the pressure from its centre: e_n of a planar contact [m]."""
+        cx, cy = self.centre
+        return float((self.pressure * np.hypot(self.x - cx, self.y - cy)).sum() / self.pressure.sum())
+
+    @property
+    def kept(self) -> float:
+        """Share of the pressure sum that acts along the approach: what curvature leaves of the normal force."""
+        cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
+        return float((self.pressure * cosine).sum() / self.pressure.sum())
+
+    @property
+    def bridging(self) -> float:
+        """What bearing on the ends, or on several places, leaves of the arm: 1 where the centre of pressure bears too.
+
+        Such a pad has a large arm, but a concave object leaves it only corners and edges.
+        """
+        away = np.hypot(self.x - self.centre[0], self.y - self.centre[1])
+        near = self.pressure[away <= max(1.5 * MIDDLE, float(away.min()))].mean()
+        mean = self.pressure.sum() / np.count_nonzero(self.pressure)
+        return float(BRIDGED + (1.0 - BRIDGED) * min(1.0, near / mean))
+
+    @property
+    def peak(self) -> float:
+        """What the highest pressure leaves: foam that is crushed somewhere carries little there, and solves badly."""
+        strain = float(self.pressure.max()) / (self.jaws.stiffness * self.jaws.pad[2])
+        return 1.0 / (1.0 + (strain / CRUSHED) ** 2)
+
+    @property
+    def worth(self) -> float:
+        """Torque arm, no longer than on a whole flat face, less what curvature, peaks and bridging take [m]."""
+        full = float(np.hypot(self.x, self.y).mean())
+        return min(self.arm, full) * self.kept * self.peak * self.bridging
+
+
+def _direction(slope: FloatArray) -> FloatArray:
+    """Unit normal into the object where its height field has a slope ``(2,)``."""
+    # the height grows where the surface recedes: its outward normal leans towards that side
+    direction = np.array([-slope[0], -slope[1], 1.0])
+    return direction / np.linalg.norm(direction)
+
+
+class JawsOnSurface:
+    """Both pads on a surface, in one pose of the gripper."""
+
+    def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
+        self.point, self.axes, self.jaws = point, axes, jaws
+        length, width, _ = jaws.pad
+        x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
+        local = (surface[0] - point) @ axes
+        self.local, self.triangles = np.ascontiguousarray(local), surface[1]
+        low, high = height_fields(self.local, self.triangles, x, y)
+        if not np.isfinite(low).any():
+            raise NoContactError("the pad passes the object")
+        self.through = bool((np.isfinite(low) & (high - low < THROUGH)).any())
+        # finger 2 looks against the approach, with its short side reversed
+        self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
+
+    @property
+    def opening(self) -> float:
+        """Distance of the pads' faces at first touch [m]."""
+        return -self.sides[0].touch - self.sides[1].touch
+
+    @property
+    def tilt(self) -> FloatArray:
+        """Approach that meets both contacts squarely, in the frame of the gripper ``(3,)``."""
+        one, two = (side.normal for side in self.sides)
+        mean = one + np.array([two[0], -two[1], two[2]]) * [-1.0, -1.0, 1.0]
+        return mean / np.linalg.norm(mean)
+
+    @property
+    def shift(self) -> FloatArray:
+        """From the middle of the pads to the middle of both centres of pressure ``(2,)`` [m]."""
+        one, two = (side.centre for side in self.sides)
+        return 0.5 * (one + two * [1.0, -1.0])
+
+    @property
+    def misalignment(self) -> tuple[float, float]:
+        """Angle between one contact normal and the other reversed, and of their line to a normal [rad]."""
+        return self._angles(self.sides[0].normal, self.sides[1].normal)
+
+    @property
+    def frames_misalignment(self) -> tuple[float, float]:
+        """The same with the normals where the contact frames of a solved contact will be."""
+        return self._angles(self.sides[0].facing, self.sides[1].facing)
+
+    @property
+    def quality(self) -> float:
+        """Estimate of grasp quality, for ranking [m]: as that, it grows with the square of the contacts' distance.
+
+        Less what misalignment takes, and nothing where the pads lie over a hole of the surface.
+        """
+        if self.through:
+            return 0.0
+        normals, line = np.maximum(self.misalignment, self.frames_misalignment)
+        aligned = max(0.0, 1.0 - normals / WORST) * max(0.0, 1.0 - math.tan(min(line, 1.5)) / self.jaws.mu)
+        return min(side.worth for side in self.sides) * (self.opening / self.jaws.pad[0]) ** 2 * aligned
+
+    def _angles(self, one: FloatArray, other: FloatArray) -> tuple[float, float]:
+        two = other * [1.0, -1.0, -1.0]
+        (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
+        line = np.array([u - x, -v - y, self.opening])
+        return angle(one, -two), max(angle(one, line), angle(-two, line))
