@@ -25,6 +25,8 @@ from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
 from softjaw.study.scene import Scene
 
+HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
+
 
 def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
     """Cases of one candidate, force by force upward; each force starts from the state at the one before."""
@@ -84,13 +86,18 @@ def _probed(result: CaseResult, probing: Probing, note: str) -> CaseResult:
 
 def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
     """For every force the contacts of both fingers, or why there are none."""
-    path = solving.load_path(forces)
+    path, lowest = solving.load_path(forces), True
     for k, force in enumerate(forces):
         try:
             yield next(path)
+            lowest = False
         except (ConvergenceError, CheckError) as error:
-            good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
+            good = f"the last good force is {forces[k - 1]:g} N" if not lowest else "no force below it was solved"
             yield CaseFailure(f"{error}; {good}")
+            # hardly a touch, which tells nothing of the forces above
+            if lowest and force < HARDLY * max(forces[k + 1 :], default=0.0):
+                path = solving.load_path(forces[k + 1 :])
+                continue
             for _ in forces[k + 1 :]:
                 yield CaseFailure(f"not tried, because the load path ended at {force:g} N: {error}")
             return

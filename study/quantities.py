@@ -226,6 +226,8 @@ TABLE = (
              "value.", needs="two meshes", relative_to="e_n"),
     Quantity("quality_error", (), "", "relative error of quality", "As e_n_error.", needs="two scores",
              relative_to="quality"),
+    Quantity("payload_error", (), "", "relative error of payload", "As e_n_error.", needs="two scores",
+             relative_to="payload"),
     Quantity("f_x_max_error", (), "", "relative error of f_x_max", "As e_n_error.", needs="two meshes",
              relative_to="f_x_max"),
     Quantity("f_y_max_error", (), "", "relative error of f_y_max", "As e_n_error.", needs="two meshes",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
-from softjaw.study.quantities import DONE, MISSING
+from softjaw.study.quantities import DONE
 
 IntArray = NDArray[np.int64]
 LARGEST = "the largest that was solved"
@@ -102,12 +103,17 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
     return better, " or ".join(flag.word for flag in flags_in(marks))
 
 
+def asked_score(has: Collection[str]) -> str:
+    """The map that grasps are ranked by unless another is named, from what the scene asks for (`quantities.NEEDS`)."""
+    return "payload" if "task" in has else "quality"
+
+
 def score_of(ds: Any, by: str | None = None) -> str:
     """The map that grasps are ranked by: the one that is named, the payload where the scene has a task, else quality.
 
     A file without a value of it is ranked by quality or e_n.
     """
-    first = by or ("payload" if "task" in ds.attrs.get("has", ()) else "quality")
+    first = by or asked_score(ds.attrs.get("has", ()))
     known = [n for n in (first, "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
     return known[0] if known else "e_n"
 
@@ -139,36 +145,6 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     if len(shared) and shared[-1] < k:
         return int(shared[-1]), "the largest that most candidates were solved at"
     return k, LARGEST
-
-
-def between(ds: Any, force: float) -> Any:
-    """The dataset at one force [N] between two solved ones, by straight lines; flags of both.
-
-    A case beside one that is not solved has that one's state; so has one across a snap-in, which is "not computed".
-
-    Raises
-    ------
-    ValueError
-        For a force outside of the solved ones, with what they are.
-    """
-    forces = ds["normal_force"].values
-    if not forces[0] <= force <= forces[-1]:
-        solved = ", ".join(f"{f:g}" for f in forces)
-        raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
-    k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
-    share = (force - forces[k]) / (forces[k + 1] - forces[k])
-    low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    found = low.copy()
-    for name in (n for n, v in ds.data_vars.items() if "normal_force" in v.dims):
-        if ds[name].dtype.kind == "f":
-            found[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
-        elif name == "flags":
-            found[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
-    states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
-    across = (low["flags"].values ^ high["flags"].values) & Flag.SNAPPED > 0
-    found["status"] = (ds["status"].dims, np.where(across & (states == DONE), MISSING, states), ds["status"].attrs)
-    found["normal_force"].attrs.update(ds["normal_force"].attrs)
-    return found
 
 
 def borne_level(status: np.ndarray, flags: np.ndarray) -> int | None:

@@ -27,7 +27,7 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
-from softjaw.study.case.task import Task, payload_values, task_of
+from softjaw.study.case.task import Task, payload_error, payload_values, task_of
 from softjaw.study.flags import raised
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -195,7 +195,11 @@ def mesh_errors(
         errors[f"maps/{key}_error"] = abs(values[f"maps/{key}"] - value)
     # only the ellipsoids' quality: fits on the coarse mesh would double their time
     best, other = values["maps/quality"][0], quality(coarse, settings)
-    return errors | {"maps/quality_error": abs(other - best) / best if best > 0 else np.nan}
+    errors["maps/quality_error"] = abs(other - best) / best if best > 0 else np.nan
+    if settings.task:
+        held = values["maps/payload"][0]
+        errors["maps/payload_error"] = payload_error(coarse, settings.surface.samples, settings.task, held)
+    return errors
 
 
 # --- score ------------------------------------------------------------------------------------------------------------

@@ -86,8 +86,7 @@ def fit_surfaces(
         Motions that are fitted to; others, as many as `INDEPENDENT`, judge the fits.
     """
     rho, limits = contact.rho, contact.unit_limits[model]
-    twist = _motions(samples) / [1.0, 1.0, rho]
-    wrench = friction_wrench(contact.local, twist, 1.0, model)
+    twist, wrench = sampled_wrenches(contact, model, samples)
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
@@ -101,6 +100,12 @@ def fit_surfaces(
         on_own = _fit_error(surface, W[own], T[own])
         found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], on_own, judged, reference)
     return found
+
+
+def sampled_wrenches(contact: Contact, model: str, samples: int) -> tuple[FloatArray, FloatArray]:
+    """Motions ``(m, 3)`` of a contact and their wrenches ``(m, 6)`` for mu = 1; the first ``samples`` are fitted to."""
+    twist = _motions(samples) / [1.0, 1.0, contact.rho]
+    return twist, friction_wrench(contact.local, twist, 1.0, model)
 
 
 @lru_cache(maxsize=8)

@@ -13,7 +13,7 @@ from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.payload import GRAVITY, Payload, payload
 from softjaw.study.case.build import own_frame
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.limit_surface import SurfaceFit
+from softjaw.study.case.limit_surface import SurfaceFit, sampled_wrenches
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -70,7 +70,7 @@ def payload_values(
     The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
     found errs on the safe side, by about 1 % with 500 samples.
     """
-    found = [_payload(contacts, [own[m] for own in fits], task) for m in MODELS]
+    found = [_payload(contacts, [own[m].wrench for own in fits], task) for m in MODELS]
     mass = np.array([f.force for f in found]) / GRAVITY
     values = {"maps/payload": mass.tolist()}
     if task.mass is not None:
@@ -78,8 +78,14 @@ def payload_values(
     return values, Flag(0) if found[0].borne else Flag.NOT_BORNE
 
 
-def _payload(contacts: Sequence[Contact], fits: Sequence[SurfaceFit], task: Task) -> Payload:
+def payload_error(contacts: Sequence[Contact], samples: int, task: Task, mass: float) -> float:
+    """Relative difference of a mass that is held (curved model) to what these contacts of another mesh hold."""
+    wrenches = [sampled_wrenches(c, MODELS[0], samples)[1][:samples] for c in contacts]
+    return abs(_payload(contacts, wrenches, task).force / GRAVITY - mass) / mass if mass > 0 else np.nan
+
+
+def _payload(contacts: Sequence[Contact], wrenches: Sequence[FloatArray], task: Task) -> Payload:
     # a motion the other way gives the opposite wrench, which costs no further sample
-    both = [np.vstack([fit.wrench, -fit.wrench])[:, [0, 1, 5]] for fit in fits]
+    both = [np.vstack([wrench, -wrench])[:, [0, 1, 5]] for wrench in wrenches]
     soft = [c.soft(PolytopeBody(c.mu * wrench)) for c, wrench in zip(contacts, both, strict=True)]
     return payload(soft, [c.pressure_wrench for c in contacts], task.centre_of_mass, task.direction, task.kind)

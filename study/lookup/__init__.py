@@ -30,12 +30,11 @@ from softjaw.study.lookup.interpolation import (
 )
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, turning
-from softjaw.study.quantities import BOTH_ENDS, MODELS
-from softjaw.study.result.layout import DONE
+from softjaw.study.quantities import DONE, MODELS
+from softjaw.study.ranking import judged, ranking, score_of, shown_level
+from softjaw.study.result.between import KINDS, contact_kinds
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.units import UNITS
-
-KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
 
 
 class GraspMap:
@@ -120,6 +119,37 @@ class GraspMap:
         along = _one(station, station_mm, "mm", "station")
         turn = _one(angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None)
         return self.point(along, turn, force)
+
+    def best(self, n: int = 1, by: str | None = None, force: float | None = None) -> list[GraspPoint]:
+        """The first ``n`` solved grasps as ``softjaw show`` ranks them, those that cannot be used last.
+
+        Parameters
+        ----------
+        n : int
+            How many; fewer where fewer are solved.
+        by : str, optional
+            "payload", "quality", "e_n" or "epsilon"; by default payload where the scene has a mass or the direction of
+            a weight, else quality.
+        force : float, optional
+            Solved force [N] at which they are ranked, and which the points have. By default that of ``softjaw show``;
+            where the object's mass is known each point then has its own force to use.
+        """
+        ds = self.source.data
+        flags, forces = judged(ds), self.source.axes[2].values
+        k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
+        if force is not None and not np.isclose(forces[k], force):
+            raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
+        score = self.source.read(score_of(ds, by))[..., k].ravel()
+        done = np.flatnonzero(self.source.status[..., k].ravel() == DONE)
+        order = done[ranking(score[done], flags[..., k].ravel()[done])][:n]
+        low = ds["force_low"].values.ravel() if force is None and "force_low" in ds else np.full(score.shape, np.nan)
+        found = []
+        for i in order:
+            station, angle = np.unravel_index(i, self.source.status.shape[:-1])
+            at = self.source.axes[0].values[station], self.source.axes[1].values[angle]
+            use = forces[k] if np.isnan(low[i]) else max(low[i], forces[0])
+            found.append(self.point(int(station) if self.by_poses else at[0], at[1], use))
+        return found
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
@@ -223,8 +253,7 @@ class GraspMap:
         """A number for each kind of contact at the nodes; 0 where a file does not tell."""
         found = np.zeros(self.shape, np.int64)
         for name, most in KINDS.items() if self.source.has("fingers/rims") else ():
-            values = np.nan_to_num(self._read(f"fingers/{name}")).astype(np.int64)
-            values = (values & BOTH_ENDS) == BOTH_ENDS if name == "rims" else np.minimum(values, most)
+            values = contact_kinds(name, self._read(f"fingers/{name}"))
             for finger in range(values.shape[-1]):
                 found = found * (most + 1) + values[..., finger]
         return found

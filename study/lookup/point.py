@@ -94,6 +94,33 @@ class GraspPoint:
         return self.value("quality")
 
     @property
+    def payload(self) -> Any:
+        """Largest mass that is held, CCM [kg]."""
+        return self.value("payload")
+
+    @property
+    def opening(self) -> Any:
+        """Distance of the undeformed pads as they touch the object [m]: open the gripper wider."""
+        return self.value("opening")
+
+    @property
+    def pose(self) -> tuple[FloatArray, FloatArray]:
+        """Rotations ``(..., 2, 3, 3)`` and origins ``(..., 2, 3)`` [m] of both pads at first touch.
+
+        ``x = rotation x_pad + origin`` in the frame of the object's own file; between cases the nearest rotation to
+        their mean. NaN at angles outside of the solved ones, whose values are those of an image by symmetry.
+        """
+        R, x = self.fingers("pose_rotation"), self.fingers("pose_origin")
+        flat, origin, angles = R.reshape(-1, 2, 3, 3), x.reshape(-1, 2, 3), self.map.source.axes[1].values
+        nearest = np.clip(self.place[:, 1], angles.min(), angles.max())
+        here = self.map.by_poses | (np.abs(self.place[:, 1] - nearest) < 1e-9)
+        flat[~here], origin[~here] = np.nan, np.nan
+        known = here & (self.states == INSIDE)
+        U, _, V = np.linalg.svd(flat[known])
+        flat[known] = U @ V
+        return flat.reshape(R.shape), origin.reshape(x.shape)
+
+    @property
     def safety_factor(self) -> Any:
         """How many times its weight the object could have; `KeyError` where the scene gives no mass."""
         return self.value("safety_factor")

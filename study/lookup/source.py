@@ -30,23 +30,23 @@ class Source:
         self.all_axes = axes_of(ds)
         self.axes = self.all_axes[-3:]
         self.index, self.point = _sweep_point(self.all_axes[:-3], where)
-        self._data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
-        self.status, self.messages = self._data.status.values, self._data.message.values
+        self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
+        self.status, self.messages = self.data.status.values, self.data.message.values
         self.maps = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
 
     def read(self, name: str, model: str = "ccm") -> np.ndarray:
         """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""
         if name in self.maps:
-            return values_of(self._data, name, model)
+            return values_of(self.data, name, model)
         if not self.has(name):
             raise KeyError(f"{name} is not in {self.file}; it has {', '.join(sorted(self.maps))}")
-        found = self._data[BY_KEY[name].variable]
+        found = self.data[BY_KEY[name].variable]
         return (found.sel(model=model) if "model" in found.dims else found).values
 
     def has(self, name: str) -> bool:
         """Whether the file has such a map or dataset of the fingers."""
         q = BY_KEY.get(name)
-        return name in self.maps or bool(q and "finger" in q.dims and q.variable in self._data)
+        return name in self.maps or bool(q and "finger" in q.dims and q.variable in self.data)
 
     def case(self, index: tuple[int, ...]) -> str:
         """A case in words, by its index along station, angle and force."""

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
+from softjaw.study.ranking import asked_score
 
 if TYPE_CHECKING:
     from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[float, ...], ...]  # stations that each round added [mm]
-SCORE = "quality"  # the map that grasps are ranked by
 STEEPER = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
 TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
@@ -97,9 +97,9 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     return np.where(h >= 2 * finest * (1 - MARGIN), found, 0.0)
 
 
-def chances_in(result: Any, score: str = SCORE) -> FloatArray:
-    """`chances` of a result file by a map, CCM where it has several models."""
-    values = _cases(result, result.read(f"{score}/ccm"))
+def chances_in(result: Any) -> FloatArray:
+    """`chances` of a result file, by the map that its grasps are ranked by, CCM."""
+    values = _cases(result, result.read(f"{asked_score(result.layout.has)}/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     done = _cases(result, result.status) == DONE
     values = np.where(done, values, np.nan)

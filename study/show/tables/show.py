@@ -14,7 +14,8 @@ from rich.cells import cell_len
 
 from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
-from softjaw.study.ranking import between, judged, passed_over, ranking, score_of, shown_level
+from softjaw.study.ranking import judged, passed_over, ranking, score_of, shown_level
+from softjaw.study.result.between import at_force
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.answer import answer
@@ -105,7 +106,7 @@ def _at(ds: xr.Dataset, force: float | None) -> tuple[xr.Dataset, int, str]:
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
-    at = between(ds, force)
+    at = at_force(ds, force)
     low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
     return at, 0, f", by straight lines from {low:g} to {high:g} N"
 
@@ -225,7 +226,7 @@ def least(names: Sequence[str]) -> list[str]:
     main = [name for name in reversed(MAIN[3:]) if name in names]
     errors = [f"{name}_error" for name in main if f"{name}_error" in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
-    last = [name for name in ("quality_error", MAIN[2]) if name in names]
+    last = [name for name in ("quality_error", f"{MAIN[2]}_error", MAIN[2]) if name in names]
     return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
 
 

@@ -73,6 +73,10 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
         expected = abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert not any(mesh_errors(fine, fine, values, SETTINGS).values())
+    task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
+    held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
+    error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, task)["maps/payload_error"]
+    assert error == pytest.approx(abs(less / held - 1), rel=1e-9)
 
 
 def test_a_weight_between_the_pads_is_held_by_their_friction():

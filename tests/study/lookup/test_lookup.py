@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
@@ -357,3 +358,36 @@ def test_the_readme_says_how(tmp_path, monkeypatch):
     names: dict = {"stations": np.zeros(3), "angles": np.linspace(0, 1, 3), "forces": 1.5}
     exec("from softjaw.study.lookup" + text.partition("```")[0], names)
     assert names["e_n"] == pytest.approx(names["grasps"].at(0, [0, 0.5, 1], 1.5).e_n)
+
+
+def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):
+    from softjaw.study.result.read import open as open_dataset
+    from softjaw.study.show.tables.show import best
+
+    held = np.random.default_rng(2).permutation(np.arange(float(len(STATIONS) * len(ANGLES) * len(FORCES))))
+    held = 0.01 * held.reshape(len(STATIONS), len(ANGLES), len(FORCES))
+    path = make(tmp_path / "a.hdf", smooth, payload__ccm=held)
+    found, ds = GraspMap(path), open_dataset(path)
+    for by, force in ((None, None), ("payload", None), ("payload", FORCES[0]), ("e_n", FORCES[1])):
+        table = best(ds, force=force, by=by, top=3)
+        names = [name for name, _ in table.columns]
+        points = found.best(3, by, force)
+        for row, point in zip(table.rows, points, strict=True):
+            assert point.place[0].tolist() == [row[1], row[2], table.force]
+            assert [point.payload, point.e_n] == [row[names.index("payload")], row[names.index("e_n")]]
+    assert len(found.best(10_000)) == len(STATIONS) * len(ANGLES)
+    with pytest.raises(ValueError, match=r"force is 1\.5"):
+        found.best(force=1.5)
+
+
+def test_a_point_knows_the_poses_of_its_pads_between_solved_angles_only(tmp_path):
+    turns = Rotation.from_euler("z", np.reshape(ANGLES, (-1, 1))).as_matrix()[None, :, None, None]
+    turns = np.broadcast_to(turns, (len(STATIONS), len(ANGLES), len(FORCES), 2, 3, 3))
+    found = GraspMap(make(tmp_path / "a.hdf", fingers__pose_rotation=lambda old: turns.reshape(old.shape)))
+    angle = (ANGLES[0] + ANGLES[1]) / 2
+    R, x = found.at(STATIONS[0], angle, FORCES[0]).pose
+    assert R == pytest.approx(np.broadcast_to(Rotation.from_euler("z", angle).as_matrix(), (2, 3, 3)), abs=1e-12)
+    assert x.tolist() == [[0.0, 0.0, -0.02], [0.0, 0.0, 0.02]]
+    many, _ = found.at(STATIONS[0], [ANGLES[0], ANGLES[-1] + 0.1], FORCES[0]).pose
+    assert np.isfinite(many[0]).all()
+    assert np.isnan(many[1]).all()

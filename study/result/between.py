@@ -1,0 +1,60 @@
+"""A dataset at a force between two solved ones, and which cases are of one kind, so that a line may join them."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import BOTH_ENDS, DONE, MISSING
+
+KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
+
+
+def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
+    """Numbers of a finger's quantity of `KINDS` that differ where contacts differ in kind; NaN counts as 0."""
+    numbers = np.nan_to_num(values).astype(np.int64)
+    if name == "rims":  # a pad that bears on both of its ends
+        return np.asarray((numbers & BOTH_ENDS) == BOTH_ENDS, np.int64)
+    return np.minimum(numbers, KINDS[name])
+
+
+def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
+    """The dataset at one force [N] between two solved ones, by straight lines; flags of both.
+
+    A case beside one that is not solved has that one's state. Across a snap-in of the wall, and between contacts that
+    differ in kind, nothing is known: the state is "not computed".
+
+    Raises
+    ------
+    ValueError
+        For a force outside of the solved ones, with what they are.
+    """
+    forces = ds["normal_force"].values
+    if not forces[0] <= force <= forces[-1] or len(forces) < 2:
+        solved = ", ".join(f"{f:g}" for f in forces)
+        raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
+    k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
+    share = (force - forces[k]) / (forces[k + 1] - forces[k])
+    low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
+    found = low.copy()
+    for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
+        if ds[name].dtype.kind == "f":
+            found[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
+        elif name == "flags":
+            found[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
+    states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
+    states = np.where((states == DONE) & _apart(low, high), MISSING, states)
+    found["status"] = (ds["status"].dims, states, ds["status"].attrs)
+    found["normal_force"].attrs.update(ds["normal_force"].attrs)
+    return found
+
+
+def _apart(low: xr.Dataset, high: xr.Dataset) -> NDArray[np.bool_]:
+    """Cases that no straight line may join."""
+    apart = (low["flags"].values ^ high["flags"].values) & int(Flag.SNAPPED) > 0
+    for name in KINDS if "finger_rims" in low else ():
+        one, other = (contact_kinds(name, ds[f"finger_{name}"].values) for ds in (low, high))
+        apart |= (one != other).any(axis=-1)
+    return np.asarray(apart, bool)
