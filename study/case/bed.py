@@ -68,7 +68,7 @@ class Side:
         self.jaws = jaws
         self.touch = float(np.min(height))
         self.height = height - self.touch
-        self.x, self.y = np.meshgrid(x, y, indexing="ij")
+        self.x, self.y = np.repeat(x[:, None], len(y), axis=1), np.repeat(y[None], len(x), axis=0)
         self.cell = (x[1] - x[0]) * (y[1] - y[0])
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
