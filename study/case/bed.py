@@ -136,7 +136,8 @@ class Side:
     def worth(self) -> float:
         """Torque arm, no longer than on a whole flat face, less what curvature, peaks and bridging take [m]."""
         full = float(np.hypot(self.x, self.y).mean())
-        return min(self.arm, full) * self.kept * self.peak * self.bridging
+        # curvature takes of the torque, and once more of the forces that quality multiplies it with
+        return min(self.arm, full) * self.kept**2 * self.peak * self.bridging
 
 
 def _slopes(height: FloatArray, dx: float, dy: float) -> FloatArray:
