@@ -68,7 +68,7 @@ class Side:
         self.jaws = jaws
         self.touch = float(np.min(height))
         self.height = height - self.touch
-        self.x, self.y = np.meshgrid(x, y, indexing="ij")
+        self.x, self.y = np.repeat(x[:, None], len(y), axis=1), np.repeat(y[None], len(x), axis=0)
         self.cell = (x[1] - x[0]) * (y[1] - y[0])
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
@@ -136,7 +136,8 @@ class Side:
     def worth(self) -> float:
         """Torque arm, no longer than on a whole flat face, less what curvature, peaks and bridging take [m]."""
         full = float(np.hypot(self.x, self.y).mean())
-        return min(self.arm, full) * self.kept * self.peak * self.bridging
+        # curvature takes of the torque, and once more of the forces that quality multiplies it with
+        return min(self.arm, full) * self.kept**2 * self.peak * self.bridging
 
 
 def _slopes(height: FloatArray, dx: float, dy: float) -> FloatArray:
