@@ -187,7 +187,7 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         return path, output
 
     def compare():
-        scene.write_text(SCENE.replace("BUDGET", "20"))
+        scene.write_text(SCENE.replace("BUDGET", "12"))
         alone, _ = run("alone.hdf", 0)
         assert len(added(alone)) >= 2
         expected = contents(alone)
