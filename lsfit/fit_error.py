@@ -62,6 +62,18 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     )
 
 
+def overclaim(model: LimitSurface, W: ArrayLike) -> float:
+    """Largest share by which ``model`` claims more than wrenches ``W (m, d)`` of a true surface, along them.
+
+    0 where it claims nowhere more, infinite where it has no end. Samples without a wrench are left out.
+    """
+    W, _ = checked_motions(W, None)
+    P = model.value(W)
+    with np.errstate(divide="ignore"):
+        radius = np.where(P > ENDLESS, P, 0.0) ** (-1 / model.degree)
+    return max(float(radius.max()) - 1.0, 0.0)
+
+
 def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     """Angles ``(m,)`` between motions and all that is normal to a flat surface: gradients plus what leaves its span."""
     length = np.linalg.norm(G, axis=1, keepdims=True)

@@ -203,9 +203,7 @@ def joint_support(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: st
 
 
 def joined(h: FloatArray, kind: str) -> FloatArray:
-    """Supports ``(n, m)`` of the contacts for unit normal forces as one of the grasp; "linf", "l1" or "fixed"."""
-    if kind == "fixed":
-        return h.sum(axis=0)
+    """Supports ``(n, m)`` of the contacts for unit normal forces as one of the grasp; "linf" or "l1"."""
     # without a normal force a contact adds nothing, and can be let go where it would resist
     h = np.maximum(h, 0)
     return h.max(axis=0) if kind == "l1" else h.sum(axis=0)

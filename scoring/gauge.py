@@ -5,9 +5,9 @@ carries ``lam c + D^T f`` with ``|f| <= lam``. The reach along ``w`` is a pair o
 
     max s:  s w = sum_i lam_i c_i + D_i^T f_i      =      min sum_i s_i:  u . w = 1,  s_i >= c_i . u + |D_i u|,
 
-with ``0 <= lam_i <= 1`` and ``s_i >= 0`` (L-infinity), ``sum_i lam_i <= 1`` and one common ``s`` (L1), or ``lam_i = 1``
-and free ``s_i`` (normal forces fixed). `cone_programme` solves the pair for many wrenches at once. Both sides are then
-evaluated as they stand, so the bounds hold however well it converged.
+with ``0 <= lam_i <= 1`` and ``s_i >= 0`` (L-infinity), or ``sum_i lam_i <= 1`` and one common ``s`` (L1).
+`cone_programme` solves the pair for many wrenches at once. Both sides are then evaluated as they stand, so the bounds
+hold however well it converged.
 
 The programmes are solved by a primal-dual interior-point method over products of Lorentz cones, with Nesterov and
 Todd's scaling and Mehrotra's corrector; L. Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (2010),
@@ -50,7 +50,7 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     w : (m, r) array
         Wrenches, none of them 0.
     kind : str
-        "linf", "l1" or "fixed"; the last gives the lower bound -inf if no multiple of the wrench was found held.
+        "linf" or "l1".
     tolerance : float
         Gap at which the programmes stop, relative to the value and to the contacts' supports for ``w / |w|^2``.
     """
@@ -83,11 +83,10 @@ def facing(
     n, r = c.shape
     k, more = 1 if kind == "l1" else n, 0 if centre is None else 1
     # (u, s, q) -> (s_i - c_i u, D_i u), then s_i >= 0, then q >= -centre u
-    L = np.zeros(((n if kind == "fixed" else n + k) + more, 4, r + k + more))
+    L = np.zeros((n + k + more, 4, r + k + more))
     L[:n, 0, :r], L[:n, 1:, :r] = -c, D
     L[np.arange(n), 0, r + np.arange(n) % k] = 1
-    if kind != "fixed":
-        L[n + np.arange(k), 0, r + np.arange(k)] = 1
+    L[n + np.arange(k), 0, r + np.arange(k)] = 1
     u0 = w / (w * w).sum(axis=1, keepdims=True)
     h = contact_support(c, D, u0)
     # room for the start inside all cones, also where the supports themselves are nearly 0
@@ -95,7 +94,7 @@ def facing(
     if centre is not None:
         L[-1, 0, :r], L[-1, 0, -1] = centre, 1
         size = size + np.abs(u0 @ centre)[:, None]
-    s = h if kind == "fixed" else np.maximum(h, 0)
+    s = np.maximum(h, 0)
     v0 = np.hstack([u0, (s.max(axis=1, keepdims=True) if kind == "l1" else s) + size])
     if centre is not None:
         v0 = np.hstack([v0, size - (u0 @ centre)[:, None]])
@@ -115,7 +114,7 @@ def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str
     """Reach along ``w`` of the loads ``x = (lam, f)``, ``(m, n, 4)``, once they are made to be in their cones."""
     lam, f = x[..., :1], x[..., 1:]
     # loads are pulled back into their cones, so that the bound holds however far the programme came
-    lam = np.ones_like(lam) if kind == "fixed" else np.maximum(lam, 0)
+    lam = np.maximum(lam, 0)
     length = np.linalg.norm(f, axis=2, keepdims=True)
     f = f * np.minimum(1, lam / np.maximum(length, 1e-300))
     wrench = np.einsum("mi,ir->mr", lam[..., 0], c) + np.einsum("mia,iar->mr", f, D)
@@ -123,10 +122,9 @@ def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str
     missing = np.linalg.norm(wrench - s[:, None] * w, axis=1)
     size = (lam[..., 0] * (np.linalg.norm(c, axis=1) + np.linalg.norm(D, axis=(1, 2)))).sum(axis=1)
     # forces beyond their limit shrink together, which keeps their wrench along w
-    total = {"linf": lam.max(axis=(1, 2)), "l1": lam.sum(axis=(1, 2)), "fixed": np.ones(len(w))}[kind]
-    failed = -np.inf if kind == "fixed" else 0.0
-    # loads off the line of w prove only s = 0, where none are needed; with fixed forces not even that
-    return np.where(missing <= _ROUNDING * size, s / np.maximum(total, 1), failed)
+    total = {"linf": lam.max(axis=(1, 2)), "l1": lam.sum(axis=(1, 2))}[kind]
+    # loads off the line of w prove only s = 0, where none are needed
+    return np.where(missing <= _ROUNDING * size, s / np.maximum(total, 1), 0.0)
 
 
 def _across(w: FloatArray) -> FloatArray:

@@ -52,7 +52,7 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
     w : (r,) array
         Wrench, not 0.
     kind : str
-        "linf", "l1" or "fixed" as in `scoring.gauge`.
+        "linf" or "l1" as in `scoring.gauge`.
     tolerance : float
         Gap of the bounds, relative to the upper one, at which the cutting planes stop.
     """
@@ -61,7 +61,7 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
         bounds = gauge(C[:, :, 0], D, w[None], kind)
         return Reach(float(bounds.lower[0]), float(bounds.upper[0]), bounds.u[0])
     programme = _CuttingPlanes(C, bodies, w, kind)
-    best = Reach(-np.inf if kind == "fixed" else 0.0, np.inf, w / (w @ w))
+    best = Reach(0.0, np.inf, w / (w @ w))
     programme.cut(best.u)
     for _ in range(_CUTS):
         lower, u = programme.solve()
@@ -99,7 +99,6 @@ class _CuttingPlanes:
     def solve(self) -> tuple[float, FloatArray]:
         """Reach of the polytopes and its direction."""
         cost = np.concatenate([np.zeros(self.r), np.ones(self.k)])
-        s = (None, None) if self.kind == "fixed" else (0, None)
         # the bounds keep the programme finite where the polytopes so far do not hold the wrench at all
         optimum = linprog(
             cost,
@@ -107,7 +106,7 @@ class _CuttingPlanes:
             b_ub=np.zeros(len(self.rows)),
             A_eq=np.concatenate([self.w, np.zeros(self.k)])[None],
             b_eq=[1.0],
-            bounds=[(-self.far, self.far)] * self.r + [s] * self.k,
+            bounds=[(-self.far, self.far)] * self.r + [(0, None)] * self.k,
             method="highs-ds",
         )
         # the solver meets u . w = 1 up to its tolerance only, and the bound needs it exactly

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object, own_frame, pad_shape
 from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, solver, state_flags
+from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, followed, solver, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
@@ -94,16 +93,16 @@ def _outcomes(
         for k, found in solving.levels(forces, range(len(forces)) if wanted is None else sorted(wanted)):
             yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
         return
-    path = solving.load_path(forces)
-    for k, force in enumerate(forces):
-        try:
-            yield k, next(path)
-        except (ConvergenceError, CheckError) as error:
-            good = f"the last good force is {forces[k - 1]:g} N" if k else "no force below it was tried"
-            yield k, CaseFailure(f"{error}; {good}")
-            for above in range(k + 1, len(forces)):
-                yield above, CaseFailure(f"not tried, because the load path ended at {force:g} N: {error}")
-            return
+    last, k = "no force below it was solved", -1
+    for k, found in enumerate(followed(solving.load_path, forces)):
+        if isinstance(found, Solved):
+            last = f"the last good force is {forces[k]:g} N"
+            yield k, found
+        else:
+            ended = f"not tried, because the load path ended at {forces[k]:g} N: {found}"
+            yield k, CaseFailure(f"{found}; {last}")
+    for above in range(k + 1, len(forces)):
+        yield above, CaseFailure(ended)
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:

@@ -166,6 +166,11 @@ TABLE = (
              "377 motions that it was not fitted to; CCM, of the finger where it is larger.", rank=10),
     Quantity("fit_error_ellipsoid", (), "", "fit error of the ellipsoid from three motions",
              "As fit error, of the ellipsoid that quality is computed from."),
+    Quantity("overclaim", (), "", "largest overclaim of the fitted limit surface",
+             "Largest share by which the fitted limit surface claims more friction than the contact carries, over the "
+             "same motions; CCM, of the finger where it is larger."),
+    Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
+             "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
              "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.", rank=2),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",

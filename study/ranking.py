@@ -118,6 +118,20 @@ def score_of(ds: Any, by: str | None = None) -> str:
     return known[0] if known else "e_n"
 
 
+def rank_values(ds: Any, name: str, k: int, each: bool) -> np.ndarray:
+    """What grasps are ranked by at a force level, the largest first; flat over the candidates.
+
+    It is a map (curved model). Only where each grasp is to have its own force (``each``), the object's mass is known
+    and the map is the payload, the smaller force to use is the better; grasps that have none come after, by payload.
+    """
+    found = ds[name].sel(model="ccm") if "model" in ds[name].dims else ds[name]
+    values = np.asarray(found.values, float)[..., k].ravel()
+    if not (each and name == "payload" and "force_low" in ds):
+        return values
+    force, most = ds["force_low"].values.ravel(), values[np.isfinite(values)].max(initial=0.0)
+    return np.where(np.isfinite(force), 1.0 / force, values - most - 1.0)
+
+
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     """Number of the force level at which grasps are ranked, and in words why it is that one.
 

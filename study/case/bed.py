@@ -68,12 +68,12 @@ class Side:
         self.jaws = jaws
         self.touch = float(np.min(height))
         self.height = height - self.touch
-        self.x, self.y = np.meshgrid(x, y, indexing="ij")
+        self.x, self.y = np.repeat(x[:, None], len(y), axis=1), np.repeat(y[None], len(x), axis=0)
         self.cell = (x[1] - x[0]) * (y[1] - y[0])
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
         filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
-        self.slope = np.stack(np.gradient(filled, x, y), axis=-1)
+        self.slope = _slopes(filled, x[1] - x[0], y[1] - y[0])
         # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
         edge = np.abs(self.slope).max(axis=-1) > STEEPEST
         self.slope[edge] = 0.0
@@ -136,7 +136,19 @@ class Side:
     def worth(self) -> float:
         """Torque arm, no longer than on a whole flat face, less what curvature, peaks and bridging take [m]."""
         full = float(np.hypot(self.x, self.y).mean())
-        return min(self.arm, full) * self.kept * self.peak * self.bridging
+        # curvature takes of the torque, and once more of the forces that quality multiplies it with
+        return min(self.arm, full) * self.kept**2 * self.peak * self.bridging
+
+
+def _slopes(height: FloatArray, dx: float, dy: float) -> FloatArray:
+    """Central differences of a height field on even steps, one-sided at its sides ``(m, n, 2)``."""
+    # as numpy.gradient, which takes twice the time on fields as small as these
+    slope = np.empty((*height.shape, 2))
+    for k, (h, step) in enumerate(((height, dx), (height.T, dy))):
+        along = slope[..., k] if k == 0 else slope[..., k].T
+        along[1:-1] = (h[2:] - h[:-2]) / (2.0 * step)
+        along[0], along[-1] = (h[1] - h[0]) / step, (h[-1] - h[-2]) / step
+    return slope
 
 
 def _direction(slope: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from softjaw.lsfit.ellipsoid import (
     full_ellipsoid,
     three_motion_ellipsoid,
 )
-from softjaw.lsfit.fit_error import FitErrors, fit_error
+from softjaw.lsfit.fit_error import FitErrors, fit_error, overclaim
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
@@ -46,7 +46,7 @@ class SurfaceFit(NamedTuple):
 
     ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``own`` is the fit error on
     those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from three
-    motions on others.
+    motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much there.
     """
 
     rho: float
@@ -57,6 +57,8 @@ class SurfaceFit(NamedTuple):
     own: FitErrors
     fit_error: FitErrors
     ellipsoid_fit_error: FitErrors
+    overclaim: float
+    ellipsoid_overclaim: float
 
     def body(self, mu: float) -> LimitSurface:
         """The surface in ``(f_x, f_y, tau_z)`` per unit of S [-, -, m]."""
@@ -92,13 +94,15 @@ def fit_surfaces(
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
     # a fit is judged by motions that it has not seen
     own, others = slice(samples), slice(samples, None)
-    reference = _fit_error(ellipsoid, W[others], T[others])
+    reference, too_much = _fit_error(ellipsoid, W[others], T[others]), overclaim(ellipsoid, W[others])
     found = {}
     for kind in kinds:
         surface, certificate = fitted(ellipsoid, W[own], T[own], kind, objective)
         judged = reference if surface is ellipsoid else _fit_error(surface, W[others], T[others])
         on_own = _fit_error(surface, W[own], T[own])
-        found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], on_own, judged, reference)
+        claim = too_much if surface is ellipsoid else overclaim(surface, W[others])
+        errors = on_own, judged, reference, claim, too_much
+        found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], *errors)
     return found
 
 
@@ -189,6 +193,8 @@ def surface_values(
         "limit_surface/rho": [b.rho for b in curved],
         "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),
         "maps/fit_error_ellipsoid": np.max([b.ellipsoid_fit_error.Erad for b in curved]),
+        "maps/overclaim": np.max([b.overclaim for b in curved]),
+        "maps/overclaim_ellipsoid": np.max([b.ellipsoid_overclaim for b in curved]),
     }
 
 

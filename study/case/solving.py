@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -30,8 +30,10 @@ from softjaw.study.scene import Scene
 OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
+HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+State = TypeVar("State")
 
 
 class PressedContact(Contact):
@@ -143,6 +145,23 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
     return OnWall(scene, fingers, level)
 
 
+def followed(
+    load_path: Callable[[Sequence[float]], Iterator[State]], forces: Sequence[float]
+) -> Iterator[State | ConvergenceError | CheckError]:
+    """For every force what a load path has there or why it has nothing, up to the one at which it ends."""
+    path, lowest = load_path(forces), True
+    for k, force in enumerate(forces):
+        try:
+            yield next(path)
+            lowest = False
+        except (ConvergenceError, CheckError) as error:
+            yield error
+            # hardly a touch, which tells nothing of the forces above
+            if not lowest or not force < HARDLY * max(forces[k + 1 :], default=0.0):
+                return
+            path = load_path(forces[k + 1 :])
+
+
 class OnRigid:
     """Fingers on a rigid object do not feel each other."""
 
@@ -186,7 +205,7 @@ class OnRigid:
         states = [(fine.at(force, start), start) for (fine, _), start in zip(self.presses, coarse, strict=True)]
         # an error can be told only where both fingers have a coarser state
         if any(start is None for start in coarse):
-            reason = next(path.ended for path in paths if path.ended)
+            reason = next(path.ended for path, start in zip(paths, coarse, strict=True) if start is None)
             return replace(self._solved([(fine,) for fine, _ in states]), note=NO_ERROR.format(reason=reason))
         return self._solved(states)
 
@@ -213,16 +232,14 @@ class _CoarsePath:
     """States of a finger on the coarser mesh, from the lowest force upward, as far as they are asked for."""
 
     def __init__(self, press: Press, forces: Sequence[float]) -> None:
-        self._path, self._states = press.load_path(forces), list[Pressed]()
+        self._path, self._states = followed(press.load_path, forces), list[Pressed | None]()
         self.ended = ""  # why there are no more
 
     def state(self, k: int) -> Pressed | None:
         """State at the ``k``-th force; None where the path ends before."""
-        while len(self._states) <= k and not self.ended:
-            try:
-                self._states.append(next(self._path))
-            except (ConvergenceError, CheckError) as error:
-                self.ended = str(error)
+        while len(self._states) <= k and (found := next(self._path, None)) is not None:
+            self._states.append(found if isinstance(found, Pressed) else None)
+            self.ended = self.ended if isinstance(found, Pressed) else str(found)
         return self._states[k] if k < len(self._states) else None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
+from softjaw.study.lookup.pads import pad_poses
 from softjaw.study.quantities import BOTH_ENDS, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
@@ -108,17 +109,12 @@ class GraspPoint:
         """Rotations ``(..., 2, 3, 3)`` and origins ``(..., 2, 3)`` [m] of both pads at first touch.
 
         ``x = rotation x_pad + origin`` in the frame of the object's own file; between cases the nearest rotation to
-        their mean. NaN at angles outside of the solved ones, whose values are those of an image by symmetry.
+        their mean. NaN at angles outside of the solved ones, where values are those of an image by symmetry.
         """
-        R, x = self.fingers("pose_rotation"), self.fingers("pose_origin")
-        flat, origin, angles = R.reshape(-1, 2, 3, 3), x.reshape(-1, 2, 3), self.map.source.axes[1].values
-        nearest = np.clip(self.place[:, 1], angles.min(), angles.max())
-        here = self.map.by_poses | (np.abs(self.place[:, 1] - nearest) < 1e-9)
-        flat[~here], origin[~here] = np.nan, np.nan
-        known = here & (self.states == INSIDE)
-        U, _, V = np.linalg.svd(flat[known])
-        flat[known] = U @ V
-        return flat.reshape(R.shape), origin.reshape(x.shape)
+        R, x = pad_poses(self.map.source, self.place, self.map.by_poses)
+        outside = self.states != INSIDE
+        R[outside], x[outside] = np.nan, np.nan
+        return R.reshape(*self.shape, 2, 3, 3), x.reshape(*self.shape, 2, 3)
 
     @property
     def safety_factor(self) -> Any:

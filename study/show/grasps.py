@@ -16,7 +16,7 @@ import xarray as xr
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, Flag, flags_in
 from softjaw.study.quantities import MODELS
-from softjaw.study.ranking import judged, ranking, score_of, shown_level
+from softjaw.study.ranking import judged, rank_values, ranking, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.units import shown, shown_unit
 
@@ -161,9 +161,9 @@ def unravelled(position: int, shape: tuple[int, ...]) -> Index:
 
 def order(ds: xr.Dataset, k: int) -> list[Index]:
     """Indices of the solved cases at a force level, the best first."""
-    found, states = field(ds, ds.attrs["score"]), ds.status.values[..., k]
+    states, each = ds.status.values[..., k], k == ds.attrs["level"]
     done = np.flatnonzero(states.ravel() == DONE)
-    score = np.full(done.shape, -np.inf) if found is None else found[..., k].ravel()[done]
+    score = rank_values(ds, ds.attrs["score"], k, each)[done]
     ranked = done[ranking(score, ds["flags"].values[..., k].ravel()[done])]
     return [(*unravelled(int(c), states.shape), k) for c in ranked]
 

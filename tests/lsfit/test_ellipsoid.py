@@ -7,7 +7,7 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import body_volume, hull_volume
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.lsfit.fit_error import fit_error
+from softjaw.lsfit.fit_error import fit_error, overclaim
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from tests.generators import lcg_patch
 
@@ -35,6 +35,13 @@ def test_errors_of_a_swollen_ellipsoid():
     W, T = on_the_surface()
     errors = fit_error(Ellipsoid(1.1 * AXES), W, T)
     np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
+
+
+def test_only_what_is_claimed_too_much_is_an_overclaim():
+    W, _ = on_the_surface()
+    assert overclaim(Ellipsoid(1.1 * AXES), W) == pytest.approx(0.1, rel=1e-9)
+    assert overclaim(Ellipsoid(0.9 * AXES), W) == 0.0
+    assert overclaim(Ellipsoid(AXES * [1.0, 1.0, 1.2]), [[0, 0, AXES[2]], [AXES[0], 0, 0]]) == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -164,7 +164,7 @@ def test_a_plane_contact_resists_three_directions_and_a_curved_one_six(shape, ra
     assert values["limit_surface/fit_error_6d"][0][1] < 0.05
     level, dropped, _ = result.effects["wrench"]
     assert level == "6-D"
-    assert (dropped > 1e-3) == (rank == 6)
+    assert (dropped > 1e-4) == (rank == 6)
 
 
 def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the_pads():

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from softjaw.fem.errors import ConvergenceError
 from softjaw.study import pipeline
 from softjaw.study.case import solving
 from softjaw.study.case.build import build_object
@@ -76,7 +77,7 @@ def differing(found, expected, tolerance, scale=None):
 SCALES = {
     "maps/misalignment": 1.0, "fingers/frame_origin": 0.01, "fingers/pose_origin": 0.01, "fingers/frame_axes": 1.0,
     "maps/curvature_loss": 1.0, "checks/force_balance": 1.0, "checks/adhesion": 1.0, "checks/penetration": 1.0,
-    "checks/complementarity": 1.0,
+    "checks/complementarity": 1.0, "maps/payload": 1e3,  # known to 5e-4, by a search that rounding turns
     **{f"maps/{n}_overestimate{s}": 1.0 for n in ("f_x", "f_y", "tau_z") for s in ("", "_pcm_projected")},
 }  # fmt: skip
 
@@ -317,8 +318,8 @@ def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(
 
 def test_a_load_path_without_a_first_step_says_so():
     first, second = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
-    assert "no force below it was tried" in first.message
-    assert first.message.endswith("; no force below it was tried")
+    assert "no force below it was solved" in first.message
+    assert first.message.endswith("; no force below it was solved")
     assert second.message.startswith("not tried, because the load path ended at 2 N")
 
 
@@ -465,3 +466,18 @@ def test_the_opening_is_the_width_of_the_object_and_both_pads_close_it(shape, an
         assert values["maps/opening"] - values["maps/opening_loaded"] == pytest.approx(closing, abs=1e-15)
         one, two = values["fingers/pose_origin"]
         assert np.linalg.norm(two - one) == pytest.approx(values["maps/opening"], abs=1e-12)
+
+
+def test_forces_above_one_that_hardly_touches_begin_anew():
+    def load_path(forces):
+        for force in forces:
+            if force < 1e-3:
+                raise ConvergenceError("no first contact")
+            yield force
+
+    failed, *_, one, two = solving.followed(load_path, (1e-9, 1e-4, 1.0, 2.0))
+    assert isinstance(failed, ConvergenceError)
+    assert (one, two) == (1.0, 2.0)
+    # a first force that is not small beside the others ends the path
+    [only] = solving.followed(load_path, (9e-4, 0.5))
+    assert isinstance(only, ConvergenceError)

@@ -99,12 +99,15 @@ def limit_surfaces(view: View, index: Index) -> Block | None:
     made.update_scenes(plots.scene("", NAMES, aspectmode="cube"))
     made.update_layout(legend={"y": 0.56, "yanchor": "middle"}, margin={"t": 20, "b": 10})
     exact = "Dots: exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
-    fitted, ellipsoid = at(ds, "fit_error", index), at(ds, "fit_error_ellipsoid", index)
-    off = f"Fit error (CCM): {number(100 * fitted, 2)} % fitted, {number(100 * ellipsoid, 2)} % from three motions."
+    worst = [at(ds, name, index) for name in ("overclaim", "overclaim_ellipsoid")]
+    mean = [at(ds, name, index) for name in ("fit_error", "fit_error_ellipsoid")]
+    parts = zip(worst, mean, strict=True)
+    fitted, ellipsoid = (f"{number(100 * w, 2)} % (mean error {number(100 * m, 2)} %)" for w, m in parts)
+    off = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
     caption = (
         f"{place(ds, index, force=True)}: the loads that one contact carries without slipping. Above its shadows: full"
         f" lines the fitted surface, dashed the ellipsoid from three motions. {exact}"
-    ) + off * bool(np.isfinite(fitted) and np.isfinite(ellipsoid))
+    ) + off * bool(np.isfinite([*worst, *mean]).all())
     return plot(made, caption, f"Limit surfaces of {' and '.join(known)} over f_x, f_y and tau_z.", 820)
 
 

@@ -104,8 +104,8 @@ def abscissa(ds: xr.Dataset, position: int) -> tuple[Any, dict[str, Any]]:
 
 
 def fit_error(ds: xr.Dataset, position: int, index: Index) -> Block | None:
-    """Fit error of both limit surfaces along one axis; None where it is not stored."""
-    found = {"fitted surface": field(ds, "fit_error"), "ellipsoid from three motions": field(ds, "fit_error_ellipsoid")}
+    """What both limit surfaces claim too much at most, along one axis; None where it is not stored."""
+    found = {"fitted surface": field(ds, "overclaim"), "ellipsoid from three motions": field(ds, "overclaim_ellipsoid")}
     lines = {name: 100 * values[along(position, index)] for name, values in found.items() if values is not None}
     if not any(np.isfinite(line).sum() > 1 for line in lines.values()):
         return None
@@ -113,12 +113,12 @@ def fit_error(ds: xr.Dataset, position: int, index: Index) -> Block | None:
     x, settings = abscissa(ds, position)
     for (name, line), dash in zip(lines.items(), ("solid", "dash"), strict=False):
         made.add_scatter(x=x, y=line, name=name, mode="lines+markers", line={"color": "#12436d", "dash": dash})
-    made.update_xaxes(**settings).update_yaxes(title_text="fit error [%]", rangemode="tozero")
+    made.update_xaxes(**settings).update_yaxes(title_text="largest overclaim [%]", rangemode="tozero")
     caption = (
-        "Mean error of the limit surface's radius, CCM, larger fit error of both fingers, on motions that no surface"
-        " was fitted to."
+        "Largest share by which a limit surface claims more friction than the contact carries, CCM, of the finger where"
+        " it is larger, on motions that no surface was fitted to."
     )
-    return plot(made, caption, f"Fit error of the limit surfaces over {spoken(str(ds.status.dims[position]))}", 300)
+    return plot(made, caption, f"Overclaim of the limit surfaces over {spoken(str(ds.status.dims[position]))}", 300)
 
 
 # --- what curvature costs --------------------------------------------------------------------------------------------

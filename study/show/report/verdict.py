@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import BORNE
+from softjaw.study.flags import BORNE, LOST
 from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
 from softjaw.study.ranking import largest, passed_over
 from softjaw.study.show.grasps import (
@@ -130,7 +130,8 @@ def _best(ds: xr.Dataset, best: Index) -> str:
     swept = "Best point of the sweep" if max(lengths[:-3], default=1) > 1 else "The grasp"
     name = "Best grasp" if max(lengths[-3:-1]) > 1 else swept
     e_n = f"e_n {value(ds, 'e_n', best, 3)}{' mm' * bool(np.isfinite(at(ds, 'e_n', best)))}"
-    ranked = f"ranked by {score} at this force, {ds.attrs['why']}" * bool(score != "e_n")
+    by = "the force to use" if score == "payload" and "force_low" in ds else f"{score} at this force"
+    ranked = f"ranked by {by}, {ds.attrs['why']}" * bool(score != "e_n")
     text = f"{name} at {_force(ds, best)} per finger: {place(ds, best)}, {what}, {e_n}"
     return f"{'; '.join(filter(None, [text, ranked]))}.{same}"
 
@@ -276,9 +277,10 @@ def warnings(ds: xr.Dataset) -> list[str]:
         found.append(f"This study is unfinished: {missing} cases are missing, so a better grasp may be found.")
     if best is None:
         return found
-    if best[-1] < status.shape[-1] - 1:
-        above = "grasp is safe" if np.any(status[..., best[-1] + 1 :] == DONE) else "case is solved"
-        found.append(f"No {above} above {_force(ds, best)}; all comparisons are made there.")
+    above = (status[..., best[-1] + 1 :] == DONE, ds["flags"].values[..., best[-1] + 1 :] & LOST == 0)
+    if best[-1] < status.shape[-1] - 1 and not (above[0] & above[1]).any():
+        what = "grasp is safe" if above[0].any() else "case is solved"
+        found.append(f"No {what} above {_force(ds, best)}; all comparisons are made there.")
     if reasons := [flag.sentence for flag in flags_of(ds, best) if flag & BORNE]:
         found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
     if failed := flagged(ds, best):

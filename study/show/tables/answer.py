@@ -8,8 +8,9 @@ import numpy as np
 
 from softjaw.study.ranking import task_keys
 from softjaw.study.show.grasps import Index, at, forces, number, place
-from softjaw.study.units import shown_text
+from softjaw.study.units import in_si, shown, shown_text
 
+UNSEEN = 0.005  # of a force: an error below it is not seen in three digits
 PLAIN = {"\N{NO-BREAK SPACE}": " ", "\N{DEGREE SIGN}": " deg"}
 
 
@@ -44,10 +45,10 @@ def _press(ds: Any, index: Index) -> str:
     if mass is None or "force_low" not in ds:
         return f"{here}: it then {now}"
     low, error = force_to_use(ds, index)
-    wanted = f"{safety:g} times the object's {_mass(1e-3 * mass)}"
+    wanted = f"{safety:g} times the object's {_mass(in_si('mass_g', mass))}"
     if not np.isfinite(low):
         return f"{here}: it then {now}, but no solved force holds {wanted}"
-    margin = f" +- {error:.2g}" if np.isfinite(error) else ""
+    margin = f" +- {error:.2g}" if error > UNSEEN * low else ""
     return f"press with {low:.3g}{margin} N per finger: it then holds {wanted} {every} ({_mass(held)} at {force:.3g} N)"
 
 
@@ -68,5 +69,5 @@ def _pads(ds: Any, index: Index) -> str:
     middle, along = ds.finger_pose_origin.values[index].mean(axis=0), ds.finger_pose_rotation.values[index][0][:, 2]
     if not np.isfinite([*middle, *along]).all():
         return ""
-    x, n = (", ".join(f"{v + 0.0:.3g}" for v in np.round(part, 6)) for part in (1e3 * middle, along))
+    x, n = (", ".join(f"{v + 0.0:.3g}" for v in np.round(part, 6)) for part in (shown(middle, 'm'), along))
     return f" (pads about [{x}] mm, closing along [{n}])"

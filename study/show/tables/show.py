@@ -14,7 +14,7 @@ from rich.cells import cell_len
 
 from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
-from softjaw.study.ranking import judged, passed_over, ranking, score_of, shown_level
+from softjaw.study.ranking import judged, passed_over, rank_values, ranking, score_of, shown_level
 from softjaw.study.result.between import at_force
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
@@ -71,7 +71,7 @@ def best(
     forces, shape = axes[-1].values, ds.status.shape[:-1]
     maps = {(name, unit): found[..., k].ravel() for name, unit, found in _columns(ds)}
     scored = score_of(ds, by)
-    score = values_of(ds, scored)[..., k].ravel()
+    score = rank_values(ds, scored, k, each=force is None)
     done = np.flatnonzero(ds.status.values[..., k].ravel() == DONE)
     flags = flags[..., k].ravel()
     order = done[ranking(score[done], flags[done])]
@@ -86,7 +86,8 @@ def best(
         return (rank, *place, *([str(labels[i])] * len(named)), *values, int(flags[i]))
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
-    what = f"best {len(rows)} of {len(done)} solved candidates by {scored}" if rows else "no candidate is solved"
+    by = "force to use" if force is None and scored == "payload" and "force_low" in ds else scored
+    what = f"best {len(rows)} of {len(done)} solved candidates by {by}" if rows else "no candidate is solved"
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
     errors = verdict(sure(ds, scored, k), holding, same, ds[scored].attrs.get("units", ""))

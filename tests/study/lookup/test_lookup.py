@@ -388,6 +388,8 @@ def test_a_point_knows_the_poses_of_its_pads_between_solved_angles_only(tmp_path
     R, x = found.at(STATIONS[0], angle, FORCES[0]).pose
     assert R == pytest.approx(np.broadcast_to(Rotation.from_euler("z", angle).as_matrix(), (2, 3, 3)), abs=1e-12)
     assert x.tolist() == [[0.0, 0.0, -0.02], [0.0, 0.0, 0.02]]
+    between = found.at((STATIONS[0] + STATIONS[1]) / 2, ANGLES[1], FORCES[0]).pose[0]
+    assert between == pytest.approx(np.broadcast_to(turns[0, 1, 0], (2, 3, 3)), abs=1e-12)
     many, _ = found.at(STATIONS[0], [ANGLES[0], ANGLES[-1] + 0.1], FORCES[0]).pose
     assert np.isfinite(many[0]).all()
     assert np.isnan(many[1]).all()

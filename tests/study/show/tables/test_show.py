@@ -153,6 +153,18 @@ def test_grasps_are_ranked_by_what_is_named_and_by_payload_where_there_is_a_task
     assert stations(best(rising(0.1), by="quality", force=5.0)) == [0.0, 1.0]
 
 
+def test_the_smallest_force_that_holds_the_object_is_the_best_and_at_a_given_force_the_largest_payload():
+    """At 5 N the second holds more, but the first needs less force to hold 150 g twice over."""
+    ds = rising(0.15)
+    ds.payload.values[0, 0], ds.payload.values[1, 0] = [[0.12], [0.45]], [[0.11], [0.9]]
+    ds["force_low"].values[:] = [[3.2], [3.5]]
+    ds["safety_factor"] = ds.payload / 0.15
+    assert stations(best(ds)) == [0.0, 1.0]
+    assert stations(best(ds, force=5.0)) == [1.0, 0.0]
+    ds["force_low"].values[0] = np.nan
+    assert stations(best(ds)) == [1.0, 0.0]
+
+
 def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():
     assert best(rising()).force == 5.0
     some = rising()
