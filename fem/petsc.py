@@ -316,6 +316,11 @@ class NonlinearSolver:
         y.destroy()
         return solution
 
+    def forget(self) -> None:
+        """Let the next solve be that of a new solver: MUMPS orders by the first values that it sees."""
+        self._end = None
+        self._snes.getKSP().getPC().reset()
+
     def destroy(self) -> None:
         """Give the factors' memory back."""
         for thing in (self._snes, self._matrix, self._x, self._f):

@@ -6,42 +6,43 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object, own_frame, pad_shape
 from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import PressedContact, Solved, Solver, solver, state_flags
+from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, followed, solver, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
 from softjaw.study.scene import Scene
 
-HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
 
+def solve_unit(unit: Any, wanted: Collection[int] | None = None) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
+    """Cases of one candidate, force by force upward, of which ``wanted`` are asked for, else all.
 
-def solve_unit(unit: Any) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
-    """Cases of one candidate, force by force upward; each force starts from the state at the one before."""
+    Each force starts from the state at the one before, so that all up to the last one are solved; or it is independent
+    of the others, and only those are. Not a bit of a case depends on what is wanted.
+    """
     scene = unit.scene
     obj = build_object(scene.object)
     settings = settings_of(scene, obj)
     fingers = [model.approach(obj, pose, scene.gripper) for pose in unit.candidate.poses]
     solving, probing = solver(scene, fingers, unit.candidate.poses), Probing(unit)
     try:
-        for k, outcome in enumerate(_outcomes(solving, scene.load.normal_force)):
+        for k, outcome in _outcomes(solving, scene.load.normal_force, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             else:
                 result = _result(scene, settings, solving, outcome)
-                yield k, _probed(result, probing, unit.candidate.note)
+                yield k, _probed(result, probing, k, unit.candidate.note)
     finally:
         probing.close()
         solving.destroy()
@@ -58,49 +59,50 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     values |= solving.wall_values(outcome)
     if outcome.grips:
         values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
-    if scene.accuracy.meshes == 2:
-        values |= mesh_errors(fine, [c for _, c in outcome.contacts], values, settings)
+    coarse = [c for _, *coarser in outcome.contacts for c in coarser]
+    if len(coarse) == len(fine):
+        values |= mesh_errors(fine, coarse, values, settings)
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
-    return CaseResult(
-        values, patch, _notes(values["maps/flags"], fine), effects_of(Simulated(scene, fine, fits, solving))
-    )
+    message = _notes(values["maps/flags"], fine, outcome.note)
+    return CaseResult(values, patch, message, effects_of(Simulated(scene, fine, fits, solving)))
 
 
-def _notes(flags: int, contacts: Sequence[PressedContact]) -> str:
-    """What there is to know of a case: its flags, and what it took to solve it."""
+def _notes(flags: int, contacts: Sequence[PressedContact], note: str) -> str:
+    """What there is to know of a case: its flags, what it took to solve it, and a note."""
     own = dict.fromkeys(note for c in contacts for note in c.state.notes)
-    return "; ".join(text for text in (flag_sentences(flags), *own) if text)
+    return "; ".join(text for text in (flag_sentences(flags), *own, note) if text)
 
 
-def _probed(result: CaseResult, probing: Probing, note: str) -> CaseResult:
+def _probed(result: CaseResult, probing: Probing, k: int, note: str) -> CaseResult:
     """The result with what the further solves of a probe give, and their time, and a note on the candidate."""
     start = time.perf_counter()
-    values = result.values | probing.values()
+    values = result.values | probing.values(k)
     for name in ("rest", "total"):
         values[f"work/seconds_{name}"] += time.perf_counter() - start
     message = "; ".join(text for text in (result.message, note, *probing.failures) if text)
     return replace(result, values=values, message=message)
 
 
-def _outcomes(solving: Solver, forces: Sequence[float]) -> Iterator[Solved | CaseFailure]:
+def _outcomes(
+    solving: Solver, forces: Sequence[float], wanted: Collection[int] | None
+) -> Iterator[tuple[int, Solved | CaseFailure]]:
     """For every force the contacts of both fingers, or why there are none."""
-    path, lowest = solving.load_path(forces), True
-    for k, force in enumerate(forces):
-        try:
-            yield next(path)
-            lowest = False
-        except (ConvergenceError, CheckError) as error:
-            good = f"the last good force is {forces[k - 1]:g} N" if not lowest else "no force below it was solved"
-            yield CaseFailure(f"{error}; {good}")
-            # hardly a touch, which tells nothing of the forces above
-            if lowest and force < HARDLY * max(forces[k + 1 :], default=0.0):
-                path = solving.load_path(forces[k + 1 :])
-                continue
-            for _ in forces[k + 1 :]:
-                yield CaseFailure(f"not tried, because the load path ended at {force:g} N: {error}")
-            return
+    if isinstance(solving, OnRigid) and solving.apart:
+        for k, found in solving.levels(forces, range(len(forces)) if wanted is None else sorted(wanted)):
+            yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
+        return
+    last, k = "no force below it was solved", -1
+    for k, found in enumerate(followed(solving.load_path, forces)):
+        if isinstance(found, Solved):
+            last = f"the last good force is {forces[k]:g} N"
+            yield k, found
+        else:
+            ended = f"not tried, because the load path ended at {forces[k]:g} N: {found}"
+            yield k, CaseFailure(f"{found}; {last}")
+    for above in range(k + 1, len(forces)):
+        yield above, CaseFailure(ended)
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:

@@ -377,6 +377,25 @@ class Following(Stepping):
         self._last = here
         return here.x
 
+    def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
+        """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
+
+        Raises
+        ------
+        ConvergenceError
+            Where there is none near it, or one that a path from first contact need not lead to.
+        """
+        x = self.solve(start, Control(force=force), work, self.most)
+        strays = np.abs((x - start)[: self.problem.closing_dof + 1]).max() > STRAY * self.thickness
+        folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
+        # with a part of the tangent alone nothing tells whether the state is stable
+        here = None if self.problem.complementarity else self._place(x, force, None)
+        if strays or folds or (here is not None and not here.stable):
+            work.halvings += 1
+            raise ConvergenceError(f"the state at {force:.4g} N is not the one that the coarser mesh has come to")
+        self._last = here
+        return x
+
     def _begin(self, x: FloatArray, reached: float, work: Work) -> _Place:
         """Place at ``reached`` [N] on the path of this problem; the state there may be another one's."""
         # the tangent of the path needs factors, and these are at hand only where the last solve ended

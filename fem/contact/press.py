@@ -1,4 +1,4 @@
-"""Press a pad on an object along a load path, each normal force started from the one before.
+"""Press a pad on an object along a load path, each normal force started from the one before, or from a coarser mesh.
 
 A force that Newton's method does not reach in one step is approached by step halving, then by displacement control
 until the force is bracketed. Where that fails and a fallback pad with other gaps is given, the load path continues with
@@ -22,6 +22,7 @@ from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, Ste
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
+from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
@@ -121,7 +122,7 @@ class Press(LoadPath):
 
     def __post_init__(self) -> None:
         """Set up the solver."""
-        self._wanted, self._last = self.pad, (np.zeros(self.pad.size), 0.0)
+        self._wanted, self._other, self._last = self.pad, self.fallback, (np.zeros(self.pad.size), 0.0)
         super().__post_init__()
 
     @property
@@ -133,10 +134,14 @@ class Press(LoadPath):
         self._bed = SpringBed(self.pad, self.gap)
         self.problem = self.problem_of(self.pad, self.gap)
         self.solver = NonlinearSolver(self.problem, self.options)
-        self._stepping = self.stepping(
-            self.problem, self.solver, self.settings, self.pad.shape.size[2], self.pad.share, self._bed.guess,
-            self._bed.force_scale, self.pad.rounding, watch=self._remember, near=self._near,
-            deepest=self.pad.shape.size[2],
+        self._stepping = self._steps()
+
+    def _steps(self) -> Stepping:
+        """Steps of the problem as it is now, of which none has been made."""
+        thickness = self.pad.shape.size[2]
+        return self.stepping(
+            self.problem, self.solver, self.settings, thickness, self.pad.share, self._bed.guess,
+            self._bed.force_scale, self.pad.rounding, watch=self._remember, near=self._near, deepest=thickness,
         )  # fmt: skip
 
     def _near(self, x: FloatArray) -> bool:
@@ -175,22 +180,66 @@ class Press(LoadPath):
         x, reached = None, 0.0
         for force in forces:
             work, elapsed, below = Work(), self._stopwatch(), x
-            self._stepping.closed = False
-            try:
-                x = self._next(x, reached, force, work)
-            except SpentError as error:
-                spent = f"given up after {MOST_ITERATIONS} Newton iterations"
-                text = f"stuck at {self._last[1]:.4g} N of {force:.4g} N: {spent}"
-                raise self._explained(ConvergenceError(text)) from error
+            self.solver.left = MOST_ITERATIONS
+            x = self._within_budget(x, reached, force, work)
             # the solver cannot see this: both states are in equilibrium and may pass their own checks
             if below is not None:
                 refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
             reached = force
-            steps, state = self._stepping, self.problem.contact_state(x)
-            yield pressed(
-                self.problem.foam, x.copy(), state, self._left_over(x), force, self.settings, work, elapsed(),
-                steps.jumped, self.pad is not self._wanted, self._notes(), NEAR if steps.off else 0.0,
-            )  # fmt: skip
+            yield self._pressed(x, force, work, elapsed())
+
+    def at(self, force: float, coarse: Pressed | None) -> Pressed:
+        """State at one normal force on the whole pad [N], whatever else this press has solved.
+
+        ``coarse`` is the state of a coarser mesh at the same force, from which one Newton solve is tried. Where that
+        leads off the load path, where the coarse mesh has jumped before, or without it, the force is approached from
+        first contact.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If there is no acceptable state.
+        """
+        work, elapsed = Work(), self._stopwatch()
+        self._begin_afresh()
+        steps = self._stepping
+        # without following the path nothing would tell a state that lies off it
+        if coarse is not None and not coarse.path_dependent and isinstance(steps, Following):
+            start = interpolated(coarse.pad, coarse.unknowns, self.pad)
+            try:
+                return self._pressed(steps.from_near(start, force, work), force, work, elapsed())
+            except (ConvergenceError, CheckError):
+                pass
+        return self._pressed(self._within_budget(None, 0.0, force, work), force, work, elapsed())
+
+    def _begin_afresh(self) -> None:
+        """Forget what was solved before, so that not a bit of what follows depends on it."""
+        self._last, self.fallback = (np.zeros(self._wanted.size), 0.0), self._other
+        if self.pad is self._wanted:
+            self.solver.forget()
+            self._stepping = self._steps()
+        else:
+            self.pad = self._wanted
+            self._start_again()
+        self.solver.left = MOST_ITERATIONS
+
+    def _within_budget(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
+        """As `_next`; what it needed in vain is told."""
+        self._stepping.closed = False
+        try:
+            return self._next(x, reached, force, work)
+        except SpentError as error:
+            spent = f"given up after {MOST_ITERATIONS} Newton iterations"
+            text = f"stuck at {self._last[1]:.4g} N of {force:.4g} N: {spent}"
+            raise self._explained(ConvergenceError(text)) from error
+
+    def _pressed(self, x: FloatArray, force: float, work: Work, seconds: Seconds) -> Pressed:
+        """The state ``x``, checked."""
+        steps, state = self._stepping, self.problem.contact_state(x)
+        return pressed(
+            self.problem.foam, x.copy(), state, self._left_over(x), force, self.settings, work, seconds,
+            steps.jumped, self.pad is not self._wanted, self._notes(), NEAR if steps.off else 0.0,
+        )  # fmt: skip
 
     def _notes(self) -> tuple[str, ...]:
         """Which means beside Newton's method on steps of the force the last state took."""
@@ -209,7 +258,6 @@ class Press(LoadPath):
 
     def _next(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one at ``reached`` [N]."""
-        self.solver.left = MOST_ITERATIONS
         if self.fallback is None:
             return self._step_to(x, reached, force, work)
         # half of the iterations is for the other means

@@ -164,6 +164,12 @@ class Pad:
         """``E / thickness`` [Pa/m]: scales pressures to lengths and estimates the pad as a bed of springs."""
         return self.material.young_modulus / self.shape.size[2]
 
+    def lines(self, axis: int) -> FloatArray:
+        """Coordinates of the nodes along an axis, rising [m]."""
+        ends = self.shape.lines(axis, axis < 2 and self.symmetry[axis])
+        # those inside a triquadratic element lie in its middle
+        return ends if self.shape.per_side == 2 else np.sort(np.append(ends, 0.5 * (ends[1:] + ends[:-1])))
+
     def displacement(self, x: FloatArray) -> FloatArray:
         """Nodal displacements ``(k, 3)`` [m] of a vector of unknowns."""
         u = np.zeros(self.dofs.shape)

@@ -211,6 +211,14 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     return sampler.with_sampled_grasps(scene)
 
 
+def forces_apart(scene: Scene) -> bool:
+    """Whether every force on a rigid object is solved by itself, on a fine mesh that starts from a coarse one.
+
+    Not with friction that acts back: its state depends on the load path, which is that of the fine mesh.
+    """
+    return scene.accuracy.meshes == 2 and scene.effects.friction_pressure_coupling != "tangential"
+
+
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:
     """Dimensions and mesh of the pads; ``coarser`` has half as many elements in every direction."""
     shape = PadShape(gripper.pad_size, gripper.elements, gripper.grading, gripper.element)

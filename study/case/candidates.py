@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.build import middle_of, own_frame
+from softjaw.study.case.build import forces_apart, has_wall, middle_of, own_frame
 from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -242,6 +242,14 @@ class Unit:
     state: int = MISSING
     reason: str = ""
     hopeless: bool = False
+
+    @property
+    def apart(self) -> bool:
+        """Whether its forces are independent of each other, so that ranks may divide them.
+
+        Whether a wall is simulated is known only when the candidate is solved.
+        """
+        return forces_apart(self.scene) and (not has_wall(self.scene.object) or self.scene.effects.object == "rigid")
 
 
 def axes(scene: Scene) -> list[Axis]:

@@ -34,19 +34,24 @@ class Probing:
     def __init__(self, unit: Any) -> None:
         self._solves = variations(unit.scene) if unit.probe else ()
         self._paths = [_path(unit, variation) for variation in self._solves]
+        self._done = 0  # forces that they have followed
         self.failures: list[str] = []
 
-    def values(self) -> dict[str, np.ndarray]:
-        """Values ``(variations,)`` of the next force, keyed as in ``study.quantities``."""
+    def values(self, k: int) -> dict[str, np.ndarray]:
+        """Values ``(variations,)`` of the ``k``-th force, keyed as in ``study.quantities``; to be called upward."""
         found = np.full((len(NAMES), len(self._paths)), np.nan)
         self.failures = []
         try:
-            for i in range(len(self._paths)):
-                found[:, i] = self._next(i)
+            # what lies between is a case that failed, or one that is stored already
+            for _ in range(self._done, k + 1):
+                self.failures = []
+                for i in range(len(self._paths)):
+                    found[:, i] = self._next(i)
         # Not an Exception, so it needs a branch of its own: the case itself is complete and stays so.
         except TimeLimitError:
             self.failures.append("probe: run.time_limit_s passed")
             self.close()
+        self._done = k + 1
         return {f"probes/{name}": values for name, values in zip(NAMES, found, strict=True)} if self._paths else {}
 
     def _next(self, i: int) -> tuple[float, float]:

@@ -5,21 +5,21 @@ Either follows the load path and gives the contacts of every force; what comes a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
-from softjaw.fem.contact.press import Pressed
+from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.contact.problem import SpringBed
-from softjaw.fem.errors import CheckError
+from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
 from softjaw.friction.patch import ContactPatch
-from softjaw.study.case.build import pad_shape
+from softjaw.study.case.build import forces_apart, pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
@@ -30,7 +30,10 @@ from softjaw.study.scene import Scene
 OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
+HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
+NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+State = TypeVar("State")
 
 
 class PressedContact(Contact):
@@ -96,11 +99,13 @@ class Solved:
     """Contacts of one force: for every finger that on each mesh, the finest first.
 
     ``spent`` are the states whose work was done for it; ``grips`` those of both fingers on the wall, if it has one.
+    ``note`` says why a coarser mesh has no state at this force, if so.
     """
 
     contacts: list[list[PressedContact]]
     spent: list[Pressed]
     grips: list[Gripped]
+    note: str = ""
 
 
 class Solver(Protocol):
@@ -140,6 +145,23 @@ def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
     return OnWall(scene, fingers, level)
 
 
+def followed(
+    load_path: Callable[[Sequence[float]], Iterator[State]], forces: Sequence[float]
+) -> Iterator[State | ConvergenceError | CheckError]:
+    """For every force what a load path has there or why it has nothing, up to the one at which it ends."""
+    path, lowest = load_path(forces), True
+    for k, force in enumerate(forces):
+        try:
+            yield next(path)
+            lowest = False
+        except (ConvergenceError, CheckError) as error:
+            yield error
+            # hardly a touch, which tells nothing of the forces above
+            if not lowest or not force < HARDLY * max(forces[k + 1 :], default=0.0):
+                return
+            path = load_path(forces[k + 1 :])
+
+
 class OnRigid:
     """Fingers on a rigid object do not feel each other."""
 
@@ -150,18 +172,51 @@ class OnRigid:
         meshes = (False, True)[: scene.accuracy.meshes]
         solved = fingers[:1] if self.shared else fingers
         self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
+        self.apart = forces_apart(scene)
         self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """See `Solver`."""
-        paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
-        for states in zip(*paths, strict=True):
-            # Of two fingers that are images only the first has states, so the lengths differ.
-            pairs = zip(self.fingers, states, strict=False)
-            contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
-            if self.shared:  # an image finger has its partner's states; only its place differs
-                contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
-            yield Solved(contacts, [s for own in states for s in own], [])
+        if self.apart:
+            for _, outcome in self.levels(forces, range(len(forces))):
+                if not isinstance(outcome, Solved):
+                    raise outcome
+                yield outcome
+        else:
+            paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
+            yield from map(self._solved, zip(*paths, strict=True))
+
+    def levels(
+        self, forces: Sequence[float], wanted: Iterable[int]
+    ) -> Iterator[tuple[int, Solved | ConvergenceError | CheckError]]:
+        """Of the wanted forces each by itself, from the coarser mesh, which follows the load path: contacts or failure.
+
+        Not a bit of one depends on which others are wanted.
+        """
+        paths = [_CoarsePath(coarse, forces) for _, coarse in self.presses]
+        for k in wanted:
+            try:
+                yield k, self._level(forces[k], [path.state(k) for path in paths], paths)
+            except (ConvergenceError, CheckError) as error:
+                yield k, error
+
+    def _level(self, force: float, coarse: Sequence[Pressed | None], paths: Sequence[_CoarsePath]) -> Solved:
+        """Contacts at one force [N] from the coarser mesh's states."""
+        states = [(fine.at(force, start), start) for (fine, _), start in zip(self.presses, coarse, strict=True)]
+        # an error can be told only where both fingers have a coarser state
+        if any(start is None for start in coarse):
+            reason = next(path.ended for path, start in zip(paths, coarse, strict=True) if start is None)
+            return replace(self._solved([(fine,) for fine, _ in states]), note=NO_ERROR.format(reason=reason))
+        return self._solved(states)
+
+    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
+        """Contacts of both fingers from the states of those that are solved, on each mesh."""
+        # Of two fingers that are images only the first has states, so the lengths differ.
+        pairs = zip(self.fingers, states, strict=False)
+        contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
+        if self.shared:  # an image finger has its partner's states; only its place differs
+            contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
+        return Solved(contacts, [s for own in states for s in own], [])
 
     def wall_values(self, solved: Solved) -> dict[str, Any]:
         """See `Solver`."""
@@ -171,6 +226,21 @@ class OnRigid:
         """See `Solver`."""
         for press in (p for own in self.presses for p in own):
             press.destroy()
+
+
+class _CoarsePath:
+    """States of a finger on the coarser mesh, from the lowest force upward, as far as they are asked for."""
+
+    def __init__(self, press: Press, forces: Sequence[float]) -> None:
+        self._path, self._states = followed(press.load_path, forces), list[Pressed | None]()
+        self.ended = ""  # why there are no more
+
+    def state(self, k: int) -> Pressed | None:
+        """State at the ``k``-th force; None where the path ends before."""
+        while len(self._states) <= k and (found := next(self._path, None)) is not None:
+            self._states.append(found if isinstance(found, Pressed) else None)
+            self.ended = self.ended if isinstance(found, Pressed) else str(found)
+        return self._states[k] if k < len(self._states) else None
 
 
 class OnWall:

@@ -219,7 +219,7 @@ def _add_cost_options(parser: argparse.ArgumentParser) -> None:
 
 def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; see the README for the columns")
+    add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
     add("--mu", type=_positive, default=0.8, help="friction coefficient (default 0.8)")
     add("--long-side", type=_direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the pad's long "
         "side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)")  # fmt: skip

@@ -1,4 +1,4 @@
-"""One unit of work: the load path of a grasp candidate is solved from its lowest force, missing rows are stored."""
+"""One share of the work: forces of a grasp candidate are solved from the lowest one on, missing rows are stored."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.write import record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.schedule import LostRanks
+from softjaw.study.run.shares import Share
 
+Pending = dict[int, list[tuple[int, int]]]  # for each force, the candidates that are served and their rows
 DEADLY = 2
 KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"
 NOT_TRIED = "not tried, because a lower force of this candidate failed: {text}"
+LEFT = "not tried, because the rank that had it was given up at a lower force; 'run --retry-failed' tries again"
 TOO_SLOW = "not solved within {limit:g} s; raise run.time_limit_s and run again with --retry-failed"
 HUNG = "did not come back to Python within {patience:g} s, so its rank was given up; 'run --retry-failed' tries again"
 NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fewer ranks or a coarser mesh"
@@ -50,11 +53,12 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
             codes[row] = unit.state
         for rows in unit.rows:
             deadly = [k for k, row in enumerate(rows) if codes[row] == MISSING and attempts[row] >= DEADLY]
-            # Forces above are given up as well, because the load path would lead through the deadly one again.
-            for k in range(deadly[0], len(rows)) if deadly else ():
+            # Forces above are given up as well where the load path would lead through the deadly one again.
+            for k in range(deadly[0], len(rows)) if deadly and not unit.apart else deadly:
                 if codes[rows[k]] == MISSING:
-                    what = "this case" if k == deadly[0] else "a lower force of this candidate"
-                    writer.fail(rows[k], KILLED.format(n=attempts[rows[deadly[0]]], what=what))
+                    first = k if k in deadly else deadly[0]
+                    what = "this case" if k == first else "a lower force of this candidate"
+                    writer.fail(rows[k], KILLED.format(n=attempts[rows[first]], what=what))
                     codes[rows[k]] = FAILED
     return codes
 
@@ -80,23 +84,23 @@ class PathSolver:
         self._claims.stop()
         self._uncount()
 
-    def solve(self, unit: Any, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
-        """Solve a unit from its beginning and store the rows that ``codes`` calls missing, never a done one.
+    def solve(self, share: Share, position: int, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
+        """Solve a share, which others know by its position, and store the rows that ``codes`` calls missing.
 
         Raises
         ------
         StudyError
             The file cannot be written any more.
         """
-        pending = _pending(unit, codes)
-        cases = self._cases(unit)
+        unit, pending = share.unit, _pending(share, codes)
+        cases = self._cases(unit, pending)
         clock = time.perf_counter()
         while pending and not self._claims.stopped:
             # A file that was moved away would be filled where nobody finds it.
             self._state.check()
             # Counted before the solve: a process that is killed cannot count afterwards.
             self._count(pending)
-            self._lost.begin(unit.index)
+            self._lost.begin(position)
             try:
                 with stopper.case():
                     k, result = next(cases)
@@ -104,8 +108,10 @@ class PathSolver:
                 # What was given up for a signal stays not computed, so that resume solves it.
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
-                self._fail(pending, _sentence(error, stopper.limit), time.perf_counter() - clock)
-                break
+                _close(cases)
+                self._fail(unit, pending, _sentence(error, stopper.limit), time.perf_counter() - clock)
+                cases, clock = self._cases(unit, pending), time.perf_counter()
+                continue
             finally:
                 # Also after a failure, or this rank would be taken for one that hangs.
                 self._lost.end()
@@ -117,8 +123,8 @@ class PathSolver:
         self._uncount()
         _close(cases)
 
-    def _cases(self, unit: Any) -> Iterator[tuple[int, Any]]:
-        yield from self._solve_unit(unit)
+    def _cases(self, unit: Any, wanted: Iterable[int]) -> Iterator[tuple[int, Any]]:
+        yield from self._solve_unit(unit, tuple(wanted))
 
     def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
         rows = {row for _, row in served}
@@ -134,11 +140,14 @@ class PathSolver:
             with self._state.writing():
                 self._writer.write(row, values)
 
-    def _fail(self, pending: dict[int, list[tuple[int, int]]], message: str, seconds: float) -> None:
+    def _fail(self, unit: Any, pending: Pending, message: str, seconds: float) -> None:
+        """Note what failed, and take it from what is pending: the lowest force, and those above that depend on it."""
         self._begun = []
+        failed = {k: pending[k] for k in ([min(pending)] if unit.apart else pending)}
         with self._state.writing():
-            fail_from(self._writer, pending, message, seconds)
-        pending.clear()
+            fail_from(self._writer, failed, message, NOT_TRIED, seconds)
+        for k in failed:
+            del pending[k]
 
     def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
         rows = [row for _, row in pending[min(pending)]]
@@ -158,32 +167,27 @@ class PathSolver:
                 self._writer.count_attempt(row, -1)
 
 
-def give_up(writer: Any, unit: Any, patience: float) -> None:
-    """Mark what is missing of a unit as failed, because the rank that solves it hangs; by any other rank."""
-    fail_from(writer, _pending(unit, writer.codes()), HUNG.format(patience=patience))
+def give_up(writer: Any, share: Share, patience: float) -> None:
+    """Mark what is missing of a share as failed, because the rank that solves it hangs; by any other rank."""
+    above = LEFT if share.unit.apart else NOT_TRIED
+    fail_from(writer, _pending(share, writer.codes()), HUNG.format(patience=patience), above)
 
 
-def fail_from(
-    writer: Any, pending: dict[int, list[tuple[int, int]]], message: str, seconds: float = math.nan
-) -> None:
-    """Store why the lowest of the pending forces failed, after ``seconds``, and that those above were not tried."""
+def fail_from(writer: Any, pending: Pending, message: str, above: str, seconds: float = math.nan) -> None:
+    """Store why the lowest of the pending forces failed, after ``seconds``, and of those ``above`` why not tried."""
     lowest = min(pending, default=0)
     for k, served in pending.items():
         for n, (_, row) in enumerate(served):
             first = k == lowest and n == 0  # the time is spent once for all candidates that are served
-            text = message if k == lowest else NOT_TRIED.format(text=message)
+            text = message if k == lowest else above.format(text=message)
             writer.fail(row, text, seconds=seconds if first else math.nan)
 
 
-def _pending(unit: Any, codes: np.ndarray) -> dict[int, list[tuple[int, int]]]:
-    """Missing rows of a unit: for each force, the candidates and their rows."""
-    pending: dict[int, list[tuple[int, int]]] = {}
-    for c, rows in enumerate(unit.rows):
-        for k, row in enumerate(rows):
-            if codes[row] == MISSING:
-                pending.setdefault(k, []).append((c, row))
-    # By force: a load path is solved upward, whichever candidate lacks which force.
-    return dict(sorted(pending.items()))
+def _pending(share: Share, codes: np.ndarray) -> Pending:
+    """Missing rows of a share: for each force, rising, the candidates and their rows."""
+    found = {k: [(c, rows[k]) for c, rows in enumerate(share.unit.rows)] for k in share.forces}
+    missing = {k: [(c, row) for c, row in served if codes[row] == MISSING] for k, served in found.items()}
+    return {k: served for k, served in missing.items() if served}
 
 
 def _with_work(result: CaseResult, c: int, seconds: float) -> CaseResult:

@@ -24,6 +24,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.estimate import START, estimated
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
+from softjaw.study.run.shares import by_cost, divisible
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -52,6 +53,12 @@ class Plan:
     def costs(self) -> list[float]:
         """Cost of every unit that is tried, in any unit of time."""
         return [float(unit.cost) for unit in self.tried]
+
+    def in_parts(self, costs: Sequence[float]) -> list[float]:
+        """Costs of the units that are tried, those of one whose forces ranks may divide as that of each force."""
+        forces = self.layout.shape[-1]
+        each = [forces if divisible(unit) else 1 for unit in self.tried]
+        return [cost / n for cost, n in zip(costs, each, strict=True) for _ in range(n)]
 
     @property
     def served(self) -> int:
@@ -123,23 +130,6 @@ def has(scene: Any) -> tuple[str, ...]:
     return tuple(name for name, wanted in asked.items() if wanted)
 
 
-def by_cost(costs: Sequence[float]) -> list[int]:
-    """Positions with the most expensive first; equal costs keep their order.
-
-    >>> by_cost([1.0, 5.0, 5.0, 2.0])
-    [1, 2, 3, 0]
-    """
-    return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
-
-
-def in_order(units: Sequence[Any]) -> list[int]:
-    """Positions in the order of work: the costliest first, so that no rank is alone with a long load path at the end.
-
-    What cannot hold comes after all others.
-    """
-    return sorted(by_cost([unit.cost for unit in units]), key=lambda i: units[i].hopeless)
-
-
 def makespan(costs: Sequence[float], ranks: int) -> float:
     """Time until the last unit ends when ranks take the most expensive remaining unit whenever they are free.
 
@@ -159,7 +149,7 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
     10
     """
     total = sum(costs)
-    # Beyond the number of load paths no further rank finds work; the other bound keeps this quick.
+    # Beyond the number of costs no further rank finds work; the other bound keeps this quick.
     good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= efficiency * n * makespan(costs, n)]
     return max(good, default=1)
 
@@ -217,7 +207,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
-        "ranks": f"up to {sensible_ranks(plan.costs)} are busy at least 80 % of the time",
+        "ranks": f"up to {sensible_ranks(plan.in_parts(plan.costs))} are busy at least 80 % of the time",
     }
     return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
 
@@ -251,7 +241,7 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
         return f"{_estimated_time(plan, scene, ranks)}; known better when a few load paths are in {path}"
-    whole = duration(makespan(expected, ranks))
+    whole = duration(makespan(plan.in_parts(expected), ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
 
 
@@ -262,7 +252,7 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     if not times:
         repeats = 1 + len(plan.layout.variations)
         seconds = [t * (repeats if u.probe else 1) for t, u in zip(estimated(plan.tried), plan.tried, strict=True)]
-        return f"about {duration(START + makespan(seconds, ranks))} {on}, estimated on a bed of springs"
+        return f"about {duration(START + makespan(plan.in_parts(seconds), ranks))} {on}, estimated on a bed of springs"
     paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.tried)
     low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
     if low == high:

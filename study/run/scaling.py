@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.run.plan import Plan, by_cost, measured_seconds
+from softjaw.study.run.plan import Plan, measured_seconds
 from softjaw.study.run.progress import duration
+from softjaw.study.run.shares import by_cost, divisible
 
 STATE_WRITES = 5  # of a case besides its values: begun, state, its checksum, and the maps that are seen first
 NOTHING = 0.05  # share of the time below which something does not count as the limit
@@ -108,12 +109,18 @@ def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
 
 
 def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
-    """Load paths of a plan with the times of its cases, ``(rows,)`` with NaN where none was taken [s]."""
+    """Load paths of a plan, or its forces where ranks may divide them, with the times of its cases ``(rows,)`` [s].
+
+    NaN is a case without a time.
+    """
     found = []
     for unit in plan.tried:
         times = seconds[list(unit.rows[0])]
-        if np.isfinite(times).any():  # the forces above a failed one were not tried
-            found.append(LoadPath(tuple(map(float, times[np.isfinite(times)])), unit.cost, len(unit.rows)))
+        taken = tuple(map(float, times[np.isfinite(times)]))  # the forces above a failed one were not tried
+        if divisible(unit):
+            found += [LoadPath((t,), unit.cost / len(times), len(unit.rows)) for t in taken]
+        elif taken:
+            found.append(LoadPath(taken, unit.cost, len(unit.rows)))
     return found
 
 

@@ -111,28 +111,28 @@ class LostRanks:
     def __init__(self, node: Any, limit: float) -> None:
         self.patience, self._node = PATIENCE * limit, node
         self._window, numbers = _shared(node, 2 * node.size, float)
-        self._unit, self._since = numbers.reshape(2, node.size)
+        self._share, self._since = numbers.reshape(2, node.size)
         if node.rank == 0:
-            self._unit[:] = IDLE
+            self._share[:] = IDLE
         node.Barrier()
 
-    def begin(self, unit: int) -> None:
-        """Note that this rank begins a case of the unit with this index."""
-        # Time before unit: between the two a look must not pair the new unit with an old time.
+    def begin(self, position: int) -> None:
+        """Note that this rank begins a case of the share of the work at this position."""
+        # Time before share: between the two a look must not pair the new share with an old time.
         self._since[self._node.rank] = time.monotonic()  # one clock for all processes of a node
-        self._unit[self._node.rank] = unit
+        self._share[self._node.rank] = position
 
     def end(self) -> None:
         """Note that this rank solves nothing."""
-        self._unit[self._node.rank] = IDLE
+        self._share[self._node.rank] = IDLE
 
-    def units(self) -> list[int]:
-        """Units whose ranks have been in one case for much longer than its time limit."""
-        late = (self._unit != IDLE) & (time.monotonic() - self._since > self.patience)
-        return [int(unit) for unit in self._unit[late]]
+    def positions(self) -> list[int]:
+        """Shares whose ranks have been in one case for much longer than its time limit."""
+        late = (self._share != IDLE) & (time.monotonic() - self._since > self.patience)
+        return [int(position) for position in self._share[late]]
 
     def free(self) -> None:
         """Give the memory back."""
         # No view may outlive the window that it looks into.
-        self._unit = self._since = np.empty(0)
+        self._share = self._since = np.empty(0)
         self._window.Free()

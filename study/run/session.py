@@ -10,7 +10,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,10 +29,11 @@ from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, settle
-from softjaw.study.run.plan import Plan, in_order
+from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.refine import Rounds, round_text
 from softjaw.study.run.schedule import Claims, LostRanks
+from softjaw.study.run.shares import shares
 
 T = TypeVar("T")
 
@@ -44,7 +45,8 @@ class Work:
     Parameters
     ----------
     solve_unit : callable
-        ``solve_unit(unit)`` yields ``(k, CaseResult | CaseFailure)`` for the forces of a load path, upward.
+        ``solve_unit(unit, wanted)`` yields ``(k, CaseResult | CaseFailure)`` for forces of a unit, upward: for those
+        that are wanted, and for others that it has to solve on the way.
     image : callable, optional
         ``image(result, unit, c)`` turns a result into that of the ``c``-th candidate which the unit serves.
     finalise : callable, optional
@@ -57,7 +59,7 @@ class Work:
         As for `study.run.limits.limited_memory`.
     """
 
-    solve_unit: Callable[[Any], Iterable[tuple[int, Any]]]
+    solve_unit: Callable[[Any, Sequence[int]], Iterable[tuple[int, Any]]]
     image: Callable[[Any, Any, int], Any] | None = None
     finalise: Callable[[ResultWriter], None] | None = None
     summary: Callable[[Any], str] | None = None
@@ -201,8 +203,7 @@ class Session:
     def __init__(self, plan: Plan, work: Work, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
-        todo = [unit for unit in plan.units if any(codes[row] == MISSING for rows in unit.rows for row in rows)]
-        self._todo = [todo[i] for i in in_order(todo)]
+        self._todo = shares(plan.units, codes, comm.size)
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
         if comm.rank == 0:
             writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
@@ -250,7 +251,7 @@ class Session:
         stopper = Stopper(solver.on_stop, self._work.time_limit, lost.patience if unseen else None)
         with stopper, limited_memory(self._work.memory, claims.node.size):
             for position in claims:
-                solver.solve(self._todo[position], self._codes, stopper, self._look)
+                solver.solve(self._todo[position], position, self._codes, stopper, self._look)
             request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
             while not request.Test():
                 self._look()
@@ -262,12 +263,13 @@ class Session:
 
     def _only_lost_are_left(self, lost: LostRanks, stopper: Stopper) -> bool:
         """Mark the cases of ranks that hang as failed; whether there are such ranks, and nothing else to wait for."""
-        units = lost.units()
-        for unit in self._todo if units else ():
-            if unit.index in units:
-                give_up(self._writer, unit, lost.patience)
+        positions = lost.positions()
+        for position in positions:
+            give_up(self._writer, self._todo[position], lost.patience)
         # After a signal nobody begins anything new, so what is missing then stays missing.
-        return bool(units) and (stopper.overdue > max(GRACE.values()) or not np.any(self._writer.codes() == MISSING))
+        return bool(positions) and (
+            stopper.overdue > max(GRACE.values()) or not np.any(self._writer.codes() == MISSING)
+        )
 
     def _look(self) -> None:
         if self._progress and self._progress.due():

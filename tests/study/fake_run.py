@@ -23,7 +23,7 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=()):
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apart=False):
     """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide.
 
     Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
@@ -50,6 +50,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=()):
             served = tuple(rows[i] for i in a)
             unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
             unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
+            unit.apart, unit.probe = apart, False
             units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"
@@ -88,8 +89,9 @@ def fake_path(options):
     """The injected solver; rows are named by the first candidate that a unit serves."""
     from softjaw.study.case.result import CaseFailure
 
-    def solve_unit(unit):
-        for k, row in enumerate(range(unit.first, unit.first + FORCES)):
+    def solve_unit(unit, wanted):
+        for k in wanted if unit.apart else range(FORCES):
+            row = unit.first + k
             deadline = time.monotonic() + (60.0 if row == options.hang else options.delay)
             while time.monotonic() < deadline:
                 time.sleep(0.002)
@@ -129,6 +131,7 @@ def main():
     parser.add_argument("--memory", type=float, default=0.5)
     parser.add_argument("--stations", type=int, default=6)
     parser.add_argument("--grow", action="store_true")
+    parser.add_argument("--apart", action="store_true")  # forces that do not depend on each other
     for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args()
@@ -150,7 +153,7 @@ def main():
     work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
     growth = fake_growth(options.digest, options.stations, work) if options.grow else None
     try:
-        plan = fake_plan(options.digest, options.stations, wide=options.wide)
+        plan = fake_plan(options.digest, options.stations, wide=options.wide, apart=options.apart)
         return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed, growth=growth)
     except StudyError as error:
         return complain(error)

@@ -46,7 +46,7 @@ def test_both_definitions_of_e_n_and_the_projected_one():
         over = np.array(first) / of(found, "maps/e_n") - 1.0
         projected = of(found, "maps/e_n_projected") / of(found, "maps/e_n") - 1.0
         assert over.min() > -1e-9
-        assert 0.0 < projected.min() <= projected.max() < 0.045
+        assert 0.0 < projected.min() <= projected.max() < 0.05
         worst.append(over.max())
         print(f"{file}: max tau_z / max f_t is up to {over.max():.2%} above e_n, e_n_projected {projected.max():.2%}")
     assert 0.005 < worst[0] < 0.02
@@ -55,7 +55,7 @@ def test_both_definitions_of_e_n_and_the_projected_one():
 
 @pytest.mark.long
 def test_friction_that_acts_back_moves_what_auto_leaves_out():
-    """At 78 mm by less than 2 %, at 73.5 mm by 5 %, at 175 mm by a third; all of it is told, none of it is taken."""
+    """At 78 mm by less than 2 %, at 73.5 mm by 4 %, at 175 mm by a third; all of it is told, none of it is taken."""
     from softjaw.study.quantities import REASONS
 
     where = ["candidates.stations_mm=[73.5294, 77.9412, 175]", "load.normal_force_n=[1, 2, 13]"]

@@ -215,6 +215,22 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(once, shared_path, 
 
 @pytest.mark.long
 @pytest.mark.launches
+@pytest.mark.parametrize("how", ["hang", "stuck"])
+def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(once, shared_path, how):
+    path = shared_path / f"{how}.hdf"
+    assert once(study, 3, path, "--apart", f"--{how}", 13, "--limit", 1)[0] == SOME_FAILED
+    codes, messages = once(states, path)
+    lost = {row for row, code in enumerate(codes) if code == FAILED}
+    # a rank that came back goes on; one that did not takes with it what else it was to solve of the candidate
+    assert {13, 16} <= lost <= ({13, 16} if how == "hang" else {13, 14, 16, 17})
+    assert {codes[row] for row in range(36) if row not in lost} == {DONE}
+    assert "lower force" not in messages[13]
+    assert once(study, 0, path, "--retry-failed")[0] == 0
+    assert once(differing, path, once(whole, shared_path)) == []
+
+
+@pytest.mark.long
+@pytest.mark.launches
 def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(once, shared_path):
     path = shared_path / "alone.hdf"
     for _ in range(2):

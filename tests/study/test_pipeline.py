@@ -469,14 +469,15 @@ def test_the_opening_is_the_width_of_the_object_and_both_pads_close_it(shape, an
 
 
 def test_forces_above_one_that_hardly_touches_begin_anew():
-    class Touchy:
-        def load_path(self, forces):
-            for force in forces:
-                if force < 1e-3:
-                    raise ConvergenceError("no first contact")
-                yield force
+    def load_path(forces):
+        for force in forces:
+            if force < 1e-3:
+                raise ConvergenceError("no first contact")
+            yield force
 
-    found = list(pipeline._outcomes(Touchy(), (1e-9, 1e-4, 1.0, 2.0)))
-    assert [isinstance(outcome, CaseFailure) for outcome in found] == [True, True, False, False]
-    assert found[2:] == [1.0, 2.0]
-    assert all(isinstance(outcome, CaseFailure) for outcome in pipeline._outcomes(Touchy(), (9e-4, 0.5)))
+    failed, *_, one, two = solving.followed(load_path, (1e-9, 1e-4, 1.0, 2.0))
+    assert isinstance(failed, ConvergenceError)
+    assert (one, two) == (1.0, 2.0)
+    # a first force that is not small beside the others ends the path
+    [only] = solving.followed(load_path, (9e-4, 0.5))
+    assert isinstance(only, ConvergenceError)

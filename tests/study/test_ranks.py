@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from softjaw.study.doctor import launch_environment
-from softjaw.study.result.layout import DONE
+from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.store import open_result
+from softjaw.study.run.plan import make_plan
+from softjaw.study.run.shares import shares
+from softjaw.study.scene import parse_scene
 from tests.study.launching import ROOT, contents, differing, launch, wait_for
 
 pytestmark = pytest.mark.launches
@@ -56,8 +59,8 @@ os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
 from softjaw.study import pipeline
 solve = pipeline.solve_unit
 
-def slow(unit):
-    for case in solve(unit):
+def slow(unit, wanted):
+    for case in solve(unit, wanted):
         time.sleep(0.12)
         yield case
 
@@ -94,6 +97,27 @@ def run(ranks, scene, path, *words):
 def done(path):
     with open_result(path) as result:
         return int((result.status == DONE).sum())
+
+
+def test_two_ranks_divide_the_forces_of_a_candidate():
+    """So that what follows compares forces that were solved beside each other with forces that were solved in turn."""
+    plan = make_plan(parse_scene(SCENE))
+    divided = [own.unit.index for own in shares(plan.units, np.full(CASES, MISSING), 2)]
+    assert len(divided) > len(set(divided)) == 4
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [2, 3, 4])
+def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_path, scene, ranks):
+    changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
+               "uncertainty.mu=0", "uncertainty.pose_mm=0", "uncertainty.probes=2",
+               "limit_surface.wrench_samples='none'")  # fmt: skip
+    place = [word for change in changes for word in ("--set", change)]
+    whole, path = shared_path / "whole.hdf", shared_path / "divided.hdf"
+    for where, count in ((whole, 0), (path, ranks)):
+        code, _, errors = once(run, count, scene, where, *place)
+        assert code == 0, errors
+    assert once(differing, path, once(contents, whole)) == []
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 2, pytest.param(3, marks=pytest.mark.long)])

@@ -115,15 +115,16 @@ def test_what_is_no_grasp_is_never_solved_and_no_failure(once, shared_path):
 
 
 @pytest.mark.long
-def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, uninterrupted):
+@pytest.mark.parametrize(("apart", "lost"), [((), [13, 14, 16, 17]), (("--apart",), [13, 16])])
+def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, uninterrupted, apart, lost):
     path = shared_path / "deadly.hdf"
-    assert once(study, 0, path, "--kill", 13)[0] == -signal.SIGKILL
-    assert once(study, 0, path, "--kill", 13)[0] == -signal.SIGKILL
-    code, output, _ = once(study, 0, path, "--kill", 13)
+    assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
+    assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
+    code, output, _ = once(study, 0, path, "--kill", 13, *apart)
     assert code == 6
     assert "the process was killed 2 times while it solved this case" in output
-    # Row 13 and the force above it, for both candidates of the unit; everything else is solved.
-    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [13, 14, 16, 17]
+    # Row 13 and the force above it that depends on it, for both candidates of the unit; everything else is solved.
+    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == lost
     assert once(study, 0, path, "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []
 
@@ -144,6 +145,17 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
         assert result.read("e_n/ccm").ravel()[10] > 0
     assert once(study, 0, path)[0] == 6
     assert once(study, 0, path, "--retry-failed")[0] == 0
+    assert once(differing, path, uninterrupted) == []
+
+
+def test_forces_that_are_apart_fail_alone(once, shared_path, uninterrupted):
+    """Divided among ranks or not; the exception is that of one force, for both candidates of its unit."""
+    path = shared_path / "apart.hdf"
+    code, _, errors = once(study, 3, path, "--apart", "--fail", 9, "--raises", 25)
+    assert code == 6, errors
+    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [9, 25, 28]
+    assert (once(states, path) == DONE).sum() == 33
+    assert once(study, 0, path, "--apart", "--retry-failed")[0] == 0
     assert once(differing, path, uninterrupted) == []
 
 

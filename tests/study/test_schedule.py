@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from softjaw.study.doctor import launch_environment
-from softjaw.study.run.plan import Plan, by_cost, makespan, sensible_ranks, unit_seconds
+from softjaw.study.run.plan import Plan, makespan, sensible_ranks, unit_seconds
 from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
+from softjaw.study.run.shares import by_cost, shares
 
 CLAIMS = """
 from mpi4py import MPI
@@ -84,6 +85,62 @@ def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
     assert makespan([1.0, 2.0, 4.0], 1) == 7.0
     assert makespan([1.0, 2.0, 4.0], 5) == 4.0
     assert by_cost([2.0, 3.0, 2.0]) == [1, 0, 2]
+
+
+def units_of(costs, forces=6, apart=True):
+    """Units that serve two candidates each."""
+    rows = np.arange(len(costs) * 2 * forces).reshape(len(costs), 2, forces).tolist()
+    return [
+        SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, probe=False, hopeless=False, state=0)
+        for i, (own, cost) in enumerate(zip(rows, costs, strict=True))
+    ]
+
+
+def divided(made, ranks, codes=None):
+    """Forces of each share, by unit, in the order of work."""
+    found = shares(made, np.zeros(sum(len(r) for u in made for r in u.rows)) if codes is None else codes, ranks)
+    return [(own.unit.index, own.forces) for own in found]
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4, 20])
+def test_every_missing_force_is_in_one_share(ranks):
+    made = units_of([3.0, 1.0, 2.0])
+    codes = np.zeros(36)
+    codes[[0, 6, 1]] = 1  # force 0 for both candidates of the first unit, force 1 for one of them
+    found = divided(made, ranks, codes)
+    expected = [(i, k) for i in range(3) for k in range(6) if (i, k) != (0, 0)]
+    assert sorted((i, k) for i, forces in found for k in forces) == expected
+    assert all(forces == tuple(sorted(forces)) for _, forces in found)
+
+
+def test_one_candidate_is_divided_evenly_and_many_only_at_the_end():
+    [one] = units_of([1.0])
+    assert divided([one], 1) == [(0, (0, 1, 2, 3, 4, 5))]
+    assert divided([one], 2) == [(0, (0, 2, 4)), (0, (1, 3, 5))]
+    assert [len(forces) for _, forces in divided([one], 4)] == [2, 2, 1, 1]
+    assert len(divided([one], 50)) == 6
+    many = divided(units_of([1.0] * 35), 2)
+    assert [len(forces) for _, forces in many] == [6] * 33 + [3] * 4
+    # a candidate that takes longer than all others together
+    assert divided(units_of([100.0, 1.0]), 2)[:2] == [(0, (0, 2, 4)), (0, (1, 3, 5))]
+
+
+def test_load_paths_and_probes_are_not_divided():
+    whole = (0, 1, 2, 3, 4, 5)
+    assert divided(units_of([1.0], apart=False), 2) == [(0, whole)]
+    probe, other = units_of([4.0, 1.0])
+    probe.probe, other.hopeless = True, True
+    assert divided([other, probe], 2) == [(0, whole), (1, (0, 2, 4)), (1, (1, 3, 5))]
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 4, 8])
+def test_ranks_are_busy_to_the_end(ranks):
+    """However costs lie, the longest share is at most one force more than an even part of one candidate."""
+    costs = np.random.default_rng(ranks).uniform(1, 3, 12)
+    found = shares(units_of(costs), np.zeros(144), ranks)
+    even = costs.sum() / ranks
+    assert makespan([own.cost for own in found], ranks) <= 1.1 * even
+    assert makespan(costs, ranks) >= even
 
 
 def test_more_ranks_than_load_paths_are_not_sensible():

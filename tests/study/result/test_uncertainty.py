@@ -197,11 +197,17 @@ def test_what_fails_at_a_probe_harms_nothing(monkeypatch):
 
     monkeypatch.setattr(probing, "_path", path_of)
     own = probing.Probing(SimpleNamespace(probe=True, scene=scene("uncertainty.mesh=true", "uncertainty.pose_mm=1")))
-    assert own.values()["probes/e_n"].tolist() == [1.0, 1.0, 1.0]
-    assert np.array_equal(own.values()["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
+    assert own.values(0)["probes/e_n"].tolist() == [1.0, 1.0, 1.0]
+    assert np.array_equal(own.values(1)["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
     assert own.failures == ["probe, half as many elements per direction: no convergence"]
-    assert np.isnan(own.values()["probes/quality"]).all()
-    assert probing.Probing(SimpleNamespace(probe=False)).values() == {}
+    assert np.isnan(own.values(2)["probes/quality"]).all()
+    assert probing.Probing(SimpleNamespace(probe=False)).values(0) == {}
+    # where the cases between are stored or failed, the paths go on beside them, and say what they would have said
+    later = probing.Probing(SimpleNamespace(probe=True, scene=scene("uncertainty.mesh=true", "uncertainty.pose_mm=1")))
+    assert np.array_equal(later.values(1)["probes/quality"], [np.nan, 4.0, 4.0], equal_nan=True)
+    assert len(later.failures) == 1
+    assert np.isnan(later.values(2)["probes/e_n"]).all()
+    assert later.failures == []
 
 
 # --- what is said ----------------------------------------------------------------------------------------------------

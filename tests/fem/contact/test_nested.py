@@ -1,0 +1,133 @@
+"""One force by itself, from the state of a coarser mesh: the state of the load path, whatever was solved before."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softjaw.fem.contact.press import MOST_ITERATIONS, Press
+from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.pad.interpolation import interpolated
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
+from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, VI, pad_of, relative
+
+FORCES = [1.0, 3.0, 10.0]
+
+
+def pair(element, symmetry=(True, True), grading=(1.0, 1.0, 1.0)):
+    """A pad and the one half as fine; its width has an odd number of elements, so it is no half across."""
+    shape = PadShape(SIZE, {"hex8": (12, 6, 4), "hex27": (8, 4, 2)}[element], grading, element)
+    contact = "nodal" if element == "hex8" else "weighted"
+    coarse, even = shape.halved(), [n % 2 == 0 for n in shape.halved().elements]
+    return (
+        Pad(shape, FOAM, symmetry, contact),
+        Pad(coarse, FOAM, (symmetry[0] and even[0], symmetry[1] and even[1]), contact),
+    )
+
+
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element):
+    pad, coarse = pair(element)
+    press, starts, ladder = (
+        Press(pad, gap),
+        list(Press(coarse, gap).load_path(FORCES)),
+        Press(pad, gap).load_path(FORCES),
+    )
+    for start, expected in zip(starts, ladder, strict=True):
+        found = press.at(start.force, start)
+        assert (found.steps, found.halvings, found.notes) == (1, 0, ())
+        assert found.iterations <= 7
+        assert relative(found.unknowns, expected.unknowns) < 1e-9
+        assert relative(found.pressure, expected.pressure) < 1e-9
+        assert found.checks.max_strain == pytest.approx(expected.checks.max_strain, rel=1e-9)
+
+
+def test_not_a_bit_depends_on_what_was_solved_before():
+    pad, coarse = pair("hex8")
+    starts = list(Press(coarse, OVAL).load_path(FORCES))
+    press = Press(pad, OVAL)
+    upward = [press.at(s.force, s).unknowns.tobytes() for s in starts]
+    downward = [press.at(s.force, s).unknowns.tobytes() for s in reversed(starts)]
+    assert upward == downward[::-1] == [Press(pad, OVAL).at(s.force, s).unknowns.tobytes() for s in starts]
+
+
+@pytest.mark.parametrize("start", ["none", "jumped", "far off", "broken"])
+def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(start):
+    pad, coarse = pair("hex8")
+    [good] = Press(coarse, BALL).load_path([3.0])
+    far = replace(good, unknowns=good.unknowns + np.eye(coarse.size)[coarse.closing_dof] * 4e-3)
+    given = {
+        "none": None, "jumped": replace(good, path_dependent=True), "far off": far,
+        "broken": replace(good, unknowns=np.full(coarse.size, np.nan)),
+    }  # fmt: skip
+    [expected] = Press(pad, BALL).load_path([3.0])
+    found = Press(pad, BALL).at(3.0, given[start])
+    assert found.steps > 1
+    assert relative(found.unknowns, expected.unknowns) < 1e-9
+    assert not found.path_dependent
+
+
+def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
+    """Far beyond what the foam bears; the force before and after it are solved as ever."""
+    pad = pad_of((6, 4, 2), contact="nodal")
+    press = Press(pad, BALL)
+    [start] = Press(pad, BALL).load_path([3.0])
+    before = press.at(3.0, start).unknowns
+    with pytest.raises(ConvergenceError):
+        press.at(3000.0, None)
+    assert press.solver.left >= -25
+    assert MOST_ITERATIONS - press.solver.left > 25
+    assert press.at(3.0, start).unknowns.tobytes() == before.tobytes()
+
+
+def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
+    pad, coarse = pair("hex8")
+    [start] = Press(coarse, OVAL).load_path([3.0])
+    one, other = (Press(pad, OVAL, options).at(3.0, start) for options in ({}, VI))
+    assert other.steps == 1
+    assert relative(one.unknowns, other.unknowns) < 3e-9
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex27"])
+@pytest.mark.parametrize("symmetry", [(True, True), (True, False), (False, False)])
+def test_fields_of_the_elements_degree_are_interpolated_exactly(element, symmetry):
+    """Displacements odd across a plane of symmetry, pressures even; also from a quarter to the whole."""
+    p = 1 if element == "hex8" else 2
+
+    def state(pad):
+        x, y, z = pad.nodes.T
+        # |x| is a field of trilinear elements on both sides of the plane x = 0
+        u = np.column_stack([x * (1 + z**p), y * (2 + np.abs(x)), (1 + np.abs(y) ** p) * (z + np.abs(x) ** p)])
+        found = np.zeros(pad.size)
+        found[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
+        found[pad.closing_dof] = 0.5
+        face = np.abs(pad.nodes[pad.contact_nodes])
+        found[pad.closing_dof + 1 :] = 1 + face[:, 0] ** p * face[:, 1] + face[:, 1] ** p
+        return found
+
+    fine = Pad(PadShape((4, 2, 1), (8, 8, 3), (1.5, 2.0, 2.0), element), FOAM, symmetry, "weighted")
+    quarter = Pad(PadShape((4, 2, 1), (4, 4, 2), (1.0, 1.5, 1.0), element), FOAM, (True, True), "weighted")
+    expected, found = state(fine), interpolated(quarter, state(quarter), fine)
+    inner = np.setdiff1d(np.arange(fine.closing_dof), fine.dofs[fine.nodes[:, 2] < -0.5].ravel())
+    assert found[inner] == pytest.approx(expected[inner], abs=1e-12)
+    assert found[fine.closing_dof :] == pytest.approx(expected[fine.closing_dof :], abs=1e-12)
+    assert interpolated(fine, expected, fine) == pytest.approx(expected, abs=1e-12)
+
+
+def test_pressures_are_never_interpolated_below_zero():
+    pad, coarse = pair("hex27")
+    x = np.zeros(coarse.size)
+    x[coarse.closing_dof + 1 :: 5] = 1.0  # quadratic functions swing between 1 and 0
+    pressure = interpolated(coarse, x, pad)[pad.closing_dof + 1 :]
+    assert pressure.min() == 0.0
+    assert pressure.max() >= 1.0 - 1e-12
+
+
+def test_pads_of_other_gaps_share_the_mesh():
+    """A coarse mesh that had to take its fallback pad is as good a start as any."""
+    nodal, weighted = (pad_of((6, 4, 2), contact=contact) for contact in ("nodal", "weighted"))
+    [start] = Press(weighted, OVAL).load_path([3.0])
+    [expected] = Press(nodal, OVAL).load_path([3.0])
+    assert relative(Press(nodal, OVAL).at(3.0, start).unknowns, expected.unknowns) < 1e-9
