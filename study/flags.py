@@ -5,6 +5,7 @@ Lower packages raise small flags of their own; `raised` gives them their bits of
 
 from __future__ import annotations
 
+import math
 from enum import IntFlag
 
 DEGREES_90 = "more than 90 deg from the contact normal"
@@ -95,13 +96,14 @@ def flags_in(value: int) -> list[Flag]:
     return [flag for flag in Flag if value & flag]
 
 
-def flag_words(value: int) -> str:
-    """Flags as a cell of a table.
+def flag_words(value: int, misalignment: float = math.nan) -> str:
+    """Flags as a cell of a table; ``misalignment`` of the contacts [rad] is told with its flag.
 
-    >>> flag_words(8 + 1024)
-    'hole, slips'
+    >>> flag_words(8 + 1024), flag_words(256, 0.21)
+    ('hole, slips', 'not antipodal by 12 deg')
     """
-    return ", ".join(flag.word for flag in flags_in(value))
+    angle = {Flag.NOT_ANTIPODAL: f" by {math.degrees(misalignment):.0f} deg"} if math.isfinite(misalignment) else {}
+    return ", ".join(flag.word + angle.get(flag, "") for flag in flags_in(value))
 
 
 def flag_sentences(value: int) -> str:

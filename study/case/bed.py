@@ -26,7 +26,7 @@ WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of
 MIDDLE = 2e-3  # reach of the weights round the centre of pressure [m]: about a cell, or a face of a pad's usual mesh
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 BRIDGED = 0.25  # what is left of a grasp whose pad bears on its ends, with nothing under the centre of pressure
-THROUGH = 1e-9  # [m]: a line that meets the surface only once passes through a hole
+BESIDE = 0.6  # of a pad's sides, from its middle: a solve looks so far at the surface
 
 
 @njit(cache=True)
@@ -170,7 +170,6 @@ class JawsOnSurface:
         low, high = height_fields(self.local, self.triangles, x, y)
         if not np.isfinite(low).any():
             raise NoContactError("the pad passes the object")
-        self.through = bool((np.isfinite(low) & (high - low < THROUGH)).any())
         # finger 2 looks against the approach, with its short side reversed
         self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
 
@@ -206,13 +205,21 @@ class JawsOnSurface:
     def quality(self) -> float:
         """Estimate of grasp quality, for ranking [m]: as that, it grows with the square of the contacts' distance.
 
-        Less what misalignment takes, and nothing where the pads lie over a hole of the surface.
+        Less what misalignment takes.
         """
-        if self.through:
-            return 0.0
         normals, line = np.maximum(self.misalignment, self.frames_misalignment)
         aligned = max(0.0, 1.0 - normals / WORST) * max(0.0, 1.0 - math.tan(min(line, 1.5)) / self.jaws.mu)
         return min(side.worth for side in self.sides) * (self.opening / self.jaws.pad[0]) ** 2 * aligned
+
+    def over(self, lids: FloatArray) -> bool:
+        """Whether a pad lies over a hole, given by the corners ``(n, 3, 3)`` of the triangles that close it [m]."""
+        corners = (lids - self.point) @ self.axes
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        length, width, thick = self.jaws.pad
+        reach = BESIDE * np.array([length, width])
+        beside = ((low[:, :2] <= reach) & (high[:, :2] >= -reach)).all(axis=1)
+        faces = self.sides[0].touch, -self.sides[1].touch
+        return any(bool((beside & (low[:, 2] <= z + thick) & (high[:, 2] >= z - thick)).any()) for z in faces)
 
     def _angles(self, one: FloatArray, other: FloatArray) -> tuple[float, float]:
         two = other * [1.0, -1.0, -1.0]

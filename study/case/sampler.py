@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side
 from softjaw.study.case.build import build_object, own_frame
@@ -131,7 +132,12 @@ def _curvature(side: Side, flip: float) -> FloatArray:
 
 
 def antipodal_grasps(
-    surface: tuple[FloatArray, IntArray], jaws: Jaws, count: int, seed: int = 0, samples: int = SAMPLES
+    surface: tuple[FloatArray, IntArray],
+    jaws: Jaws,
+    count: int,
+    seed: int = 0,
+    samples: int = SAMPLES,
+    lids: FloatArray | None = None,
 ) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps of a surface, the best first; then those that are not worth a solve.
 
@@ -144,6 +150,10 @@ def antipodal_grasps(
         Grasps that can be solved.
     seed : int
         Of the points where grasps are looked for; the same seed gives the same grasps on every machine.
+    samples : int
+        Number of those points.
+    lids : (n, 3, 3) array, optional
+        Corners of the triangles that close holes [m]: no pad is put there.
     """
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     corners = points[triangles]
@@ -159,7 +169,9 @@ def antipodal_grasps(
             starts.append(start)
             for along in long_sides(start, own):
                 axes = axes_of(start.axes[:, 2], along)
-                seen.append(judged(straightened((points, triangles), start.point, axes, jaws)))
+                grip = straightened((points, triangles), start.point, axes, jaws)
+                if lids is None or not grip.over(lids):
+                    seen.append(judged(grip))
         except NoContactError:
             continue
     return thinned(seen, count, jaws.pad[0])
@@ -250,7 +262,9 @@ def with_sampled_grasps(scene: Scene) -> Scene:
         Where no grasp fits between the pads.
     """
     obj = build_object(scene.object)
-    found = antipodal_grasps(obj.surface(), jaws_of(scene), scene.candidates.count, scene.candidates.seed)
+    given = scene.candidates
+    lids = obj.points[obj.triangles[obj.lids]] if isinstance(obj, MeshObject) else None
+    found = antipodal_grasps(obj.surface(), jaws_of(scene), given.count, given.seed, lids=lids)
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
@@ -260,7 +274,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    kept = {key: getattr(scene.candidates, key) for key in ("solve_best", "skip_hopeless")}
+    kept = {key: getattr(given, key) for key in ("solve_best", "skip_hopeless")}
     return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 

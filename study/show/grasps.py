@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, Flag, flags_in
+from softjaw.study.flags import LOST, Flag, flag_words, flags_in
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import judged, rank_values, ranking, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
@@ -200,6 +200,11 @@ def lost(ds: xr.Dataset, index: Index) -> bool:
 def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:
     """Flags of a case."""
     return flags_in(int(ds.variables["flags"].values[index]))
+
+
+def words_of(ds: xr.Dataset, index: Index) -> str:
+    """Flags of a case in words."""
+    return flag_words(int(ds.variables["flags"].values[index]), at(ds, "misalignment", index))
 
 
 def check(ds: xr.Dataset, name: str, index: Index) -> float:

@@ -99,7 +99,7 @@ def test_a_difference_above_the_errors_is_still_one():
 
 @tries
 @given(seeds)
-def test_a_interval_of_a_probe_is_that_of_its_images(seed):
+def test_an_interval_of_a_probe_is_that_of_its_images(seed):
     from softjaw.study.result.interval import at_least_own
 
     values = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.1], [math.nan, 2.0]])

@@ -32,6 +32,7 @@ from softjaw.study.show.grasps import (
     place,
     spoken,
     unravelled,
+    words_of,
 )
 from softjaw.study.show.report.verdict import VALUES, listed, safe_range, value
 from softjaw.study.show.tables.overview import RULE, wall_text
@@ -97,7 +98,7 @@ def _with_angles(ds: xr.Dataset, index: Index) -> str:
 def _row(ds: xr.Dataset, index: Index) -> list[str]:
     known = any(np.isfinite(check(ds, name, index)) for name in LIMITS)
     checks = flagged(ds, index) or ["passed" if known else "not stored"]
-    notes = ", ".join([*checks, *(flag.word for flag in flags_of(ds, index))])
+    notes = ", ".join(text for text in (*checks, words_of(ds, index)) if text)
     planar = number(at(ds, "e_n", index, ds.attrs["planar"]) * 1e3, 4)
     last = safe_range(ds, index) if "force_high" in ds else planar
     return [*(value(ds, name, index) for name in VALUES), last, notes]
@@ -110,7 +111,7 @@ def note(ds: xr.Dataset, index: Index) -> str:
         return str(ds.variables["message"].values[index]) or "no reason was given"
     if state != DONE:
         return ""
-    return ", ".join([*flagged(ds, index), *(flag.word for flag in flags_of(ds, index))])
+    return ", ".join(text for text in (*flagged(ds, index), words_of(ds, index)) if text)
 
 
 def states(ds: xr.Dataset) -> list[Block]:

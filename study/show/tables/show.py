@@ -32,7 +32,8 @@ INTERVAL_MEANS = (
     "half-width of the uncertainty interval (95 %) of the column before it; [uncertainty] in the scene lists its parts"
 )
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
-FLAGS_WIDTH, LABEL_WIDTH = 18, 28
+MISALIGNMENT = "misalignment"  # its flag is told with the angle
+FLAGS_WIDTH, LABEL_WIDTH = 15, 20
 RESERVED = {"map": 7, "flags": 13}  # characters of a column
 
 
@@ -145,6 +146,8 @@ def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
                 break
         if q.name == "e_n":  # what the paper compares it with
             yield f"e_n_{ds.planar}", q.unit, values_of(ds, q.name, ds.planar)
+    if MISALIGNMENT in ds:
+        yield MISALIGNMENT, ds[MISALIGNMENT].units, values_of(ds, MISALIGNMENT)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
@@ -228,7 +231,7 @@ def least(names: Sequence[str]) -> list[str]:
     errors = [f"{name}_error" for name in main if f"{name}_error" in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
     last = [name for name in ("quality_error", f"{MAIN[2]}_error", MAIN[2]) if name in names]
-    return [*main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
+    return [*(n for n in (MISALIGNMENT,) if n in names), *main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
 
 
 def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:
@@ -282,12 +285,13 @@ def _body(table: Table) -> list[list[str]]:
 
 
 def _stacked(flags: str) -> str:
-    r"""Flags in as many narrow lines as they take, each flag in one piece.
+    r"""Flags in as many narrow lines as they take, each flag in one piece but for its angle.
 
     >>> _stacked("hole, not antipodal, too weak")
     'hole,\nnot antipodal,\ntoo weak'
     """
-    whole = textwrap.wrap(flags.replace(" ", "\xa0").replace(",\xa0", ", "), FLAGS_WIDTH, break_long_words=False)
+    joined = flags.replace(" ", "\xa0").replace(",\xa0", ", ").replace("\xa0by", " by")
+    whole = textwrap.wrap(joined, FLAGS_WIDTH, break_long_words=False)
     return "\n".join(whole).replace("\xa0", " ")
 
 
@@ -338,14 +342,16 @@ def _range_text(bounds: dict[str, float]) -> str:
 
 def _cells(row: tuple[Any, ...], columns: Columns) -> list[str]:
     """A row as it is displayed; what stands before the quality are coordinates."""
-    first = [name for name, _ in columns].index("quality")
+    names = [name for name, _ in columns]
+    first, off = names.index("quality"), row[names.index(MISALIGNMENT)] if MISALIGNMENT in names else np.nan
     pairs = zip(row, columns, strict=True)
-    return [_cell(value, name, units, i < first) for i, (value, (name, units)) in enumerate(pairs)]
+    return [
+        flag_words(value, off) if name == "flags" else _cell(value, name, units, i < first)
+        for i, (value, (name, units)) in enumerate(pairs)
+    ]
 
 
 def _cell(value: Any, name: str, units: str, coordinate: bool) -> str:
-    if name == "flags":
-        return flag_words(value)
     if not isinstance(value, float):
         text = str(value)
         return text if len(text) <= LABEL_WIDTH else f"{text[: LABEL_WIDTH - 3]}..."

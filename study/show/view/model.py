@@ -22,7 +22,7 @@ from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undefo
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene import SceneError, parse_scene
-from softjaw.study.show.grasps import Index, candidate_of, field, forces, number, order, place, quantity, unravelled
+from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -208,7 +208,7 @@ class View:
             if (found := field(self.ds, key)) is not None:
                 text, unit, factor = quantity(self.ds, key)
                 lines.append(f"{text}: {number(found[index] * factor)} {unit}".rstrip())
-        flags = flag_words(int(self.ds["flags"].values[index]))
+        flags = flag_words(int(self.ds["flags"].values[index]), at(self.ds, "misalignment", index))
         return [*lines, f"flags: {flags}"] if flags else lines
 
     def legend(self, index: Index, motion: str) -> list[str]:

@@ -149,11 +149,22 @@ def test_a_contact_frame_stands_where_the_centre_of_pressure_is():
     assert grip.frames_misalignment[0] > grip.misalignment[0]
 
 
-def test_a_pad_over_a_hole_of_the_surface_is_worth_nothing():
-    points, triangles = box(0.2, 0.2, 0.05)
-    front = (points[triangles][:, :, 2] < 0).all(axis=1)
-    assert at_origin((points, triangles)).quality > 0.0
-    assert at_origin((points, triangles[~front])).quality == 0.0
+def test_no_pad_is_put_over_a_hole():
+    body = box(0.2, 0.2, 0.05)
+
+    def at(x, z):
+        return np.array([[[x, 0.0, z - 0.025], [x + 0.01, 0.0, z - 0.025], [x, 0.01, z - 0.025]]])
+
+    grip = at_origin(body)
+    assert grip.over(at(0.0, 0.0))
+    assert grip.over(at(0.0, 0.05))  # the other pad
+    assert grip.over(at(0.028, 0.0))
+    assert not grip.over(at(0.031, 0.0))
+    assert not grip.over(at(0.0, 0.02))  # in between, out of reach
+    assert len(antipodal_grasps(body, NARROW, 20, samples=80)) > 3
+    corners = body[0][body[1]]
+    all_over = corners[np.ptp(corners[..., 2], axis=1) == 0.0]  # both large faces
+    assert not [g for g in antipodal_grasps(body, NARROW, 20, samples=80, lids=all_over) if not g.state]
 
 
 def test_grasps_are_spread_over_the_places_of_an_object():

@@ -47,8 +47,8 @@ def file(tmp_path_factory):
         "fingers/S": [S, S],
         "fingers/f_x_max": np.full((2, 3), MU * S),
         "fingers/tau_z_max": np.full((2, 3), 0.01),
-        "maps/fit_error": 0.002,
-        "maps/fit_error_ellipsoid": 0.013,
+        "maps/overclaim": 0.002,
+        "maps/overclaim_ellipsoid": 0.013,
     }
     layout = Layout(axes(stations=(0.0, 0.01), angles=(0.0,), forces=(1.0,)), 24)
     return make(tmp_path_factory.mktemp("surface") / "s.hdf", layout, **values)
