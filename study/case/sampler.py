@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -263,8 +264,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     """
     obj = build_object(scene.object)
     given = scene.candidates
-    lids = obj.points[obj.triangles[obj.lids]] if isinstance(obj, MeshObject) else None
-    found = antipodal_grasps(obj.surface(), jaws_of(scene), given.count, given.seed, lids=lids)
+    found = antipodal_grasps(obj.surface(), jaws_of(scene), given.count, given.seed, lids=lids_of(obj))
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
@@ -276,6 +276,11 @@ def with_sampled_grasps(scene: Scene) -> Scene:
         )
     kept = {key: getattr(given, key) for key in ("solve_best", "skip_hopeless", "refine")}
     return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
+
+
+def lids_of(obj: Any) -> FloatArray | None:
+    """Corners ``(n, 3, 3)`` of the triangles that close holes of a mesh [m]; None for other objects."""
+    return obj.points[obj.triangles[obj.lids]] if isinstance(obj, MeshObject) else None
 
 
 def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:

@@ -96,9 +96,11 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
 def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> list[Place]:
     """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
     from softjaw.study.case.bed import JawsOnSurface  # compiled loops, which a plan is made without
+    from softjaw.study.case.sampler import lids_of
 
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
-    placed, surface = own_frame(shape), build_object(shape).surface()
+    obj, placed = build_object(shape), own_frame(shape)
+    surface, lids = obj.surface(), lids_of(obj)
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
     found: list[tuple[float, Place]] = []
     for best in best_places(values):
@@ -110,6 +112,8 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
                 grip = JawsOnSurface(surface, point, axes, jaws)
             except NoContactError:
                 continue
+            if lids is not None and grip.over(lids):
+                continue  # pads bear on no hole
             # In the middle between both contacts, where the next tilt turns about.
             point = point + 0.5 * (grip.sides[0].touch - grip.sides[1].touch) * axes[:, 2]
             known.append((point, axes))

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, WIDE
@@ -128,6 +129,21 @@ def test_new_poses_stand_in_the_middle_of_the_object_and_none_passes_it():
     level = [x for added in rounds for x in added if abs(x[4]) > 0.9999 and abs(x[3]) < 50]
     assert level
     assert all(abs(x[1]) < 0.5 for x in level)  # between the faces x = -30 and 30 mm
+
+
+def test_no_neighbour_is_put_over_a_hole_of_a_mesh(tmp_path):
+    body = trimesh.creation.box((60, 40, 120)).subdivide_to_size(6.0)
+    middle = body.triangles_center
+    hole = (middle[:, 0] > 29.9) & (np.abs(middle[:, 1]) < 4) & (np.abs(middle[:, 2] - 49) < 5)
+    assert 2 <= hole.sum() < 30
+    body.update_faces(~hole)
+    body.export(tmp_path / "body.stl")
+    shape = f'shape = "mesh"\nmesh = "{tmp_path}/body.stl"\nunit = "mm"\n'
+    text = SCENE.replace("BUDGET", "10").replace('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6\n', shape)
+    rounds, _ = searched(lambda point, approach, _: 0.1 * (approach[0] > 0.9), parse_scene(text))
+    shifts = [x[3] for added in rounds for x in added if x[0] == 1.0]
+    assert min(shifts) == pytest.approx(8 - 12.5)
+    assert max(shifts) == pytest.approx(8)
 
 
 def test_a_search_ends_where_finer_steps_gain_nothing_or_the_budget_is_spent():
