@@ -52,6 +52,7 @@ FEWEST = 1.0 / 1024.0  # part of a step that is not halved again where nothing i
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
 FIRST = 0.25  # closing displacement at which the first contact is looked for, at most
+MOST_NEAR = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
@@ -385,7 +386,7 @@ class Following(Stepping):
         ConvergenceError
             Where there is none near it, or one that a path from first contact need not lead to.
         """
-        x = self.solve(start, Control(force=force), work, self.most)
+        x = self.solve(start, Control(force=force), work, self.most or MOST_NEAR)
         strays = np.abs((x - start)[: self.problem.closing_dof + 1]).max() > STRAY * self.thickness
         folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
         # with a part of the tangent alone nothing tells whether the state is stable

@@ -141,10 +141,10 @@ class Press(LoadPath):
         thickness = self.pad.shape.size[2]
         return self.stepping(
             self.problem, self.solver, self.settings, thickness, self.pad.share, self._bed.guess,
-            self._bed.force_scale, self.pad.rounding, watch=self._remember, near=self._near, deepest=thickness,
+            self._bed.force_scale, self.pad.rounding, watch=self._remember, near=self._keeps_laws, deepest=thickness,
         )  # fmt: skip
 
-    def _near(self, x: FloatArray) -> bool:
+    def _keeps_laws(self, x: FloatArray) -> bool:
         """Whether an iterate that no solve has ended at keeps all laws of contact to `NEAR`."""
         # vinewtonrsls has another residual, which says nothing of pressures at their bounds
         if self.problem.complementarity or not np.isfinite(left_over := self._left_over(x)):
@@ -182,18 +182,16 @@ class Press(LoadPath):
             work, elapsed, below = Work(), self._stopwatch(), x
             self.solver.left = MOST_ITERATIONS
             x = self._within_budget(x, reached, force, work)
-            # the solver cannot see this: both states are in equilibrium and may pass their own checks
-            if below is not None:
-                refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
+            self._refuse_fall(below, reached, x, force)
             reached = force
             yield self._pressed(x, force, work, elapsed())
 
-    def at(self, force: float, coarse: Pressed | None) -> Pressed:
+    def at(self, force: float, coarse: Sequence[Pressed]) -> Pressed:
         """State at one normal force on the whole pad [N], whatever else this press has solved.
 
-        ``coarse`` is the state of a coarser mesh at the same force, from which one Newton solve is tried. Where that
-        leads off the load path, where the coarse mesh has jumped before, or without it, the force is approached from
-        first contact.
+        ``coarse`` are states of a coarser mesh, the nearest first, none above this force. From each one Newton solve is
+        tried; from the first that leads to a state on the load path the force is approached, if it is lower. Where none
+        does, or the coarser mesh has jumped before, the force is approached from first contact.
 
         Raises
         ------
@@ -202,15 +200,26 @@ class Press(LoadPath):
         """
         work, elapsed = Work(), self._stopwatch()
         self._begin_afresh()
+        x, reached = self._near(coarse, work)
+        if x is None or reached < force:
+            below, x = x, self._within_budget(x, reached, force, work)
+            self._refuse_fall(below, reached, x, force)
+        return self._pressed(x, force, work, elapsed())
+
+    def _near(self, coarse: Sequence[Pressed], work: Work) -> tuple[FloatArray | None, float]:
+        """State that was found from a coarser mesh and its force [N]; none if there is none."""
         steps = self._stepping
-        # without following the path nothing would tell a state that lies off it
-        if coarse is not None and not coarse.path_dependent and isinstance(steps, Following):
-            start = interpolated(coarse.pad, coarse.unknowns, self.pad)
+        for start in coarse:
+            # without following the path nothing would tell a state that lies off it
+            if start.path_dependent or not isinstance(steps, Following):
+                continue
             try:
-                return self._pressed(steps.from_near(start, force, work), force, work, elapsed())
+                x = steps.from_near(interpolated(start.pad, start.unknowns, self.pad), start.force, work)
+                self._pressed(x, start.force, work, Seconds())
             except (ConvergenceError, CheckError):
-                pass
-        return self._pressed(self._within_budget(None, 0.0, force, work), force, work, elapsed())
+                continue
+            return x, start.force
+        return None, 0.0
 
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""
@@ -222,6 +231,12 @@ class Press(LoadPath):
             self.pad = self._wanted
             self._start_again()
         self.solver.left = MOST_ITERATIONS
+
+    def _refuse_fall(self, below: FloatArray | None, reached: float, x: FloatArray, force: float) -> None:
+        """Refuse a state ``x`` that more force has not led to from the one ``below``, if there is one."""
+        # the solver cannot see this: both states are in equilibrium and may pass their own checks
+        if below is not None:
+            refuse_fall((reached, self.problem.closing(below)), (force, self.problem.closing(x)))
 
     def _within_budget(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """As `_next`; what it needed in vain is told."""

@@ -274,7 +274,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    kept = {key: getattr(given, key) for key in ("solve_best", "skip_hopeless")}
+    kept = {key: getattr(given, key) for key in ("solve_best", "skip_hopeless", "refine")}
     return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 
@@ -282,22 +282,11 @@ def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:
     """A grasp in the frame of the object's own file, as a scene gives it."""
     place = _rounded([converted(float(x), "m", "mm") for x in placed.to_object(grasp.point)], 3)
     approach, long_side = (_rounded(placed.rotation @ v, 6) for v in (grasp.approach, grasp.long_side))
-    label = f"{place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f} mm, {_angle_text(approach)}"
-    return GraspPose(point_mm=place, approach=approach, long_side=long_side, label=label)
+    pose = GraspPose(point_mm=place, approach=approach, long_side=long_side)
+    return pose.model_copy(update={"label": pose.place})
 
 
 def _rounded(v: Sequence[float] | FloatArray, digits: int) -> tuple[float, float, float]:
     """A vector in so many digits; 0.0 makes of a negative zero a positive one."""
     x, y, z = (round(float(part), digits) + 0.0 for part in v)
     return x, y, z
-
-
-def _angle_text(approach: Sequence[float]) -> str:
-    """Azimuth and elevation of an approach, which tell grasps at one place apart.
-
-    >>> _angle_text((0.0, 1.0, 0.0))
-    'from 90/0 deg'
-    """
-    azimuth = math.degrees(math.atan2(approach[1], approach[0]))
-    elevation = math.degrees(math.asin(max(-1.0, min(1.0, approach[2]))))
-    return f"from {azimuth:.0f}/{elevation:.0f} deg"

@@ -31,6 +31,7 @@ OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse fo
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
+STARTS = 3  # states of the coarser mesh that a force on the fine one is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 State = TypeVar("State")
@@ -196,18 +197,18 @@ class OnRigid:
         paths = [_CoarsePath(coarse, forces) for _, coarse in self.presses]
         for k in wanted:
             try:
-                yield k, self._level(forces[k], [path.state(k) for path in paths], paths)
+                yield k, self._level(forces[k], k, paths)
             except (ConvergenceError, CheckError) as error:
                 yield k, error
 
-    def _level(self, force: float, coarse: Sequence[Pressed | None], paths: Sequence[_CoarsePath]) -> Solved:
-        """Contacts at one force [N] from the coarser mesh's states."""
-        states = [(fine.at(force, start), start) for (fine, _), start in zip(self.presses, coarse, strict=True)]
+    def _level(self, force: float, k: int, paths: Sequence[_CoarsePath]) -> Solved:
+        """Contacts at the ``k``-th force [N] from the coarser mesh's states."""
+        coarse = [path.state(k) for path in paths]
+        fine = [own[0].at(force, path.starts(k)) for own, path in zip(self.presses, paths, strict=True)]
         # an error can be told only where both fingers have a coarser state
-        if any(start is None for start in coarse):
-            reason = next(path.ended for path, start in zip(paths, coarse, strict=True) if start is None)
-            return replace(self._solved([(fine,) for fine, _ in states]), note=NO_ERROR.format(reason=reason))
-        return self._solved(states)
+        if lacking := [path.ended for path, state in zip(paths, coarse, strict=True) if state is None]:
+            return replace(self._solved([(state,) for state in fine]), note=NO_ERROR.format(reason=lacking[0]))
+        return self._solved(list(zip(fine, coarse, strict=True)))
 
     def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
         """Contacts of both fingers from the states of those that are solved, on each mesh."""
@@ -241,6 +242,10 @@ class _CoarsePath:
             self._states.append(found if isinstance(found, Pressed) else None)
             self.ended = self.ended if isinstance(found, Pressed) else str(found)
         return self._states[k] if k < len(self._states) else None
+
+    def starts(self, k: int) -> list[Pressed]:
+        """What the fine mesh starts from at the ``k``-th force: the states there and below, the nearest first."""
+        return [state for i in range(k, -1, -1) if (state := self.state(i)) is not None][:STARTS]
 
 
 class OnWall:

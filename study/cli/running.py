@@ -22,7 +22,7 @@ from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.progress import Unbreakable
-from softjaw.study.run.refine import Rounds, added_cases, next_stations, refined
+from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
 from softjaw.study.run.session import Growth, Work, on_rank0, run_study
 from softjaw.study.scene import Scene
 from softjaw.study.show.report.verdict import plain_report
@@ -35,19 +35,19 @@ def run(options: Namespace) -> int:
     sys.stdout = Unbreakable(sys.stdout)
     scene, choice = on_rank0(comm, with_target_met, options.scene_read, path)
     plan = on_rank0(comm, prepare, scene, options, choice)
-    growth = None if scene.candidates.poses else _growth(scene, plan, choice, comm)
+    growth = _growth(scene, plan, choice, comm)
     return run_study(plan, work(scene, choice), path, comm, retry_failed=options.retry_failed, growth=growth)
 
 
 def _growth(scene: Scene, plan: Any, choice: Any, comm: Any) -> Growth:
-    """How the stations of a scene are refined; also a file that has such stations already needs it."""
+    """How the grasps of a scene are refined; also a file that has been refined already needs it."""
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
         made = on_rank0(comm, make_plan, scene, *about, True, rounds)
         return made, work(refined(scene, rounds), choice)
 
-    return Growth(study, lambda result: next_stations(result, scene, each))
+    return Growth(study, lambda result: next_round(result, scene, each))
 
 
 def cost(options: Namespace) -> None:

@@ -81,8 +81,8 @@ class Layout:
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
     candidates ``probes``. ``surface`` counts the points and triangles of the object, ``pad_faces`` the faces along and
-    across a pad, as `study.result.vtkhdf` shows them, or zeros. ``added`` are the stations that each round of a
-    refinement added to those of the scene [mm].
+    across a pad, as `study.result.vtkhdf` shows them, or zeros. ``added`` is what each round of a
+    refinement added to the scene: stations [mm], or poses as `study.run.pattern.Place`.
     """
 
     axes: tuple[Any, ...]
@@ -99,7 +99,7 @@ class Layout:
     pad_faces: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
-    added: tuple[tuple[float, ...], ...] = ()
+    added: tuple[tuple[Any, ...], ...] = ()
 
     @cached_property
     def parts(self) -> dict[str, tuple[int, ...]]:
@@ -249,11 +249,20 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
-        added = tuple(tuple(map(float, some)) for some in options.get("added", ()))
+        added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
         return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
                       pad_faces, probes, variations, added)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
+
+
+def _place(given: Any) -> Any:
+    """A station, or a pose with its step."""
+    if not isinstance(given, list):
+        return float(given)
+    if len(given) != 10:
+        raise ValueError(f"an added pose of {len(given)} numbers")
+    return tuple(map(float, given))
 
 
 def _pair(given: Sequence[int]) -> tuple[int, int]:

@@ -69,7 +69,7 @@ class Plan:
 def make_plan(
     scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False, rounds: Rounds = ()
 ) -> Plan:
-    """The plan of a scene, with the stations that ``rounds`` of refinement added; builds its objects.
+    """The plan of a scene, with what ``rounds`` of refinement added; builds its objects.
 
     ``ordered`` marks units that come last.
     """
@@ -231,8 +231,9 @@ def _rounds(plan: Plan, scene: Any) -> str:
     if asked is None:
         return ""
     each = added_cases(plan.units, plan.layout)
-    text = f"up to {asked.budget // each} more stations, {each} cases each, until the best is known to"
-    return f"{text} {asked.best_within:.2g} of itself; not in the numbers above and below"
+    what = "poses" if scene.candidates.poses else "stations"
+    text = f"up to {asked.budget // each} more {what}, {each} cases each, {scene.candidates.refined_until}"
+    return f"{text}; not in the numbers above and below"
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:

@@ -1,8 +1,9 @@
-"""Further stations, in rounds: where the best grasp may still lie between two solved ones, by stored numbers alone.
+"""Further grasps, in rounds: where the best may still lie between two solved stations, by stored numbers alone.
 
 Between two stations a score is taken to rise no faster than `STEEPER` times the steepest slope of the interval and of
 the two beside it. Where that lets it pass the best one by more than the scene tolerates, the middle of the interval is
-solved. Poses have no order, so a scene of poses is not refined; nor are angles, of which every station has all.
+solved. Poses have no order: around the best of them `study.run.pattern` searches. Angles are not refined, every
+station has all.
 """
 
 from __future__ import annotations
@@ -19,22 +20,25 @@ from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
 from softjaw.study.ranking import asked_score
+from softjaw.study.run.pattern import gained, next_poses, with_places
 
 if TYPE_CHECKING:
     from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
-Rounds = tuple[tuple[float, ...], ...]  # stations that each round added [mm]
+Rounds = tuple[tuple[Any, ...], ...]  # what each round added: stations [mm], or poses as `pattern.Place`
 STEEPER = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
 TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
 
 
 def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
-    """The scene with the stations of all rounds as its own; ``probes`` are the numbers that the scene gives them."""
+    """The scene with what all rounds added as its own; ``probes`` are the numbers that the scene gives them."""
     if not rounds:
         return scene
     where, given = scene.candidates, scene.candidates.station_values_mm
+    if where.poses:
+        return _with_poses(scene, rounds, probes)
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
     numbers = _Renumbered(given, stations, len(where.angles_deg))
     fixed: dict[str, Any] = {"stations": None, "station_range_mm": None, "stations_mm": stations, "refine": None}
@@ -46,6 +50,17 @@ def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
         parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
     if probes:
         parts["uncertainty"] = scene.uncertainty.model_copy(update={"probes": numbers(probes)})
+    return scene.model_copy(update=parts)
+
+
+def _with_poses(scene: Scene, rounds: Rounds, probes: Sequence[int]) -> Scene:
+    where = scene.candidates
+    poses = with_places(where.poses, rounds)
+    # What was left out as not among the best stays so in the file; the added poses are all solved.
+    fixed = {"poses": poses, "refine": None, "solve_best": None}
+    parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
+    if probes:
+        parts["uncertainty"] = scene.uncertainty.model_copy(update={"probes": tuple(probes)})
     return scene.model_copy(update=parts)
 
 
@@ -98,14 +113,25 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
 
 
 def chances_in(result: Any) -> FloatArray:
-    """`chances` of a result file, by the map that its grasps are ranked by, CCM."""
-    values = _cases(result, result.read(f"{asked_score(result.layout.has)}/ccm"))
-    flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
-    done = _cases(result, result.status) == DONE
-    values = np.where(done, values, np.nan)
+    """`chances` of a result file of stations."""
+    values, sound = _scores(result)
     stations, added = result.axes[-3].values, sum(map(len, result.layout.added))
     finest = FINEST * np.ptp(stations) / max(len(stations) - added - 1, 1)
-    return chances(stations, values, np.isfinite(values) & (flags & LOST == 0), finest)
+    return chances(stations, values, sound, finest)
+
+
+def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """The map that grasps are ranked by, CCM, NaN where nothing is solved; and whether a grasp can be used."""
+    values = _cases(result, result.read(f"{asked_score(result.layout.has)}/ccm"))
+    flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
+    values = np.where(_cases(result, result.status) == DONE, values, np.nan)
+    return values, np.isfinite(values) & (flags & LOST == 0)
+
+
+def _of_poses(result: Any) -> FloatArray:
+    """The same of every pose at every force and point of the sweep, NaN where a grasp cannot be used."""
+    values, sound = _scores(result)
+    return np.moveaxis(np.where(sound, values, np.nan), 1, 0).reshape(values.shape[1], -1)
 
 
 def _cases(result: Any, values: np.ndarray) -> np.ndarray:
@@ -114,8 +140,23 @@ def _cases(result: Any, values: np.ndarray) -> np.ndarray:
 
 
 def added_cases(units: Sequence[Any], layout: Any) -> int:
-    """Cases that are solved at each station of a plan; images by symmetry lie at the station of what is solved."""
+    """Cases that are solved at each station of a plan; images by symmetry lie at the station of what is solved.
+
+    Or for each pose, as if it had no image.
+    """
+    if not layout.axes[-3].units:
+        return int(layout.rows // layout.shape[-3])
     return len(units) * layout.shape[-1] // layout.shape[-3]
+
+
+def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
+    """What the next round solves; nothing where the best is known well enough or the budget is spent.
+
+    ``each`` is the number of cases that are solved at a station, or of a pose.
+    """
+    if scene.candidates.poses:
+        return next_poses(result, _of_poses(result), scene, each)
+    return next_stations(result, scene, each)
 
 
 def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
@@ -147,17 +188,28 @@ def _middle(low: float, high: float) -> float:
 
 
 def about(result: Any) -> str:
-    """What was added, and how well the best grasp is known, in a sentence; empty for a file without added stations."""
+    """What was added, and how well the best grasp is known, in a sentence; empty where nothing was added."""
     rounds = result.layout.added
     if not rounds:
         return ""
     count, own = sum(map(len, rounds)), result.layout.shape[-3]
-    text = f"{own - count} stations of the scene and {count} added in {_counted(len(rounds), 'round')}"
+    what = "stations" if result.axes[-3].units else "poses"
+    text = f"{own - count} {what} of the scene and {count} added in {_counted(len(rounds), 'round')}"
     if (result.status == MISSING).any():
         return f"{text}, the last of which is not complete"
+    if what == "poses":
+        by = gained(_of_poses(result), own - count)
+        return f"{text}, the last by {rounds[-1][0][0]:g} of the first step; the best gained {by:.1%} at most"
     chance = float(chances_in(result).max(initial=0.0))
     known = f"; between them the best may be beaten by {chance:.1%} at most, judged by the slopes beside"
     return text + (known if chance > 0 else "; no station between them is expected to beat the best")
+
+
+def round_text(added: Sequence[Any]) -> str:
+    """What a round adds, in words."""
+    if isinstance(added[0], tuple):
+        return f"{len(added)} more pose{'s' * (len(added) > 1)} around the best, by {added[0][0]:g} of the first step"
+    return f"{_counted(len(added), 'more station')}, at {', '.join(f'{s:g}' for s in added)} mm"
 
 
 def _counted(count: int, what: str) -> str:

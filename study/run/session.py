@@ -31,7 +31,7 @@ from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress
-from softjaw.study.run.refine import Rounds
+from softjaw.study.run.refine import Rounds, round_text
 from softjaw.study.run.schedule import Claims, LostRanks
 from softjaw.study.run.shares import shares
 
@@ -86,18 +86,18 @@ def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a study gets more stations while it runs.
+    """How a study gets more grasps while it runs.
 
     Parameters
     ----------
     study : callable
-        ``study(rounds)`` gives plan and work with the stations that these rounds added; collective.
+        ``study(rounds)`` gives plan and work with what these rounds added; collective.
     more : callable
-        ``more(result)`` gives the stations of the next round, from what is stored alone; none at the end.
+        ``more(result)`` gives the stations or poses of the next round, from what is stored alone; none at the end.
     """
 
     study: Callable[[Rounds], tuple[Plan, Work]]
-    more: Callable[[Result], tuple[float, ...]]
+    more: Callable[[Result], tuple[Any, ...]]
 
 
 def run_study(
@@ -105,7 +105,7 @@ def run_study(
 ) -> int:
     """Solve all missing cases of ``plan`` into ``path`` and return the exit code; collective over ``comm``.
 
-    With ``growth`` rounds of further stations follow, each in a file that takes the place of the one before.
+    With ``growth`` rounds of further grasps follow, each in a file that takes the place of the one before.
 
     Raises
     ------
@@ -162,12 +162,11 @@ def _rounds_in(path: Path, plan: Plan) -> Rounds:
     return ()
 
 
-def _next_round(path: Path, growth: Growth) -> tuple[float, ...]:
+def _next_round(path: Path, growth: Growth) -> tuple[Any, ...]:
     with open_result(path) as result:
         added, number = growth.more(result), len(result.layout.added) + 1
     if added:
-        some = f"{len(added)} more station{'s' * (len(added) > 1)}"
-        print(f"round {number}: {some}, at {', '.join(f'{s:g}' for s in added)} mm", flush=True)
+        print(f"round {number}: {round_text(added)}", flush=True)
     return added
 
 

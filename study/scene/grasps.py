@@ -35,6 +35,17 @@ class GraspPose(SceneSection):
     label: Text = Field("", max_length=100, description="name of the grasp")
     point: ClassVar[Any] = si("point_mm")
 
+    @property
+    def place(self) -> str:
+        """Where it is and from where it comes, which tells grasps apart.
+
+        >>> GraspPose(point_mm=(0.0, 0.0, 20.0), approach=(0.0, 1.0, 0.0), long_side=(0.0, 0.0, 1.0)).place
+        '0, 0, 20 mm, from 90/0 deg'
+        """
+        x, y, z = _unit(self.approach)
+        azimuth, elevation = math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z))))
+        return "{:.0f}, {:.0f}, {:.0f} mm, from {:.0f}/{:.0f} deg".format(*self.point_mm, azimuth, elevation)
+
     def findings(self) -> Iterator[Finding]:
         """Directions that do not fix a frame, points far from any object."""
         cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
@@ -59,10 +70,14 @@ class GraspPose(SceneSection):
 
 
 class Refinement(SceneSection):
-    """How the stations are refined once the scene's own are solved; `study.run.refine` says by which rule."""
+    """How grasps are refined once the scene's own are solved; `study.run.refine` and `study.run.pattern` say how."""
 
     best_within: float = Field(
-        0.02, ge=0.001, le=0.5, description="stop when no station is expected to beat the best by more than this share"
+        0.02,
+        ge=0.001,
+        le=0.5,
+        description="stop when no station is expected to beat the best by more than this share, or when a finer step"
+        " between poses gained less",
     )
     budget: int = Field(120, ge=1, le=100_000, description="cases that are solved at most beside the scene's own")
 
@@ -107,7 +122,7 @@ class Candidates(SceneSection):
     seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
     refine: Annotated[Refinement | None, BeforeValidator(_switched)] = Field(
         None,
-        description="solves further stations where the best grasp may lie between the given ones",
+        description="solves further stations between the given ones, or further poses around the best given ones",
         examples=[True],
         json_schema_extra=_also_a_switch,
     )
@@ -139,6 +154,14 @@ class Candidates(SceneSection):
             return self.count
         return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
 
+    @property
+    def refined_until(self) -> str:
+        """What ends a refinement, in words."""
+        share = self.refine.best_within if self.refine else 0.0
+        if self.poses or self.sampler:
+            return f"until a finer step between poses gains less than {share:.2g} of the best"
+        return f"until the best is known to {share:.2g} of itself"
+
     def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
         """Numbers of the candidates that are given by number or label, each once, in the order given."""
         return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
@@ -164,9 +187,6 @@ class Candidates(SceneSection):
         for key in ("angles_deg", "roll_deg") if self.poses or self.sampler else ():
             if getattr(self, key) != Candidates.model_fields[key].default:
                 yield Finding((key,), f"{key} without stations", "it with stations only", "remove it")
-        if self.refine and (self.poses or self.sampler):
-            # Poses have no order, so nothing lies between two of them.
-            yield Finding(("refine",), "refine without stations", "it with stations only", "remove it")
         for i, pose in enumerate(self.poses):
             yield from (f.below("poses", i) for f in pose.findings())
 

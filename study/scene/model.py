@@ -133,10 +133,9 @@ class Scene(SceneSection):
         """Every value in effect, defaults filled in, as the tables of a scene file."""
         data = self.model_dump(exclude_none=True)
         # Only the way that was chosen: a scene that gives both would be refused.
-        if self.candidates.poses:
-            data["candidates"] = {"poses": data["candidates"]["poses"]}
-        elif self.candidates.sampler:
-            data["candidates"] = {key: data["candidates"][key] for key in ("sampler", "count", "seed")}
+        if self.candidates.poses or self.candidates.sampler:
+            way = ("poses",) if self.candidates.poses else ("sampler", "count", "seed")
+            data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, "refine")}
         else:
             for key in ("poses", "count", "seed"):
                 del data["candidates"][key]

@@ -13,7 +13,7 @@ from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.plan import make_plan, measured_seconds
 from softjaw.study.run.refine import FINEST, chances, next_stations
-from softjaw.study.scene import SceneError, load_scene, parse_scene
+from softjaw.study.scene import parse_scene
 from tests.study.launching import contents, differing, launch
 
 GIVEN = np.linspace(25.0, 175.0, 35)
@@ -143,13 +143,6 @@ def filled(path, plan):
         values["wrenches/wrench"] = random.random((2, 3, plan.layout.samples, 3))
         writer.write(row, record(plan.layout, CaseResult(values, patch)))
     writer.close()
-
-
-def test_scenes_of_poses_are_not_refined():
-    with pytest.raises(SceneError, match="refine without stations"):
-        load_scene("jobs/box-poses.toml", ["candidates.refine=true"])
-    assert load_scene("jobs/smoke.toml", ["candidates.refine=true"]).candidates.refine.budget == 120
-    assert load_scene("jobs/smoke.toml", ["candidates.refine=false"]).candidates.refine is None
 
 
 @pytest.mark.long

@@ -63,11 +63,13 @@ def _error(ds: Any, index: Index) -> str:
 
 
 def _pads(ds: Any, index: Index) -> str:
-    """Middle of both pads and the way finger 1 closes, in the frame of the object's own file."""
+    """Middle of both pads, the way finger 1 closes and their long side, in the frame of the object's own file."""
     if "finger_pose_origin" not in ds:
         return ""
-    middle, along = ds.finger_pose_origin.values[index].mean(axis=0), ds.finger_pose_rotation.values[index][0][:, 2]
-    if not np.isfinite([*middle, *along]).all():
+    middle, turn = ds.finger_pose_origin.values[index].mean(axis=0), ds.finger_pose_rotation.values[index][0]
+    if not np.isfinite([*middle, *turn.ravel()]).all():
         return ""
-    x, n = (", ".join(f"{v + 0.0:.3g}" for v in np.round(part, 6)) for part in (shown(middle, 'm'), along))
-    return f" (pads about [{x}] mm, closing along [{n}])"
+    # adding 0 turns -0 into 0
+    x = ", ".join(f"{v + 0.0:.4g}" for v in np.round(shown(middle, "m"), 2))
+    closing, long_side = (", ".join(f"{v + 0.0:.3g}" for v in np.round(turn[:, k], 3)) for k in (2, 0))
+    return f" (pads about [{x}] mm, closing along [{closing}], long side along [{long_side}])"

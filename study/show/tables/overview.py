@@ -32,7 +32,7 @@ def scene_text(scene: Any, file: str) -> str:
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
         "cases": str(scene.cases),
-        "refinement": _refinement(c.refine),
+        "refinement": _refinement(c),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
         "target": _target(scene),
@@ -46,11 +46,9 @@ def scene_text(scene: Any, file: str) -> str:
     return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
 
 
-def _refinement(asked: Any) -> str:
+def _refinement(where: Any) -> str:
     """What a refinement may add; empty without one."""
-    if asked is None:
-        return ""
-    return f"at most {asked.budget} more cases, until the best is known to {asked.best_within:.2g} of itself"
+    return f"at most {where.refine.budget} more cases, {where.refined_until}" if where.refine else ""
 
 
 def limits_text(run: Any) -> str:

@@ -43,11 +43,19 @@ def status_json(result: Any) -> str:
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
-    found |= {"added_stations_mm": [list(some) for some in result.layout.added]}
+    found |= _added(result)
     found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
     return json.dumps(found, indent=2)
+
+
+def _added(result: Any) -> dict[str, Any]:
+    """What each round of a refinement added: stations, or poses in the frame of the object's own file."""
+    rounds = result.layout.added
+    if result.axes[-3].units:
+        return {"added_stations_mm": [list(some) for some in rounds]}
+    poses = [[{"step": x[0], "point_mm": x[1:4], "approach": x[4:7], "long_side": x[7:]} for x in r] for r in rounds]
+    return {"added_poses": poses}
 
 
 def status_csv(result: Any) -> str:
@@ -81,7 +89,7 @@ def _place(result: Any, row: int) -> list[float]:
 
 
 def counts(result: Any) -> str:
-    """How many cases are in which state, and how many stations a refinement added."""
+    """How many cases are in which state, and how many grasps a refinement added."""
     title = f" ({result.title})" if result.title else ""
     states = [*(f"{int(np.sum(result.status == state))} {STATES[state]}" for state in (FAILED, MISSING)),
               *no_grasps(result.status)]  # fmt: skip

@@ -86,7 +86,7 @@ class View:
             codes = result.status.ravel()
             self._remember(codes)
             line = self._progress.line(codes) if runner and self._progress else _counts(codes)
-            line += f", round {len(rounds)} of further stations" if (rounds := result.layout.added) else ""
+            line += f", round {len(rounds)} of further grasps" if (rounds := result.layout.added) else ""
             if self.live:
                 self.live.update(self._drawn(result, codes, runner, line), refresh=True)
             # In a log only a new count is worth a line, not a new estimate of the rest.
@@ -98,7 +98,7 @@ class View:
         return bool(runner)
 
     def _remember(self, codes: np.ndarray) -> None:
-        if codes.size != self._codes.size:  # another round of stations: rows have other numbers, and another end
+        if codes.size != self._codes.size:  # another round: rows have other numbers, and another end
             self._codes, self._progress, self._failure = np.zeros(0), None, -1
         before = self._codes if self._codes.size else np.full(codes.shape, MISSING)
         fresh = np.flatnonzero((codes == FAILED) & (before != FAILED))

@@ -36,7 +36,7 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element)
         Press(pad, gap).load_path(FORCES),
     )
     for start, expected in zip(starts, ladder, strict=True):
-        found = press.at(start.force, start)
+        found = press.at(start.force, [start])
         assert (found.steps, found.halvings, found.notes) == (1, 0, ())
         assert found.iterations <= 7
         assert relative(found.unknowns, expected.unknowns) < 1e-9
@@ -48,9 +48,9 @@ def test_not_a_bit_depends_on_what_was_solved_before():
     pad, coarse = pair("hex8")
     starts = list(Press(coarse, OVAL).load_path(FORCES))
     press = Press(pad, OVAL)
-    upward = [press.at(s.force, s).unknowns.tobytes() for s in starts]
-    downward = [press.at(s.force, s).unknowns.tobytes() for s in reversed(starts)]
-    assert upward == downward[::-1] == [Press(pad, OVAL).at(s.force, s).unknowns.tobytes() for s in starts]
+    upward = [press.at(s.force, [s]).unknowns.tobytes() for s in starts]
+    downward = [press.at(s.force, [s]).unknowns.tobytes() for s in reversed(starts)]
+    assert upward == downward[::-1] == [Press(pad, OVAL).at(s.force, [s]).unknowns.tobytes() for s in starts]
 
 
 @pytest.mark.parametrize("start", ["none", "jumped", "far off", "broken"])
@@ -59,8 +59,8 @@ def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(st
     [good] = Press(coarse, BALL).load_path([3.0])
     far = replace(good, unknowns=good.unknowns + np.eye(coarse.size)[coarse.closing_dof] * 4e-3)
     given = {
-        "none": None, "jumped": replace(good, path_dependent=True), "far off": far,
-        "broken": replace(good, unknowns=np.full(coarse.size, np.nan)),
+        "none": [], "jumped": [replace(good, path_dependent=True)], "far off": [far],
+        "broken": [replace(good, unknowns=np.full(coarse.size, np.nan))],
     }  # fmt: skip
     [expected] = Press(pad, BALL).load_path([3.0])
     found = Press(pad, BALL).at(3.0, given[start])
@@ -69,23 +69,35 @@ def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(st
     assert not found.path_dependent
 
 
+def test_a_start_at_a_lower_force_is_gone_on_from():
+    """Where the coarse mesh has no state at the force itself, or has jumped before it."""
+    pad, coarse = pair("hex8")
+    one, other = Press(coarse, BALL).load_path([1.0, 10.0])
+    [expected] = Press(pad, BALL).load_path([10.0])
+    for starts in ([one], [replace(other, path_dependent=True), one]):
+        found = Press(pad, BALL).at(10.0, starts)
+        assert relative(found.unknowns, expected.unknowns) < 1e-9
+        assert found.steps >= 2
+        assert not found.path_dependent
+
+
 def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
     """Far beyond what the foam bears; the force before and after it are solved as ever."""
     pad = pad_of((6, 4, 2), contact="nodal")
     press = Press(pad, BALL)
     [start] = Press(pad, BALL).load_path([3.0])
-    before = press.at(3.0, start).unknowns
+    before = press.at(3.0, [start]).unknowns
     with pytest.raises(ConvergenceError):
-        press.at(3000.0, None)
+        press.at(3000.0, [])
     assert press.solver.left >= -25
     assert MOST_ITERATIONS - press.solver.left > 25
-    assert press.at(3.0, start).unknowns.tobytes() == before.tobytes()
+    assert press.at(3.0, [start]).unknowns.tobytes() == before.tobytes()
 
 
 def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
     pad, coarse = pair("hex8")
     [start] = Press(coarse, OVAL).load_path([3.0])
-    one, other = (Press(pad, OVAL, options).at(3.0, start) for options in ({}, VI))
+    one, other = (Press(pad, OVAL, options).at(3.0, [start]) for options in ({}, VI))
     assert other.steps == 1
     assert relative(one.unknowns, other.unknowns) < 3e-9
 
@@ -130,4 +142,4 @@ def test_pads_of_other_gaps_share_the_mesh():
     nodal, weighted = (pad_of((6, 4, 2), contact=contact) for contact in ("nodal", "weighted"))
     [start] = Press(weighted, OVAL).load_path([3.0])
     [expected] = Press(nodal, OVAL).load_path([3.0])
-    assert relative(Press(nodal, OVAL).at(3.0, start).unknowns, expected.unknowns) < 1e-9
+    assert relative(Press(nodal, OVAL).at(3.0, [start]).unknowns, expected.unknowns) < 1e-9

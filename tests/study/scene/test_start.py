@@ -128,6 +128,8 @@ def test_a_banana_is_grasped_along_its_longest_axis_where_its_line_bends_less_th
     assert 4 <= len(scene.candidates.station_values_mm) <= 8
     assert scene.candidates.total <= 24
     assert no_warnings(capsys, "b.toml")
+    (tmp_path / "b.toml").write_text((tmp_path / "b.toml").read_text().replace("# refine =", "refine ="))
+    assert load_scene("b.toml").candidates.refine.budget == 36
 
 
 def test_a_pad_larger_than_the_object_stays_as_it_is_and_is_said(tmp_path):

@@ -61,7 +61,7 @@ def test_a_round_of_further_stations_is_another_file_with_more_cases(tmp_path, m
     stream = io.StringIO()
     assert watch(path, 3.0, stream, grow) == 0
     assert "96/96 done" in stream.getvalue()
-    assert "120/120 done, round 1 of further stations" in stream.getvalue()
+    assert "120/120 done, round 1 of further grasps" in stream.getvalue()
     assert main(["status", str(path)]) == 0
 
 

@@ -1,0 +1,151 @@
+"""Further poses, in rounds: a search around the best grasps, by stored numbers and the object's triangles alone.
+
+Neighbours of the best grasp at each force are those that are shifted along the pads' sides, turned about the approach
+or tilted, by a share of a first step. A round solves those of them that a bed of springs ranks highest; the share is
+halved once no neighbour is better. A peak that no grasp of the scene comes near stays unseen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.friction.patch import NoContactError
+from softjaw.study.case.build import build_object, own_frame, shapes_of
+from softjaw.study.case.candidates import STANDOFF, explicit_poses
+from softjaw.study.case.fit import jaws_of
+from softjaw.study.case.result import MARGIN
+from softjaw.study.quantities import NO_GRASP
+from softjaw.study.ranking import largest
+from softjaw.study.scene.grasps import GraspPose
+
+if TYPE_CHECKING:
+    from softjaw.study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns
+Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
+SIDE = 0.25  # first step of a shift, of the pad's side
+ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn about the approach and of a tilt of it
+FINEST = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
+SAME = 0.5  # of a step, within which two poses are one
+ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
+LEAST = 1e-9  # [m], below which the quality on a bed of springs is none
+
+
+def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
+    """The poses of a scene, then those that rounds added, which are named by round and place."""
+    made = [
+        (GraspPose(point_mm=x[1:4], approach=x[4:7], long_side=x[7:10]), f"round {r}")  # type: ignore[arg-type]
+        for r, added in enumerate(rounds, start=1)
+        for x in added
+    ]
+    return (*poses, *(pose.model_copy(update={"label": f"{name}: {pose.place}"}) for pose, name in made))
+
+
+def best_places(values: FloatArray) -> list[int]:
+    """Numbers of the best poses, each once; ``values (poses, columns)`` with NaN where a grasp cannot be used."""
+    known = [column for column in values.T if np.nanmax(column, initial=0.0) > 0.0]
+    return list(dict.fromkeys(largest(column) for column in known))
+
+
+def gained(values: FloatArray, before: int) -> float:
+    """By which share the poses after the first ``before`` are better than those, in the column where that is most."""
+    if before >= len(values):
+        return 0.0
+    old, new = (np.fmax.reduce(part, axis=0, initial=0.0) for part in (values[:before], values[before:]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return max(0.0, float(np.nan_to_num(new / old - 1.0, nan=0.0, posinf=np.inf).max(initial=0.0)))
+
+
+def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tuple[Place, ...]:
+    """Poses of the next round; none where a finer step gained too little, at the finest, or with the budget spent.
+
+    Parameters
+    ----------
+    result : Result
+    values : (poses, columns) array
+        Score of every pose at every force and point of the sweep, NaN where a grasp cannot be used.
+    scene : Scene
+        As it was before any round.
+    each : int
+        Cases of a pose.
+    """
+    asked, rounds = scene.candidates.refine, result.layout.added
+    if asked is None:
+        return ()
+    given = len(values) - sum(map(len, rounds))
+    added = np.moveaxis(result.status.reshape(-1, *result.layout.shape[-3:]), 1, 0)[given:]
+    left = (asked.budget - int(np.sum(~np.isin(added, NO_GRASP)))) // each
+    share = rounds[-1][0][0] if rounds else 1.0
+    while left > 0 and share >= FINEST:
+        if found := _neighbours(scene, rounds, values, share):
+            return tuple(found[: min(left, ROUND)])
+        before = given + sum(len(some) for some in rounds if some[0][0] > share)
+        if share < 1.0 and gained(values, before) < asked.best_within * (1 + MARGIN):
+            return ()
+        share /= 2
+    return ()
+
+
+def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> list[Place]:
+    """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
+    from softjaw.study.case.bed import JawsOnSurface  # compiled loops, which a plan is made without
+
+    shape, jaws = shapes_of(scene)[0], jaws_of(scene)
+    placed, surface = own_frame(shape), build_object(shape).surface()
+    known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
+    found: list[tuple[float, Place]] = []
+    for best in best_places(values):
+        own = max(JawsOnSurface(surface, *known[best], jaws).quality, LEAST)
+        for point, axes in _moved(known[best], share, jaws.pad):
+            if any(apart((point, axes), other, jaws.pad) < SAME * share for other in known):
+                continue
+            try:
+                grip = JawsOnSurface(surface, point, axes, jaws)
+            except NoContactError:
+                continue
+            # In the middle between both contacts, where the next tilt turns about.
+            point = point + 0.5 * (grip.sides[0].touch - grip.sides[1].touch) * axes[:, 2]
+            known.append((point, axes))
+            found.append((round(grip.quality / own, 6), (share, *_in_file(point, axes, placed))))
+    return [place for _, place in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _frame(pose: GraspPose, placed: Any) -> Frame:
+    """A grasp in the object's frame."""
+    axes = explicit_poses(pose, placed)[0]
+    return axes.origin + STANDOFF * axes.rotation[:, 2], axes.rotation
+
+
+def _in_file(point: FloatArray, axes: FloatArray, placed: Any) -> Place:
+    """A grasp in the frame of the object's own file, to 1 um and 1e-6: the same on every machine."""
+    mm = 1e3 * placed.to_object(point)
+    sides = (placed.rotation @ axes[:, k] for k in (2, 0))
+    # Adding 0 turns -0 into 0.
+    return tuple(round(float(v), 3) + 0.0 for v in mm) + tuple(round(float(v), 6) + 0.0 for side in sides for v in side)
+
+
+def _moved(frame: Frame, share: float, pad: Sequence[float]) -> Iterator[Frame]:
+    """The ten neighbours of a grasp: shifts to both sides along both sides of the pads, and turns about all axes."""
+    point, axes = frame
+    for side, sign in product((0, 1), (1.0, -1.0)):
+        yield point + sign * share * SIDE * pad[side] * axes[:, side], axes
+    for axis, sign in product((2, 0, 1), (1.0, -1.0)):
+        turn, (i, j) = sign * share * (ROLL if axis == 2 else TILT), ((axis + 1) % 3, (axis + 2) % 3)
+        R = np.eye(3)
+        R[[i, j], [i, j]], R[i, j], R[j, i] = math.cos(turn), -math.sin(turn), math.sin(turn)
+        yield point, axes @ R
+
+
+def apart(one: Frame, other: Frame, pad: Sequence[float]) -> float:
+    """How far two grasps are apart, in first steps; shifts along the approach and swapped fingers do not count."""
+    off, R = one[1].T @ (other[0] - one[0]), np.abs(one[1].T @ other[1])
+    shift = max(abs(float(off[k])) / (SIDE * pad[k]) for k in (0, 1))
+    roll, tilt = math.atan2(R[1, 0], R[0, 0]), math.atan2(math.hypot(R[0, 2], R[1, 2]), R[2, 2])
+    return max(shift, roll / ROLL, tilt / TILT)
