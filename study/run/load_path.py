@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
+from softjaw.study.quantities import NO_GRASP
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.write import record
@@ -33,13 +34,17 @@ NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fe
 def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
     """Decide by one process what is missing: torn rows again, failed ones on demand, no grasps and deadly ones never.
 
+    A case that an earlier run left out and this one asks for, as without ``candidates.solve_best``, is missing again.
+
     Returns
     -------
     (rows,) array
         State of every case as the run begins.
     """
     units, codes, attempts = list(units), writer.codes(), writer.attempts()
-    again = [*torn, *(np.flatnonzero(codes == FAILED) if retry_failed else ())]
+    wanted = [row for unit in units if not unit.state for rows in unit.rows for row in rows]
+    again = [*torn, *(row for row in wanted if codes[row] in NO_GRASP)]
+    again += list(np.flatnonzero(codes == FAILED)) if retry_failed else []
     for row in again:
         writer.forget(int(row))
         codes[row], attempts[row] = MISSING, 0

@@ -53,6 +53,8 @@ def _optional(model: type[SceneSection]) -> Any:
     """A section that may be left out."""
     return Field(default_factory=model)
 
+ALSO = ("refine", "solve_best", "skip_hopeless")  # keys of candidates of every kind
+
 
 class Scene(SceneSection):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
@@ -135,7 +137,7 @@ class Scene(SceneSection):
         # Only the way that was chosen: a scene that gives both would be refused.
         if self.candidates.poses or self.candidates.sampler:
             way = ("poses",) if self.candidates.poses else ("sampler", "count", "seed")
-            data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, "refine")}
+            data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, *ALSO)}
         else:
             for key in ("poses", "count", "seed"):
                 del data["candidates"][key]

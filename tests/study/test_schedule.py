@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from softjaw.study.doctor import launch_environment
+from softjaw.study.quantities import DONE, MISSING, WIDE, WORSE
+from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, makespan, sensible_ranks, unit_seconds
 from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
 from softjaw.study.run.shares import by_cost, shares
@@ -178,3 +180,27 @@ def test_a_replay_finds_each_limit_where_its_closed_form_is():
     assert (uneven.seconds, uneven.limit) == (8.0, "division of load paths")
     # three nodes get every third ladder: 22, 21 and 21 of them for 20 ranks each
     assert replayed(paths, 60, Machine(20, 0.0, 0.0, 0.0)) == 8.0
+
+
+def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
+    class Writer:
+        def __init__(self):
+            self.rows, self.forgotten = np.array([DONE, WORSE, WORSE, WIDE]), []
+
+        def codes(self):
+            return self.rows.copy()
+
+        def attempts(self):
+            return np.ones(4, int)
+
+        def forget(self, row):
+            self.forgotten.append(row)
+
+        def tidy(self, row):
+            raise AssertionError("nothing is torn")
+
+    writer = Writer()
+    wanted = {(0, 1): MISSING, (2,): WORSE, (3,): WIDE}
+    units = [SimpleNamespace(rows=(rows,), state=state, apart=False, reason="") for rows, state in wanted.items()]
+    assert settle(writer, units, [], False).tolist() == [DONE, MISSING, WORSE, WIDE]
+    assert writer.forgotten == [1]
