@@ -56,7 +56,9 @@ def test_friction_dissipates_and_no_other_motion_gets_more_out_of_it(patch, twis
 def test_three_motions_give_the_largest_force_and_torque(patch):
     limits = friction_limits(patch, 0.6)
     W = np.abs(friction_wrench(patch, fibonacci_twists(100, 1.0), 0.6))[:, [0, 1, 5]]
-    assert (W <= np.array([limits.f_x, limits.f_y, limits.tau_z]) * (1 + ROUNDING) + 1e-15).all()
+    # a normal may be off an axis by rounding: what it lets through is judged by the load
+    slack = 1e-14 * 0.6 * limits.S * np.array([1.0, 1.0, max(1.0, np.abs(patch.centroid).max())])
+    assert (W <= np.array([limits.f_x, limits.f_y, limits.tau_z]) * (1 + ROUNDING) + slack).all()
     assert limits.e_n == pytest.approx(limits.tau_z / (0.6 * limits.S), rel=1e-13)
 
 
