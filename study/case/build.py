@@ -9,6 +9,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.fem.objects import shapes as objects
 from softjaw.fem.objects.gap import GapObject, Pose
@@ -54,6 +55,12 @@ def build_object(shape: Any) -> GapObject:
         case "plane":
             return objects.Plane(shape.thickness)
     raise ValueError(f"no object is built from the shape '{shape.shape}'")
+
+
+@lru_cache(maxsize=8)
+def surface_triangles(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points ``(k, 3)`` [m] and triangles ``(m, 3)`` of an object; decimating a large mesh takes time."""
+    return build_object(shape).surface()
 
 
 def own_frame(shape: Any) -> Pose:

@@ -316,5 +316,9 @@ def path_cost(scene: Scene) -> float:
     """Work of one load path in element solves: forces x elements x nodes per element, and the coarse mesh's share."""
     # A triquadratic element has eight times the nodes that it does not share.
     nodes = {"hex8": 1, "hex27": 8}[scene.gripper.element]
-    coarse = 1 + (scene.accuracy.meshes - 1) / 8
-    return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * coarse
+    return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * meshes_cost(scene)
+
+
+def meshes_cost(scene: Scene) -> float:
+    """Elements of all meshes of a case over those of the fine one."""
+    return 1 + (scene.accuracy.meshes - 1) / 8

@@ -39,9 +39,9 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 def pad_material(gripper: Gripper) -> Material:
     """Foam of the pads."""
-    # The Blatz-Ko law has this ratio by its form, whatever the scene says.
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
-    return material(gripper.material, gripper.shear_modulus, nu, gripper.shear_moduli, gripper.alpha)
+    return material(
+        gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha
+    )
 
 
 def backing_plate(gripper: Gripper) -> BackingPlate:

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import Unit
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import Scene
@@ -64,10 +63,9 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
     """
     half = 0.5 * np.array(sides)
     # side by side of the rectangle: most triangles are off one of them, and need not be gathered
-    near = np.ones(len(triangles), dtype=bool)
+    near, (a, b, c) = np.ones(len(triangles), dtype=bool), triangles.T
     for k in (0, 1):
         for beyond in (points[:, k] > half[k], points[:, k] < -half[k]):
-            a, b, c = triangles.T
             near &= ~(beyond[a] & beyond[b] & beyond[c])
     corners = points[triangles[near]]
     z = np.concatenate([_inside(corners, half), _on_sides(corners, half), _on_corners(corners, half)])
@@ -140,7 +138,7 @@ def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0
 
 def stiffness(gripper: Gripper) -> float:
     """Modulus of confined compression over the pad's thickness [Pa/m]."""
-    nu = 0.25 if gripper.material == "blatz_ko" else gripper.poisson_ratio
+    nu = gripper.foam_ratio
     return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
 
 
@@ -161,17 +159,20 @@ def jaws_of(scene: Scene) -> Jaws:
     )
 
 
+def doubt(points: FloatArray) -> float:
+    """By how much triangles with these points ``(k, 3)`` may be off the surface that is solved with [m]."""
+    return DRAWN * float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
 def decided(units: Sequence[Unit]) -> list[Unit]:
     """Units of work with the states of those whose candidate is too wide or collides; images share the state."""
-    surfaces: dict[Any, tuple[FloatArray, IntArray]] = {}
     found = []
     for unit in units:
         scene, jaws = unit.scene, jaws_of(unit.scene)
         if math.isfinite(jaws.max_opening) or jaws.finger is not None:
-            points, triangles = surfaces.setdefault(scene.object, build_object(scene.object).surface())
+            points, triangles = surface_triangles(scene.object)
             pose = unit.candidate.poses[0]
-            size = float(np.linalg.norm(np.ptp(points, axis=0)))
-            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, DRAWN * size)
+            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, doubt(points))
             unit = replace(unit, state=fit.state, reason=fit.message)
         found.append(unit)
     return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import STANDOFF, Unit
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import jaws_of
@@ -57,14 +57,11 @@ def chosen(scene: Scene, units: Sequence[Unit]) -> list[Unit]:
     where = scene.candidates
     if where.solve_best is None and not where.skip_hopeless and len(units) > MOST_JUDGED:
         return list(units)
-    surfaces: dict[Any, Any] = {}
     known: list[tuple[Unit, float]] = []
     for unit in units:
         if unit.state == MISSING:
-            shape = unit.scene.object
-            if shape not in surfaces:
-                surfaces[shape] = build_object(shape).surface()
-            unit, quality = _seen(unit, promise(surfaces[shape], unit), where.skip_hopeless)
+            surface = surface_triangles(unit.scene.object)
+            unit, quality = _seen(unit, promise(surface, unit), where.skip_hopeless)
         else:
             quality = -math.inf
         known.append((unit, quality))

@@ -19,14 +19,14 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side
-from softjaw.study.case.build import build_object, own_frame
+from softjaw.study.case.build import build_object, own_frame, surface_triangles
 from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
-from softjaw.study.scene.grasps import Candidates, GraspPose
+from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
 from softjaw.study.units import converted
 
 FloatArray = NDArray[np.float64]
@@ -262,9 +262,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     StudyError
         Where no grasp fits between the pads.
     """
-    obj = build_object(scene.object)
-    given = scene.candidates
-    found = antipodal_grasps(obj.surface(), jaws_of(scene), given.count, given.seed, lids=lids_of(obj))
+    given, surface, lids = scene.candidates, surface_triangles(scene.object), lids_of(build_object(scene.object))
+    found = antipodal_grasps(surface, jaws_of(scene), given.count, given.seed, lids=lids)
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
@@ -274,7 +273,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
-    kept = {key: getattr(given, key) for key in ("solve_best", "skip_hopeless", "refine")}
+    kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
     return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface
+from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene.problems import SceneError
@@ -35,7 +35,7 @@ def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> S
     if here is None:
         return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
     body = build_object(here.object)
-    points, triangles = body.surface()
+    points, triangles = surface_triangles(here.object)
     corners = np.asarray(points, float)[triangles]
     # Triangles without area show nothing and would only be cut further.
     corners = corners[areas(corners) > 0]

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import turn_of_pose
-from softjaw.study.case.fit import DRAWN, bed_closing, jaws_of
+from softjaw.study.case.build import surface_triangles
+from softjaw.study.case.candidates import meshes_cost, turn_of_pose
+from softjaw.study.case.fit import bed_closing, doubt, jaws_of
 
 FloatArray = NDArray[np.float64]
 GRID = (13, 7)  # points of a pad's face
@@ -32,13 +32,7 @@ DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are 
 def estimated(units: Sequence[Any]) -> list[float]:
     """Expected time of each unit of work on objects without a wall [s]."""
     step = -(-len(units) // MOST) if units else 1
-    surfaces: dict[Any, tuple[FloatArray, Any]] = {}
-    known = []
-    for unit in units[::step]:
-        shape = unit.scene.object
-        if shape not in surfaces:
-            surfaces[shape] = build_object(shape).surface()
-        known.append(_seconds(unit, *surfaces[shape]))
+    known = [_seconds(unit, *surface_triangles(unit.scene.object)) for unit in units[::step]]
     return [known[i // step] for i in range(len(units))]
 
 
@@ -46,12 +40,11 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> flo
     scene, gripper = unit.scene, unit.scene.gripper
     pose, other = unit.candidate.poses
     low, high = heights((points - pose.origin) @ pose.rotation, triangles, gripper.pad_size[:2])
-    doubt = DRAWN * float(np.linalg.norm(np.ptp(points, axis=0)))
     fingers = 1 if turn_of_pose(pose, other, scene.object.axis_symmetry) is not None else 2
-    planes = _planes(scene, low, high, doubt)
+    planes = _planes(scene, low, high, doubt(points))
     kind = QUADRATIC if gripper.element == "hex27" else 1.0
     elements = kind * fingers * math.prod(gripper.elements) / 2**planes
-    each = CASE + ELEMENT * elements * (1 + (scene.accuracy.meshes - 1) / 8)
+    each = CASE + ELEMENT * elements * meshes_cost(scene)
     jaws, cell = jaws_of(scene), math.prod(gripper.pad_size[:2]) / math.prod(GRID)
     forces = scene.load.normal_force
     times = [FIRST, *[1.0] * (len(forces) - 1)]
@@ -63,7 +56,7 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> flo
     return region + each * sum(times)
 
 
-def _planes(scene: Any, low: FloatArray, high: FloatArray, doubt: float) -> int:
+def _planes(scene: Any, low: FloatArray, high: FloatArray, off: float) -> int:
     """Planes of symmetry that the pads' meshes will use; what a mesh from a file holds is never quite symmetric."""
     wanted = scene.effects.model_size
     if wanted == "full" or scene.object.shape == "mesh":
@@ -71,14 +64,14 @@ def _planes(scene: Any, low: FloatArray, high: FloatArray, doubt: float) -> int:
     found = 0
     for axis in (0, 1):
         even = scene.gripper.elements[axis] % 2 == 0
-        found += even and all(_alike(field, np.flip(field, axis), doubt) for field in (low, high))
+        found += even and all(_alike(field, np.flip(field, axis), off) for field in (low, high))
     return min(found, 1) if wanted == "half" else found
 
 
-def _alike(one: FloatArray, other: FloatArray, doubt: float) -> bool:
+def _alike(one: FloatArray, other: FloatArray, off: float) -> bool:
     both = np.isfinite(one) & np.isfinite(other)
     same_rim = np.mean(np.isfinite(one) != np.isfinite(other)) < 0.1  # rounding decides what a line at the rim meets
-    return bool(same_rim and np.abs(one[both] - other[both]).max(initial=0.0) <= doubt)
+    return bool(same_rim and np.abs(one[both] - other[both]).max(initial=0.0) <= off)
 
 
 def heights(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.build import build_object, own_frame, shapes_of
+from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
 from softjaw.study.case.candidates import STANDOFF, explicit_poses
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.result import MARGIN
@@ -99,8 +99,7 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     from softjaw.study.case.sampler import lids_of
 
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
-    obj, placed = build_object(shape), own_frame(shape)
-    surface, lids = obj.surface(), lids_of(obj)
+    placed, surface, lids = own_frame(shape), surface_triangles(shape), lids_of(build_object(shape))
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
     found: list[tuple[float, Place]] = []
     for best in best_places(values):

@@ -18,6 +18,7 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
 EXAMPLE = "for example `stations = 35` with `station_range_mm = [25, 175]`"
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
+OF_EVERY_KIND = ("refine", "solve_best", "skip_hopeless")  # keys that stations, poses and a sampler share
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 

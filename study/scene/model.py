@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from softjaw.study.scene.grasps import Candidates
+from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
 from softjaw.study.scene.objects import SHAPES, Mesh, Object
 from softjaw.study.scene.problems import Finding, SceneError, closest, shown
 from softjaw.study.scene.section import SceneSection, model_findings
@@ -52,8 +52,6 @@ JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
 def _optional(model: type[SceneSection]) -> Any:
     """A section that may be left out."""
     return Field(default_factory=model)
-
-ALSO = ("refine", "solve_best", "skip_hopeless")  # keys of candidates of every kind
 
 
 class Scene(SceneSection):
@@ -137,7 +135,7 @@ class Scene(SceneSection):
         # Only the way that was chosen: a scene that gives both would be refused.
         if self.candidates.poses or self.candidates.sampler:
             way = ("poses",) if self.candidates.poses else ("sampler", "count", "seed")
-            data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, *ALSO)}
+            data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, *OF_EVERY_KIND)}
         else:
             for key in ("poses", "count", "seed"):
                 del data["candidates"][key]

@@ -89,6 +89,11 @@ class Gripper(SceneSection):
         return (self.pad_length, self.pad_width, self.pad_thickness)
 
     @property
+    def foam_ratio(self) -> float:
+        """Poisson's ratio of the foam; the Blatz-Ko law has its own by its form, whatever the scene says."""
+        return 0.25 if self.material == "blatz_ko" else self.poisson_ratio
+
+    @property
     def grading(self) -> tuple[float, float, float]:
         """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and contact face [-]."""
         return (self.grading_x, self.grading_y, self.grading_z)

@@ -37,10 +37,12 @@ function object3d(div, all) {
     return found;
   }
 
+  const state = (c) => all.states[at.force][c];
+
   function told(c) {
     if (c < 0) return "no candidate";
     const q = quantity(), v = q && q.values[at.force][c], key = `${at.force} ${c}`;
-    return `${all.names[c]}<br>` + (v == null ? (all.states[at.force][c] === 1 ? "" : all.stated[all.states[at.force][c]])
+    return `${all.names[c]}<br>` + (v == null ? (state(c) === 1 ? "" : all.stated[state(c)])
       : `${q.label}: ${+v.toPrecision(4)}`) + (all.notes[key] ? `<br>${all.notes[key]}` : "");
   }
 
@@ -55,7 +57,7 @@ function object3d(div, all) {
     for (let t = 0; t < corners.length; t += 3) {
       const c = owner[corners[t]], v = c < 0 || !q ? null : q.values[at.force][c], into = v == null ? rest : shown;
       for (let k = 0; k < 3; k++) into[k].push(corners[t + k]);
-      into[3].push(v == null ? all.colours[c < 0 || all.states[at.force][c] === 1 || all.states[at.force][c] > 2 ? 0 : all.states[at.force][c] ? 2 : 1] : v);
+      into[3].push(v == null ? all.colours[[1, 0, 2][state(c)] ?? 0] : v);
     }
     const names = Array.from(owner, told), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
     const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other, marks] = div.data;

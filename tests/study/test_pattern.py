@@ -18,8 +18,8 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.pattern import FINEST, SAME, apart, gained, next_poses, with_places
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import load_scene, parse_scene
-from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
-from tests.study.test_refine import filled
+from tests.study.launching import ROOT, command, contents, differing, wait_for
+from tests.study.test_refine import filled, refined, same_bits
 
 PAD = (0.05, 0.02, 0.015)
 SCENE = """
@@ -196,24 +196,12 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         with open_result(path) as result:
             return result.layout.added
 
-    def run(name, ranks, *words):
-        path = shared_path / name
-        code, output, errors = launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
-        assert code == 0, errors
-        return path, output
-
     def compare():
         scene.write_text(SCENE.replace("BUDGET", "12"))
-        alone, _ = run("alone.hdf", 0)
+        alone, _ = refined(scene, "alone.hdf", 0)
         assert len(added(alone)) >= 2
         expected = contents(alone)
-        for ranks in (2, 3):
-            assert differing(run(f"{ranks}.hdf", ranks)[0], expected) == []
-        # First without, then with refinement: what is solved stays.
-        late, first = run("late.hdf", 2, "--set", "candidates.refine=false")
-        assert "round" not in first
-        assert "0 of 4 cases to solve" in run("late.hdf", 2)[1]
-        assert differing(late, expected) == []
+        same_bits(scene, expected, 4)
         killed = shared_path / "killed.hdf"
         process = subprocess.Popen(
             command(0, "-m", "softjaw", "run", scene, "-o", killed), env=launch_environment(), cwd=ROOT,
@@ -223,7 +211,7 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         process.kill()
         process.wait(timeout=30)
         assert len(added(killed)) >= 1
-        run("killed.hdf", 2)
+        refined(scene, "killed.hdf", 2)
         assert differing(killed, expected) == []
 
     once(compare)

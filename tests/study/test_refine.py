@@ -145,32 +145,38 @@ def filled(path, plan):
     writer.close()
 
 
+def refined(scene, name, ranks, *words):
+    """A run of a scene into a file beside it: the file, and what was said."""
+    path = scene.parent / name
+    code, output, errors = launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
+    assert code == 0, errors
+    return path, output
+
+
+def same_bits(scene, expected, own):
+    """Two and three ranks, and a study that is refined late, give these contents; ``own`` cases come first."""
+    for ranks in (2, 3):
+        assert differing(refined(scene, f"{ranks}.hdf", ranks)[0], expected) == []
+    # First without, then with refinement: what is solved stays.
+    late, first = refined(scene, "late.hdf", 2, "--set", "candidates.refine=false")
+    assert "round" not in first
+    assert f"0 of {own} cases to solve" in refined(scene, "late.hdf", 2)[1]
+    assert differing(late, expected) == []
+
+
 @pytest.mark.long
 @pytest.mark.launches
 def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_path):
     scene = shared_path / "vase.toml"
 
-    def run(name, ranks, *words):
-        path = shared_path / name
-        code, output, errors = launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
-        assert code == 0, errors
-        return path, output
-
     def compare():
         scene.write_text(SCENE)
-        alone, _ = run("alone.hdf", 0)
+        alone, _ = refined(scene, "alone.hdf", 0)
         with open_result(alone) as result:
             assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6  # 12 cases on a round body
             best = result.read("quality/ccm")[..., -1].max()
         assert best > 0.6  # 0.19 at the scene's own stations
-        expected = contents(alone)
-        for ranks in (2, 3):
-            assert differing(run(f"{ranks}.hdf", ranks)[0], expected) == []
-        # First without, then with refinement: what is solved stays.
-        late, first = run("late.hdf", 2, "--set", "candidates.refine=false")
-        assert "round" not in first
-        assert "0 of 20 cases to solve" in run("late.hdf", 2)[1]
-        assert differing(late, expected) == []
-        assert "0 of 44 cases to solve" in run("alone.hdf", 2)[1]
+        same_bits(scene, contents(alone), 20)
+        assert "0 of 44 cases to solve" in refined(scene, "alone.hdf", 2)[1]
 
     once(compare)
