@@ -3,7 +3,7 @@
 A force that Newton's method does not reach in one step is approached by step halving, then by displacement control
 until the force is bracketed. Where that fails and a fallback pad with other gaps is given, the load path continues with
 that one, from first contact: nodal gaps let a small object slip between the nodes, so that the force stays low. A pad
-with weighted gaps leaves its path to one with nodal gaps sooner, before displacement control and where it jumps: they
+with other gaps leaves its path to one with nodal gaps sooner, before displacement control and where it jumps: they
 couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever. Every
 state that is passed on has converged and has been checked. One force gets no more than `MOST_ITERATIONS` in all.
 """
@@ -294,6 +294,7 @@ class Press(LoadPath):
         [m] of the last state, which the path has to meet, or it is another one.
         """
         # no fallback from here on, so that displacement control may take over and jumps are passed
+        assert self._other is not None
         pads = (self.fallback,) if self._leads else (self.fallback, self.pad)
         self.fallback, errors = None, [failed]
         for pad in pads:
@@ -306,7 +307,8 @@ class Press(LoadPath):
                 errors.append(error)
         # a limit that was seen is the reason; else what stopped the other pad
         limits = [error for error in errors if isinstance(error, NotReachedError)]
-        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps lead further, a finer mesh was not tried"
+        tried = f"neither {self._wanted.contact} nor {self._other.contact} gaps lead further"
+        text = f"{(limits or errors[1:])[0]}; {tried}, a finer mesh was not tried"
         raise (NotReachedError if limits else ConvergenceError)(text) from errors[1]
 
     def _through(self, below: tuple[float, float] | None, force: float, work: Work) -> FloatArray:

@@ -9,13 +9,12 @@ finger holds do; the others are free, and the backing plate connects them to the
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementHex2, ElementLineP1, ElementLineP2, MeshHex
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefLine
 
 from softjaw.fem.materials import Material
 from softjaw.fem.pad.backing_plate import BackStiffness, back_stiffness
@@ -25,6 +24,13 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 # these orders give 2 x 2 x 2 and 3 x 3 x 3 Gauss points
 BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
+# Square of the distance of a face rule's outer points from its middle over half the side, by the number of points.
+RULES = {
+    "weighted": {2: 1 / 3, 3: 3 / 5},  # Gauss
+    # 1/2 and 2/3 of the way to Lobatto: errors of either kind cancel (Ainsworth and Wajid, 2010, "optimally blended")
+    "blended": {2: 2 / 3, 3: 13 / 15},
+    "nodal": {2: 1.0, 3: 1.0},  # Lobatto: the points are the nodes
+}
 SIDES = {2: (ElementLineP1(), [0, 1]), 3: (ElementLineP2(), [0, 2, 1])}  # element along a side, its nodes in order
 
 
@@ -38,8 +44,8 @@ class Pad:
     symmetry : (bool, bool)
         Whether ``x = 0`` and ``y = 0`` are planes of symmetry; only the positive side is then meshed.
     contact : str
-        ``"weighted"`` integrates gap and pressure over the contact face with Gauss points, ``"nodal"`` collocates them
-        at its nodes.
+        The points of the contact face that gap and pressure are integrated with, of `RULES`: ``"weighted"`` takes Gauss
+        points, ``"nodal"`` the nodes, so that each has a gap of its own, ``"blended"`` points between these.
     backing_plate : BackingPlate, optional
         The plate behind the pad; rigid without.
 
@@ -196,15 +202,13 @@ def _lines(x: FloatArray, tol: float) -> IntArray:
 
 def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
-    if contact == "weighted":
-        # as many Gauss points along a side as nodes, which the grid of the contact patch counts on
-        (points,), weights = get_quadrature(RefLine, 2 * per_side - 1)
-    elif contact == "nodal":
-        # Lobatto points are the nodes: the shape functions become the identity, and each node has a gap of its own
-        points = np.linspace(0.0, 1.0, per_side)
-        weights = np.array([0.5, 0.5]) if per_side == 2 else np.array([1.0, 4.0, 1.0]) / 6.0
-    else:
-        raise ValueError(f"contact '{contact}' is unknown; choose 'weighted' or 'nodal'")
+    if contact not in RULES:
+        raise ValueError(f"contact '{contact}' is unknown; choose one of {', '.join(RULES)}")
+    # three points have one more in the middle, and weights that integrate a parabola
+    a = math.sqrt(RULES[contact][per_side])
+    points = np.linspace(0.5 - 0.5 * a, 0.5 + 0.5 * a, per_side)
+    outer = 0.5 if per_side == 2 else 1.0 / (6.0 * a * a)
+    weights = np.array([outer, outer]) if per_side == 2 else np.array([outer, 1.0 - 2.0 * outer, outer])
     one = along_side(per_side, points)
     N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
     return N, weights

@@ -17,7 +17,7 @@ from softjaw.study.quantities import EFFECTS
 from softjaw.study.run.plan import wall_size
 from softjaw.study.scene import Scene
 from softjaw.study.scene.problems import SceneError
-from softjaw.study.scene.sections import Effects, WallSize
+from softjaw.study.scene.sections import Accuracy, Effects, WallSize
 
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
 HEX27 = (0.3, 0.5, 0.7, 1.0)
@@ -221,8 +221,9 @@ def _load_steps() -> Parameter:
 
 
 def _collocation() -> Parameter:
-    levels = tuple(Level(rule, (("accuracy.contact", rule),)) for rule in ("nodal", "weighted"))
-    long_name = "gaps that vanish at nodes, or on average round them"
+    _, *rules = get_args(Accuracy.model_fields["contact"].annotation)  # without "auto"
+    levels = tuple(Level(rule, (("accuracy.contact", rule),)) for rule in rules)
+    long_name = "gaps that vanish on average round nodes, or at nodes"
     return Parameter("gap collocation", long_name, levels, family="pad mesh")
 
 

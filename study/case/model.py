@@ -154,8 +154,9 @@ def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) 
 def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     """How gaps are collocated, and how where that has no solution; ``walled``: on a wall that gives way."""
     if scene.accuracy.contact == "auto" and scene.gripper.element == "hex8" and not walled:
-        return "nodal", "weighted"
-    return ("nodal",) if scene.accuracy.contact == "nodal" else ("weighted", "nodal")
+        return "blended", "nodal"
+    chosen = "weighted" if scene.accuracy.contact == "auto" else scene.accuracy.contact
+    return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 
 
 def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:

@@ -294,8 +294,8 @@ class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
-    contact: Literal["auto", "weighted", "nodal"] = Field(
-        "auto", description="how gaps are collocated; auto is nodal for hex8 on rigid objects, else weighted"
+    contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
+        "auto", description="how gaps are collocated; auto is blended for hex8 on rigid objects, else weighted"
     )
     residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(

@@ -40,7 +40,7 @@ def contacting_state(problem, closing=1.2e-3):
 
 @pytest.mark.parametrize("control", [Control(force=2.0), Control(closing=1e-3)], ids=["force", "closing"])
 @pytest.mark.parametrize("complementarity", [False, True], ids=["active set", "bounds"])
-@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+@pytest.mark.parametrize("contact", ["weighted", "blended", "nodal"])
 @pytest.mark.parametrize("name", OBJECTS)
 def test_tangent_is_the_derivative_of_the_residual(name, contact, complementarity, control):
     problem = problem_of(OBJECTS[name], contact)

@@ -28,7 +28,7 @@ def relative(a, b):
     return np.abs(a - b).max() / np.abs(b).max()
 
 
-@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+@pytest.mark.parametrize("contact", ["weighted", "blended", "nodal"])
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 def test_active_set_and_bounds_agree(gap, element, contact):

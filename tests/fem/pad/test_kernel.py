@@ -139,7 +139,7 @@ def test_blatz_ko_loses_ellipticity_at_a_stretch_ratio_of_two_plus_root_three(pa
     assert (ellipticity > 0) == elliptic
 
 
-@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+@pytest.mark.parametrize("contact", ["weighted", "blended", "nodal"])
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 def test_contact_face_under_constant_pressure_and_gap(element, contact):
     """Every node gets ``A_i g`` and ``-A_i p n``."""

@@ -17,7 +17,7 @@ def element(request):
     return request.param
 
 
-@pytest.fixture(params=["weighted", "nodal"])
+@pytest.fixture(params=["weighted", "blended", "nodal"])
 def contact(request):
     return request.param
 
@@ -133,5 +133,5 @@ def test_refusals_say_what_was_found(arguments, words):
 def test_a_half_needs_even_elements_and_contact_a_known_rule():
     with pytest.raises(ValueError, match=r"even number.*\(3, 2, 2\)"):
         Pad(PadShape(SIZE, (3, 2, 2)), FOAM, (True, False))
-    with pytest.raises(ValueError, match=r"'mortar'.*'weighted' or 'nodal'"):
+    with pytest.raises(ValueError, match=r"'mortar'.*weighted, blended, nodal"):
         Pad(PadShape(SIZE, (2, 2, 2)), FOAM, contact="mortar")
