@@ -13,32 +13,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.press import Pressed
-from softjaw.fem.pad.mesh import Pad, along_side
+from softjaw.fem.contact.problem import ContactPoints
+from softjaw.fem.pad.mesh import Pad, along_side, face_rule
 from softjaw.friction.patch import ContactPatch
 
 FloatArray = NDArray[np.float64]
 
 
-def extract(pad: Pad, pressed: Pressed) -> ContactPatch:
+def extract(pad: Pad, pressed: Pressed, rule: str = "") -> ContactPatch:
     """Patch of the whole pad at this state, in the pad's frame at first touch.
+
+    Its faces are those of the quadrature points that the state was solved with, or of another of `fem.pad.mesh.RULES`.
 
     ``centroid`` is the deformed quadrature point, ``normal`` the object's there (pointing into the object), ``area``
     that of the deformed face and ``pressure`` the load over that area.  Faces are numbered along the width
     first, and their number does not depend on symmetry.
     """
-    points = pressed.points
-    load = _unfold(pad, _as_grid(pad, _non_negative(points.load)[..., None]), False)[..., 0].ravel()
+    position, normal, load, side_weights = _points(pad, pressed.points, rule)
+    load = _unfold(pad, _as_grid(pad, _non_negative(load)[..., None]), False)[..., 0].ravel()
     nodes = pressed.contact_face.reshape(*pad.contact_grid, 3)
     # each quadrature point owns the part of the facet that its weight stands for, so areas and loads belong together
     for axis in range(2):
-        nodes = _subdivide(nodes, axis, pad.side_weights)
+        nodes = _subdivide(nodes, axis, side_weights)
     nodes = _unfold(pad, nodes, shared=True)
     corners = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
     return ContactPatch(
-        centroid=_unfold(pad, _as_grid(pad, points.position), False).reshape(-1, 3),
+        centroid=_unfold(pad, _as_grid(pad, position), False).reshape(-1, 3),
         area=area,
-        normal=-_unfold(pad, _as_grid(pad, points.normal), False).reshape(-1, 3),
+        normal=-_unfold(pad, _as_grid(pad, normal), False).reshape(-1, 3),
         pressure=load / area,
         corners=corners,
     )
@@ -68,6 +71,21 @@ def _moved(
         ordered(patch.centroid) * sign, ordered(patch.area), ordered(patch.normal) * sign, ordered(patch.pressure),
         None if patch.corners is None else ordered(patch.corners)[:, corners] * sign,
     )  # fmt: skip
+
+
+def _points(
+    pad: Pad, points: ContactPoints, rule: str
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Positions, unit normals and loads at the quadrature points of a rule, and its weights along a side of a face."""
+    if not rule:
+        return points.position, points.normal, points.load, pad.side_weights
+    N, weights = face_rule(pad.shape.per_side, rule)
+    # position and pressure are polynomials in each face, and the rule has as many points as these have coefficients
+    to_rule = N @ np.linalg.inv(pad.face_N)
+    position, normal = (np.einsum("pq,fqi->fpi", to_rule, field) for field in (points.position, points.normal))
+    own = np.outer(pad.side_weights, pad.side_weights).ravel()
+    load = np.outer(weights, weights).ravel() * (points.load / own @ to_rule.T)
+    return position, normal / np.linalg.norm(normal, axis=2, keepdims=True), load, weights
 
 
 def _non_negative(load: FloatArray) -> FloatArray:

@@ -143,9 +143,9 @@ class Pad:
         )
         area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
         self.contact = contact
-        self.face_N, self.side_weights = _face_rule(per_side, contact)
+        self.face_N, self.side_weights = face_rule(per_side, contact)
         # at the same places whatever the rule, so that the depths of both compare
-        self.between_N, _ = _face_rule(per_side, "weighted")
+        self.between_N, _ = face_rule(per_side, "weighted")
         self.face_area = np.outer(area, np.outer(self.side_weights, self.side_weights))
         self.node_area = np.bincount(
             self.pressure_index[self.face_nodes].ravel(),
@@ -200,7 +200,7 @@ def _lines(x: FloatArray, tol: float) -> IntArray:
     return number
 
 
-def _face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
+def face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     """Shape functions ``(points, face nodes)`` of a tensor rule with a point per node, and weights along a side."""
     if contact not in RULES:
         raise ValueError(f"contact '{contact}' is unknown; choose one of {', '.join(RULES)}")

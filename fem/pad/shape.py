@@ -52,9 +52,10 @@ class PadShape:
         return self.per_side * self.elements[0], self.per_side * self.elements[1]
 
     def halved(self) -> PadShape:
-        """The same pad with half as many elements in every direction, rounded up."""
-        length, width, depth = (-(-n // 2) for n in self.elements)
-        return PadShape(self.size, (length, width, depth), self.grading, self.element)
+        """The same pad with half as many elements in every direction, rounded up; to even numbers along even sides."""
+        # symmetry of the pad needs even numbers, and a mesh line in the middle is where the fine mesh has one
+        length, width = (2 * -(-n // 4) if n % 2 == 0 else -(-n // 2) for n in self.elements[:2])
+        return PadShape(self.size, (length, width, -(-self.elements[2] // 2)), self.grading, self.element)
 
     def lines(self, axis: int, half: bool) -> FloatArray:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""

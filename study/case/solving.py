@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -50,9 +51,8 @@ class PressedContact(Contact):
         state: Pressed,
         seen: Callable[[ContactPatch], ContactPatch] | None = None,
     ) -> None:
-        patch = extract(state.pad, state)
-        super().__init__(seen(patch) if seen else patch, scene.friction.mu, finger.pose, whole_face=True)
-        self.finger, self.state = finger, state
+        self.finger, self.state, self._seen, self._solved = finger, state, seen or (lambda patch: patch), self
+        super().__init__(self._seen(extract(state.pad, state)), scene.friction.mu, finger.pose, whole_face=True)
         self.nodal_instead = state.instead and state.pad.contact == "nodal"
 
     def of(self, finger: Finger) -> PressedContact:
@@ -62,6 +62,16 @@ class PressedContact(Contact):
         other = self.at(finger.pose)
         other.finger = finger
         return other
+
+    @property
+    def views(self) -> list[Contact]:
+        """The contact of the same pressures at Gauss points and at nodes; a finer mesh would make them alike."""
+        return [view.at(self.pose) for view in self._solved._views]
+
+    @cached_property
+    def _views(self) -> list[Contact]:
+        patches = (self._seen(extract(self.state.pad, self.state, rule)) for rule in ("weighted", "nodal"))
+        return [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
 
     @property
     def coarse(self) -> bool:

@@ -103,11 +103,6 @@ class Scene(SceneSection):
             )
         if g.poisson_ratio > 0.45 and g.element == "hex8":
             yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
-        if self.accuracy.meshes == 2 and any(n % 4 for n in g.elements):
-            yield (
-                f"accuracy.meshes = 2 halves the mesh, and gripper.elements = {list(g.elements)} cannot be halved "
-                "evenly: multiples of 4 can"
-            )
 
     @property
     def sampled(self) -> tuple[int, ...]:

@@ -293,7 +293,9 @@ class Effects(SceneSection):
 class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
-    meshes: int = Field(1, ge=1, le=2, description="2 solves every case on a coarser mesh too and maps the differences")
+    meshes: int = Field(
+        2, ge=1, le=2, description="2 solves every case on a coarser mesh too, which tells the error of every number"
+    )
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
         "auto", description="how gaps are collocated; auto is blended for hex8 on rigid objects, else weighted"
     )

@@ -309,7 +309,6 @@ def test_hyperfoam_fills_in_its_terms_and_its_modulus():
         (["friction.mu=5"], "friction.mu = 5"),
         (["load.normal_force_n=[500]"], "shear modulus"),
         (["gripper.material=linear", "gripper.poisson_ratio=0.49"], "hex27"),
-        (["accuracy.meshes=2"], "multiples of 4"),
     ],
 )
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides, word):
