@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
 from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.contact.problem import SpringBed
@@ -58,10 +59,21 @@ class PressedContact(Contact):
     def of(self, finger: Finger) -> PressedContact:
         """The same contact of another finger, which stands where the object looks the same."""
         # Touched here, because cached properties are copied only when they have been computed.
-        _ = self.ellipsoids, self.tau_pure  # computed once for both
+        _ = self.ellipsoids, self.tau_pure, self.area, self.largest_pressure  # computed once for both
         other = self.at(finger.pose)
         other.finger = finger
         return other
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the contact, with its edge inside the faces [m^2]."""
+        return contact_area(self.patch, self.state.pad.shape.patch_faces)
+
+    @cached_property
+    def largest_pressure(self) -> float:
+        """Largest pressure [Pa], as the mean over a few elements tells it."""
+        shape = self.state.pad.shape
+        return largest_pressure(self.patch, shape.patch_faces, shape.per_side)
 
     @property
     def views(self) -> list[Contact]:
