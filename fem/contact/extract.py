@@ -73,9 +73,7 @@ def _moved(
     )  # fmt: skip
 
 
-def _points(
-    pad: Pad, points: ContactPoints, rule: str
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _points(pad: Pad, points: ContactPoints, rule: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Positions, unit normals and loads at the quadrature points of a rule, and its weights along a side of a face."""
     if not rule:
         return points.position, points.normal, points.load, pad.side_weights

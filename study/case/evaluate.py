@@ -35,6 +35,9 @@ from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
+# Weights of what two meshes and two views of the coarser one tell of an error: on 97 cases with a reference they cover
+# 96 % of the errors of e_n, and are 5 times too large in the median.
+OF_MESHES, OF_VIEWS = 0.7, 0.2
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 PLANAR = (
@@ -185,43 +188,63 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
 
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
-    settings: EvaluationSettings,
+    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on the one half as fine.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
+    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes.
     """
-    # only the ellipsoids' quality: fits on the coarse mesh would double their time
-    said = dict(other) | {"maps/quality": quality(coarse, settings)}
-    if settings.task:
-        said |= payload_alone(coarse, settings.surface.samples, settings.task)
-    # of one value for each friction model the curved one's, which comes first
-    pairs: dict[str, tuple[ArrayLike, ArrayLike]]
-    pairs = {key: (np.ravel(values[key])[:1], np.ravel(said[key])[:1]) for key in said}
-    one, two = _judged(fine), _judged(coarse)
-    pairs |= {key: (one[key], two[key]) for key in one}
-    return {q.of_error.key: estimate(*pairs[q.key], q.error) for q in TABLE if q.error and q.key in pairs}
+    # of one value for each friction model the curved one's, which comes first; fits would double the time
+    fine_mesh = {key: np.ravel(value)[:1] for key, value in values.items()} | _judged(fine)
+    seen = [_judged(view) | _held(view, settings) for view in views]
+    coarse_mesh = {key: np.ravel(value)[:1] for key, value in other.items()} | _held(coarse, settings) | _judged(coarse)
+    fine_mesh, coarse_mesh = fine_mesh | _of_faces(fine), coarse_mesh | _of_faces(coarse)
+    return {
+        q.of_error.key: estimate(
+            fine_mesh[q.key], coarse_mesh[q.key], [own[q.key] for own in seen if q.key in own], q.error
+        )
+        for q in TABLE
+        if q.error and q.key in coarse_mesh
+    }
 
 
-def estimate(fine: ArrayLike, coarse: ArrayLike, kind: str) -> float:
+def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
     """Error of a number, or the largest of those of the fingers, from its values on two meshes.
 
-    ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for the error to be a share of.
+    The difference alone passes through zero where the contact's edge lies alike on both meshes; that of the ``views``
+    of the coarse contact does not. ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for the
+    error to be a share of.
     """
     f, c = np.asarray(fine, float), np.asarray(coarse, float)
     error = np.abs(c - f)
+    if views:
+        one, two = (np.asarray(view, float) for view in views)
+        error = np.maximum(OF_MESHES * error, OF_VIEWS * np.abs(one - two))
     if kind == "relative":
         error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
     return float(error.max())
 
 
+def _held(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
+    """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
+    found = {"maps/quality": quality(contacts, settings)}
+    if settings.task:
+        found |= payload_alone(contacts, settings.surface.samples, settings.task)
+    return {key: [value] for key, value in found.items()}
+
+
+def _of_faces(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
+    """Quantities that are no sums over a contact, so that only its own faces tell them; of each finger."""
+    return {"maps/contact_area": [c.area for c in contacts], "maps/p_max": [c.largest_pressure for c in contacts]}
+
+
 def _judged(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
-    """Quantities whose errors are told from the contacts, of each finger where it has its own."""
+    """Quantities whose errors are told from sums over the contacts, of each finger where it has its own."""
     ccm = [c.limits["ccm"] for c in contacts]
     found: dict[str, Sequence[float]] = {
         key: [getattr(own, name) for own in ccm] for name, key in (("e_n", "e_n"), *LIMITS)
     }
-    found |= {"contact_area": [c.area for c in contacts], "p_max": [c.largest_pressure for c in contacts]}
     found["curvature_loss"] = [1.0 - sum(own.F_N for own in ccm) / sum(own.S for own in ccm)]
     found |= {key: [value] for key, value in _overestimates(contacts).items()}
     return {f"maps/{key}": value for key, value in found.items()}
