@@ -14,7 +14,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.evaluate import FACING, EvaluationSettings, estimate, evaluate, mesh_errors, quality
+from softjaw.study.case.evaluate import FACING, EvaluationSettings, estimate, evaluate, mesh_errors, misses, quality
 from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE
@@ -97,6 +97,8 @@ def test_every_quantity_with_an_error_gets_one_from_two_meshes():
     assert estimate([1.0, 2.0], [1.1, 2.1], "relative") == pytest.approx(0.1, rel=1e-9)
     assert np.isnan(estimate([0.0], [1.0], "relative"))
     assert estimate([0.0], [-1.0], "absolute") == 1.0
+    found = [misses(e, t) for e, t in ((0.01, None), (0.02, None), (0.02, 0.02), (0.021, 0.02), (np.nan, 0.02))]
+    assert found == [False, True, False, True, False]
 
 
 def test_a_weight_between_the_pads_is_held_by_their_friction():
