@@ -17,6 +17,7 @@ from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
+from softjaw.study.show.tables.certainty import E_N_ERROR, largest_error
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
@@ -34,8 +35,19 @@ def status_text(result: Any, width: int = PAPER) -> str:
     runner = holder(result.path)
     open_cases = np.any(result.status == MISSING)
     state = f"running now: {runner}" if runner else "run the same command again to resume" if open_cases else ""
-    lines = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
+    error = largest_mesh_error(result)
+    known = [wrapped(error, width, "  ", "  ")] * bool(error)
+    lines = [counts(result), *known, *([wrapped(state, width)] if state else []), *reasons(result, width)]
     return "\n".join([*lines, *sessions(result, bool(runner), width)])
+
+
+def largest_mesh_error(result: Any) -> str:
+    """The largest error of e_n by the mesh so far; nothing where the scene asks for uncertainty intervals instead."""
+    has = E_N_ERROR in result.layout.quantities
+    if not has and any(d.name == "e_n_interval" for d in result.layout.derived):
+        return ""
+    errors = result.read(f"{E_N_ERROR.name}/{E_N_ERROR.name}") if has else None
+    return largest_error(errors, result.status, lambda index: place_text(result.axes, result.labels, index))
 
 
 def status_json(result: Any) -> str:
@@ -43,7 +55,7 @@ def status_json(result: Any) -> str:
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    found |= _added(result)
+    found |= {"largest_error": largest_mesh_error(result)} | _added(result)
     found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
     return json.dumps(found, indent=2)
