@@ -18,7 +18,7 @@ from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, followed, solver, state_flags
+from softjaw.study.case.solving import PressedContact, Solved, Solver, followed, solver, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import flag_sentences
@@ -89,7 +89,7 @@ def _outcomes(
     solving: Solver, forces: Sequence[float], wanted: Collection[int] | None
 ) -> Iterator[tuple[int, Solved | CaseFailure]]:
     """For every force the contacts of both fingers, or why there are none."""
-    if isinstance(solving, OnRigid) and solving.apart:
+    if solving.apart:
         for k, found in solving.levels(forces, range(len(forces)) if wanted is None else sorted(wanted)):
             yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
         return

@@ -132,7 +132,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     unit = make_plan(scene).units[1]  # the middle station of an even number
     fingers = [model.approach(build_object(scene.object), p, scene.gripper) for p in unit.candidate.poses]
     made = solver(scene, fingers, unit.candidate.poses)
-    assert size.shell == pytest.approx(6 * made.grips[0].problem.model.shell.nodes, rel=0.1)  # the axis is one node
+    assert size.shell == pytest.approx(6 * made.shells[0].nodes, rel=0.1)  # the axis is one node
     made.destroy()
     fine = wall_size(scene.with_values({"accuracy.wall_around_mm": 1.0, "accuracy.wall_along_mm": 1.5}))
     assert fine.shell > 4 * size.shell
