@@ -13,7 +13,7 @@ from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.grip import Gripped
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
-from softjaw.fem.shell.wall_material import faces
+from softjaw.fem.shell.wall_stress import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import MARGIN, surely_below
@@ -43,6 +43,7 @@ def thin_body(shape: Walled) -> ThinWalled:
         shape.open_top,
         shape.base_wall,
         shape.springs,
+        shape.base == "none",
     )
 
 
