@@ -52,14 +52,17 @@ mu = 0.05
 pose_mm = 1
 """
 CASES = 12
-BOX, CUP = """shape = "box"
+BOX, CUP = (
+    """shape = "box"
 size_mm = [50, 40, 120]
 edge_radius_mm = 8
-""", """shape = "revolution"
+""",
+    """shape = "revolution"
 profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
 wall_mm = 0.4
 wall_material = "PP"
-"""
+""",
+)
 # The same program with a pause before every case, so that there is time to interrupt it.
 SLOWLY = """
 import os, sys, time
