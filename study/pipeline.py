@@ -61,7 +61,8 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
         values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
     coarse = [c for _, *coarser in outcome.contacts for c in coarser]
     if len(coarse) == len(fine):
-        values |= mesh_errors(fine, coarse, values, settings)
+        other = _state_values(coarse) | solving.wall_values(outcome, 1)
+        values |= mesh_errors(fine, coarse, values, other, settings)
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}

@@ -23,7 +23,7 @@ RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "two scores")
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit")
 HELD = ("cor grid", "samples", "probes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
@@ -98,8 +98,8 @@ class Quantity:
         Group of the file; those of ``maps`` are groups of their own, which viewers draw.
     symbol : str
         Head of a column; the name where it is empty.
-    needs : str
-        One of `NEEDS` or `HELD`, or nothing; without it the quantity is not in the file.
+    needs : tuple of str
+        Of `NEEDS` or `HELD`; without all of them the quantity is not in the file.
     rank : int
         Place among the main maps, 1 for the first; 0 for all others.
     among : str
@@ -108,6 +108,8 @@ class Quantity:
         The map of which a relative error is a share.
     meanings : tuple of str
         What the integers 0, 1, ... of a code mean; -1 is none.
+    error : str
+        Where two meshes tell the error of a map, what it is: "relative", or "absolute" in the unit; else nothing.
     """
 
     name: str
@@ -117,11 +119,12 @@ class Quantity:
     definition: str
     group: str = "maps"
     symbol: str = ""
-    needs: str = ""
+    needs: tuple[str, ...] = ()
     rank: int = 0
     among: str = ""
     relative_to: str = ""
     meanings: tuple[str, ...] = ()
+    error: str = ""
 
     @property
     def key(self) -> str:
@@ -138,29 +141,40 @@ class Quantity:
         """Whether there is one value for each of `MODELS`."""
         return "model" in self.dims
 
+    @property
+    def of_error(self) -> Quantity:
+        """The row of the error of this map."""
+        relative = self.error == "relative"
+        return Quantity(
+            f"{self.name}_error", (), "" if relative else self.unit, f"{'relative ' * relative}error of {self.name}",
+            f"{MESHES}{' (CCM)' * self.by_model}{', over its value' * relative}.", needs=(*self.needs, NEEDS[0]),
+            relative_to=self.name * relative,
+        )  # fmt: skip
+
 
 SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect", "probes": "probe"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
+MESHES = "Difference between the mesh and one with half as many elements per direction"
 AS_MAP = "As the map, for each finger."
-TABLE = (
+ROWS = (
     # maps of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
              "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
              "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
-             " as in the paper.", rank=1),
+             " as in the paper.", rank=1, error="relative"),
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
              " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
-             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3),
+             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3, error="relative"),
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
-             symbol="safety", needs="mass", rank=13),
+             symbol="safety", needs=("mass",), rank=13, error="relative"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
              "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
              " many motions.", symbol="fitted", rank=9),
     Quantity("quality_graspit", M, "", "grasp quality, linearised as in GraspIt!",
              "As quality, with the hull of the 20 points that GraspIt! takes on each ellipsoid instead of the "
-             "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs="graspit"),
+             "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs=("graspit",)),
     Quantity("fit_error", (), "", "fit error of the fitted limit surface",
              "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
              "377 motions that it was not fitted to; CCM, of the finger where it is larger.", rank=10),
@@ -172,7 +186,8 @@ TABLE = (
     Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
-             "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.", rank=2),
+             "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.",
+             rank=2, error="relative"),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
              "max tau_z / (mu F_N), with F_N the sum of pressure times area times the cosine between face normal and "
              "contact normal; of the weaker finger."),
@@ -182,13 +197,13 @@ TABLE = (
              "unless score.epsilon is 'everywhere'."),
     Quantity("f_x_max", M, "N", "largest friction along x",
              "Total friction force along the contact frame's x axis when the pad slides along x, Eqs. (6)-(8); of the"
-             " weaker finger.", rank=7),
+             " weaker finger.", rank=7, error="relative"),
     Quantity("f_y_max", M, "N", "largest friction along y",
              "Total friction force along the contact frame's y axis when the pad slides along y, Eqs. (6)-(8); of the"
-             " weaker finger.", rank=8),
+             " weaker finger.", rank=8, error="relative"),
     Quantity("tau_z_max", M, "N m", "largest friction torque about z",
              "Total friction torque about the contact normal when the pad turns about it, Eqs. (6)-(8); of the weaker"
-             " finger.", rank=4),
+             " finger.", rank=4, error="relative"),
     Quantity("tau_pure", (), "N m", "largest torque without a net force",
              "Largest torque about the contact normal that the contact carries while it transmits no force in its "
              "plane; tau_z_max comes with such a force where the patch is not symmetric, and is larger: up to 2 "
@@ -198,19 +213,25 @@ TABLE = (
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
     Quantity("closing", (), "m", "closing displacement of the pad",
-             "How far the pad's back moved towards the object after first touch; mean of both fingers."),
+             "How far the pad's back moved towards the object after first touch; mean of both fingers.",
+             error="relative"),
     Quantity("opening", (), "m", "opening at first touch",
              "Distance of the undeformed contact faces of both pads, along the approach, when they touch the object.",
              rank=11),
     Quantity("opening_loaded", (), "m", "opening under load",
              "Opening at first touch less the closing displacements of both pads, as the gripper shows it then.",
-             symbol="loaded", rank=12),
-    Quantity("contact_area", (), "m^2", "contact area", "Area of the faces under pressure; mean of both fingers."),
-    Quantity("p_max", (), "Pa", "largest pressure", "Largest contact pressure on either finger."),
+             symbol="loaded", rank=12, error="absolute"),
+    Quantity("contact_area", (), "m^2", "contact area",
+             "Area under pressure, mean of both fingers; its edge is found inside the faces, from the moments of the "
+             "loads along their lines.", symbol="area", rank=14, error="relative"),
+    Quantity("p_max", (), "Pa", "largest pressure",
+             "Largest contact pressure on either finger, of a quadratic fitted to the loads within two elements of the "
+             "largest one; where the pressure is singular, at a sharp end of the object under a pad, so a mean over "
+             "these elements.", rank=15, error="relative"),
     Quantity("contact_distance", (), "m", "distance of the contacts", "Distance between the contact frames' origins."),
     Quantity("curvature_loss", (), "", "force lost to curvature",
              "1 - F_N / S: zero for a flat contact, what the tilt of the loaded normals takes off the normal force "
-             "otherwise; both fingers together."),
+             "otherwise; both fingers together.", error="absolute"),
     Quantity("misalignment", (), "rad", "misalignment of the contacts",
              "Largest of the angles between one contact normal and the other reversed, and between the line that "
              "joins the contacts and each normal."),
@@ -218,7 +239,7 @@ TABLE = (
     *(
         Quantity(f"{name}_overestimate{suffix}", (), "", f"{what}: {model} over ccm",
                  f"1 - ccm / {model} of {name}_max: the share of the planar model's claim that the curved contact"
-                 f" cannot carry ({note}); of the finger where it is largest.")
+                 f" cannot carry ({note}); of the finger where it is largest.", error="absolute")
         for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
         for suffix, model, note in (
             ("", "pcm", "both scaled by S, the paper's normalisation"),
@@ -226,35 +247,19 @@ TABLE = (
              " planar model with that force claims too little"),
         )
     ),
-    Quantity("e_n_error", (), "", "relative error of e_n",
-             "Difference of e_n (CCM) between the mesh and one with half as many elements per direction, over its "
-             "value.", needs="two meshes", relative_to="e_n"),
-    Quantity("quality_error", (), "", "relative error of quality", "As e_n_error.", needs="two scores",
-             relative_to="quality"),
-    Quantity("payload_error", (), "", "relative error of payload", "As e_n_error.", needs="two scores",
-             relative_to="payload"),
-    Quantity("f_x_max_error", (), "", "relative error of f_x_max", "As e_n_error.", needs="two meshes",
-             relative_to="f_x_max"),
-    Quantity("f_y_max_error", (), "", "relative error of f_y_max", "As e_n_error.", needs="two meshes",
-             relative_to="f_y_max"),
-    Quantity("tau_z_max_error", (), "", "relative error of tau_z_max", "As e_n_error.", needs="two meshes",
-             relative_to="tau_z_max"),
-    *(
-        Quantity(f"{name}_overestimate{suffix}_error", (), "", f"error of {name}_overestimate{suffix}",
-                 "Absolute difference between the mesh and one with half as many elements per direction.",
-                 needs="two meshes")
-        for name in ("f_x", "f_y", "tau_z") for suffix in ("", "_pcm_projected")
-    ),
     Quantity("indentation", (), "m", "indentation of the wall",
-             "Largest inward displacement of the wall, less the motion of the wall as a whole.", needs="wall", rank=5),
+             "Largest inward displacement of the wall, less the motion of the wall as a whole.",
+             needs=("wall",), rank=5, error="relative"),
     Quantity("wall_stress", (), "Pa", "largest stress in the wall",
-             "Largest von Mises stress on its two faces.", symbol="stress", needs="wall", rank=6),
+             "Largest von Mises stress on its two faces, recovered from the middles of the elements.",
+             symbol="stress", needs=("wall",), rank=6, error="relative"),
     Quantity("wall_strain", (), "", "largest strain of the wall",
-             "Largest principal strain, by size, on its two faces.", needs="wall"),
+             "Largest principal strain, by size, on its two faces, as the stress.", needs=("wall",),
+             error="relative"),
     Quantity("support_force", (), "N", "force of the support",
              "What the support has to bear in this frictionless contact: the pads push an object with sloping walls "
              "along its axis. Friction takes it in a grasp; where it is more than mu F_N of both fingers can take, "
-             "the flag 'slides out' says so.", needs="wall"),
+             "the flag 'slides out' says so.", needs=("wall",)),
     # each finger: limits, contact frame, pose of the pad
     Quantity("f_x_max", FM, "N", "largest friction along x", AS_MAP, "fingers"),
     Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
@@ -338,28 +343,28 @@ TABLE = (
              "between gradient and motion.", "limit_surface"),
     Quantity("matrix_6d", (*F, "wrench", "wrench_2"), "", "matrix of the fitted 6-D ellipsoid",
              "A of w A w = 1 in w = (f_x, f_y, f_z, tau_x / rho, tau_y / rho, tau_z / rho) / (mu S), CCM; of"
-             " the directions that the contact resists.", "limit_surface", needs="six components"),
+             " the directions that the contact resists.", "limit_surface", needs=("six components",)),
     Quantity("rank_6d", F, "", "directions that the contact resists",
-             "Of the six; 3 for a planar contact.", "limit_surface", needs="six components"),
+             "Of the six; 3 for a planar contact.", "limit_surface", needs=("six components",)),
     Quantity("fit_error_6d", (*F, "component"), "-, -, rad", "fit error of the 6-D ellipsoid",
-             "As fit error, over the motions it was fitted to.", "limit_surface", needs="six components"),
+             "As fit error, over the motions it was fitted to.", "limit_surface", needs=("six components",)),
     # deformed wall
     Quantity("place", ("wall_place", "component"), "m", "deformed wall",
              f"Outer face in the frame of the object's own file at {AROUND} angles about the axis, in equal steps from"
              f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
-             " middle or rim to the top; the angle runs slowest.", "wall", needs="wall"),
+             " middle or rim to the top; the angle runs slowest.", "wall", needs=("wall",)),
     # large arrays
     Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
              "Friction (f_x, f_y, tau_z) of the CCM in the contact frame, for turns about the points of a"
-             " square grid of ten contact lengths a side about the origin, x first.", "fingers", needs="cor grid"),
+             " square grid of ten contact lengths a side about the origin, x first.", "fingers", needs=("cor grid",)),
     Quantity("wrench", (*FM, "sample", "component"), "N, N, N m", "wrenches of sampled motions",
              "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
              " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
-             needs="samples", among="sampled"),
+             needs=("samples",), among="sampled"),
     *(
         Quantity(name, ("variation",), unit, f"{name} of changed probes", "CCM, of the candidates in"
                  " probes/candidate solved again with one thing changed; the dimension's attribute lists what.",
-                 "probes", needs="probes", among="probe")
+                 "probes", needs=("probes",), among="probe")
         for name, unit in (("e_n", "m"), ("quality", ""))
     ),
     # effects: level, indicator and reason of each
@@ -374,18 +379,19 @@ TABLE = (
     ),
     # contact patches
     Quantity("pressure", (*F, "face"), "Pa", "contact pressure", "Pressure of each face of the pad's contact face.",
-             "patch", needs="patches"),
-    Quantity("area", (*F, "face"), "m^2", "face area", "Deformed area of each face.", "patch", needs="patches"),
+             "patch", needs=("patches",)),
+    Quantity("area", (*F, "face"), "m^2", "face area", "Deformed area of each face.", "patch", needs=("patches",)),
     Quantity("centroid", (*F, "face", "component"), "m", "face centroid",
-             "Deformed position in the pad's frame.", "patch", needs="patches"),
+             "Deformed position in the pad's frame.", "patch", needs=("patches",)),
     Quantity("normal", (*F, "face", "component"), "", "face normal",
-             "Unit normal of the deformed face, in the pad's frame.", "patch", needs="patches"),
+             "Unit normal of the deformed face, in the pad's frame.", "patch", needs=("patches",)),
     # how the case stands
     Quantity("code", (), "", "state of the case", "Whether it has values.", "status", meanings=STATES),
     Quantity("attempts", (), "", "times this case was begun", "Without coming to an end, or with.", "status"),
     Quantity("message", (), "", "why a case has no result, or what to know about one", "Empty where all is said.",
              "status"),
 )  # fmt: skip
+TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
 RANKED_BY = ("payload", "quality", "e_n", "epsilon")  # what grasps can be ranked by
@@ -395,7 +401,7 @@ BY_KEY = {q.key: q for q in TABLE}
 
 def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:
     """All quantities of a file whose scene asks for these of `NEEDS` and `HELD`."""
-    return tuple(q for q in TABLE if not q.needs or q.needs in has)
+    return tuple(q for q in TABLE if set(q.needs) <= set(has))
 
 
 def map_row(name: str) -> Quantity:

@@ -121,6 +121,16 @@ class Contact:
         """Which faces of the patch carry load ``(n,)``."""
         return self.patch.pressure > LOADED * self.patch.pressure.max(initial=0.0)
 
+    @property
+    def area(self) -> float:
+        """Area of the loaded faces [m^2]."""
+        return float(self.patch.area[self.loaded].sum())
+
+    @property
+    def largest_pressure(self) -> float:
+        """Largest pressure of a face [Pa]."""
+        return float(self.patch.pressure.max())
+
     def at(self, pose: Pose) -> Self:
         """The same contact elsewhere on the object."""
         # A shallow copy keeps what was computed already, none of which depends on the place.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softjaw.friction.motion import cor_grid
 from softjaw.friction.wrench import friction_wrench
@@ -27,9 +27,9 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
-from softjaw.study.case.task import Task, payload_error, payload_values, task_of
+from softjaw.study.case.task import Task, payload_alone, payload_values, task_of
 from softjaw.study.flags import raised
-from softjaw.study.quantities import MODELS
+from softjaw.study.quantities import MODELS, TABLE
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 
@@ -144,8 +144,8 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
         "maps/tau_pure": min(tau_pure),
         "maps/S": S.mean(),
         "maps/F_N": F_N.mean(),
-        "maps/contact_area": np.mean([float(c.patch.area[c.loaded].sum()) for c in contacts]),
-        "maps/p_max": max(float(c.patch.pressure.max()) for c in contacts),
+        "maps/contact_area": np.mean([c.area for c in contacts]),
+        "maps/p_max": max(c.largest_pressure for c in contacts),
         "maps/contact_distance": float(np.linalg.norm(contacts[1].origin - contacts[0].origin)),
         "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
         "maps/misalignment": max(angles(*contacts)),
@@ -184,22 +184,47 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
 
 
 def mesh_errors(
-    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], settings: EvaluationSettings
-) -> dict[str, float]:
-    """Differences of the curved model's results to those of the mesh half as fine; ``values`` are of the fine one."""
-    errors = {}
-    for name, key in (("e_n", "e_n"), *LIMITS):
-        pairs = [tuple(getattr(c.limits["ccm"], name) for c in pair) for pair in zip(fine, coarse, strict=True)]
-        errors[f"maps/{key}_error"] = max(abs(c - f) / f if f > 0 else np.nan for f, c in pairs)
-    for key, value in _overestimates(coarse).items():
-        errors[f"maps/{key}_error"] = abs(values[f"maps/{key}"] - value)
+    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
+    settings: EvaluationSettings,
+) -> dict[str, float]:  # fmt: skip
+    """Errors of all quantities that have one, from the contacts on the mesh and on the one half as fine.
+
+    ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
+    """
     # only the ellipsoids' quality: fits on the coarse mesh would double their time
-    best, other = values["maps/quality"][0], quality(coarse, settings)
-    errors["maps/quality_error"] = abs(other - best) / best if best > 0 else np.nan
+    said = dict(other) | {"maps/quality": quality(coarse, settings)}
     if settings.task:
-        held = values["maps/payload"][0]
-        errors["maps/payload_error"] = payload_error(coarse, settings.surface.samples, settings.task, held)
-    return errors
+        said |= payload_alone(coarse, settings.surface.samples, settings.task)
+    # of one value for each friction model the curved one's, which comes first
+    pairs: dict[str, tuple[ArrayLike, ArrayLike]]
+    pairs = {key: (np.ravel(values[key])[:1], np.ravel(said[key])[:1]) for key in said}
+    one, two = _judged(fine), _judged(coarse)
+    pairs |= {key: (one[key], two[key]) for key in one}
+    return {q.of_error.key: estimate(*pairs[q.key], q.error) for q in TABLE if q.error and q.key in pairs}
+
+
+def estimate(fine: ArrayLike, coarse: ArrayLike, kind: str) -> float:
+    """Error of a number, or the largest of those of the fingers, from its values on two meshes.
+
+    ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for the error to be a share of.
+    """
+    f, c = np.asarray(fine, float), np.asarray(coarse, float)
+    error = np.abs(c - f)
+    if kind == "relative":
+        error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
+    return float(error.max())
+
+
+def _judged(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
+    """Quantities whose errors are told from the contacts, of each finger where it has its own."""
+    ccm = [c.limits["ccm"] for c in contacts]
+    found: dict[str, Sequence[float]] = {
+        key: [getattr(own, name) for own in ccm] for name, key in (("e_n", "e_n"), *LIMITS)
+    }
+    found |= {"contact_area": [c.area for c in contacts], "p_max": [c.largest_pressure for c in contacts]}
+    found["curvature_loss"] = [1.0 - sum(own.F_N for own in ccm) / sum(own.S for own in ccm)]
+    found |= {key: [value] for key, value in _overestimates(contacts).items()}
+    return {f"maps/{key}": value for key, value in found.items()}
 
 
 # --- score ------------------------------------------------------------------------------------------------------------

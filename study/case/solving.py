@@ -8,10 +8,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
+from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
 from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.contact.problem import SpringBed
@@ -59,10 +61,21 @@ class PressedContact(Contact):
     def of(self, finger: Finger) -> PressedContact:
         """The same contact of another finger, which stands where the object looks the same."""
         # Touched here, because cached properties are copied only when they have been computed.
-        _ = self.ellipsoids, self.tau_pure  # computed once for both
+        _ = self.ellipsoids, self.tau_pure, self.area, self.largest_pressure  # computed once for both
         other = self.at(finger.pose)
         other.finger = finger
         return other
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the contact, with its edge inside the faces [m^2]."""
+        return contact_area(self.patch, self.state.pad.shape.patch_faces)
+
+    @cached_property
+    def largest_pressure(self) -> float:
+        """Largest pressure [Pa], as the mean over a few elements tells it."""
+        shape = self.state.pad.shape
+        return largest_pressure(self.patch, shape.patch_faces, shape.per_side)
 
     @property
     def coarse(self) -> bool:
@@ -207,8 +220,8 @@ class Solver(ABC):
     def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
         """Contacts of both fingers from the states of what is pressed by itself, on each mesh."""
 
-    def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.quantities``; a rigid object has none."""
+    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
+        """What the wall bears at one force on a mesh, keyed as in ``study.quantities``; a rigid object has none."""
         return {}
 
     def destroy(self) -> None:
@@ -276,9 +289,9 @@ class OnWall(Solver):
         each = [self._contacts(held, state) for held, state in zip(self.held, own, strict=False)]
         return Solved([list(c) for c in zip(*each, strict=True)], [state.fingers[0] for state in own], list(own))
 
-    def wall_values(self, solved: Solved) -> dict[str, Any]:
+    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
         """See `Solver`."""
-        return wall_values(self.scene, self.held[0], solved.grips[0], self.shells[0])
+        return wall_values(self.scene, self.held[mesh], solved.grips[mesh], self.shells[mesh])
 
     def _contacts(self, held: Grasp, state: Gripped) -> list[PressedContact]:
         """Contacts of both fingers in their own frames."""

@@ -78,10 +78,11 @@ def payload_values(
     return values, Flag(0) if found[0].borne else Flag.NOT_BORNE
 
 
-def payload_error(contacts: Sequence[Contact], samples: int, task: Task, mass: float) -> float:
-    """Relative difference of a mass that is held (curved model) to what these contacts of another mesh hold."""
+def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, float]:
+    """The maps of `payload_values` in the curved model, from so many sampled motions and no fit."""
     wrenches = [sampled_wrenches(c, MODELS[0], samples)[1][:samples] for c in contacts]
-    return abs(_payload(contacts, wrenches, task).force / GRAVITY - mass) / mass if mass > 0 else np.nan
+    mass = _payload(contacts, wrenches, task).force / GRAVITY
+    return {"maps/payload": mass} | ({} if task.mass is None else {"maps/safety_factor": mass / task.mass})
 
 
 def _payload(contacts: Sequence[Contact], wrenches: Sequence[FloatArray], task: Task) -> Payload:

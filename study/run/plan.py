@@ -126,7 +126,6 @@ def has(scene: Any) -> tuple[str, ...]:
     asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
-    asked["two scores"] = scene.accuracy.meshes > 1
     return tuple(name for name, wanted in asked.items() if wanted)
 
 

@@ -227,11 +227,10 @@ def least(names: Sequence[str]) -> list[str]:
     >>> least(["quality", "quality_error", "fit_error", "e_n", "e_n_error", "e_n_pcm", "f_x_max", "f_x_max_error"])
     ['fit_error', 'f_x_max_error', 'f_x_max', 'e_n_pcm', 'quality_error']
     """
-    main = [name for name in reversed(MAIN[3:]) if name in names]
-    errors = [f"{name}_error" for name in main if f"{name}_error" in names]
+    main = [column for name in reversed(MAIN[3:]) for column in (f"{name}_error", name) if column in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
     last = [name for name in ("quality_error", f"{MAIN[2]}_error", MAIN[2]) if name in names]
-    return [*(n for n in (MISALIGNMENT,) if n in names), *main[:1], *errors, *main[1:2], *planar, *main[2:], *last]
+    return [*(n for n in (MISALIGNMENT,) if n in names), *main, *planar, *last]
 
 
 def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:

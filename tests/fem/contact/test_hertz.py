@@ -14,6 +14,8 @@ a / R`` of the half width at the rim: 0.08 % at the ``a / R = 0.002`` used here,
 import numpy as np
 import pytest
 
+from softjaw.fem.contact.edge import contact_area, largest_pressure
+from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.pad.mesh import Pad
@@ -36,7 +38,7 @@ def radius(pressed, coordinates, factor):
 
 
 def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
-    """Relative errors of half width, peak pressure and pressure profile, root mean squares over the forces."""
+    """Relative errors of half width, peak, profile, reconstructed area and its peak, root mean squares over forces."""
     a, length = 0.002 * R, 1e-3
     shape = PadShape((length, 2 * width * a, width * a), (1, 2 * n, n), (1.0, grade, grade), element)
     pad = Pad(shape, material("linear", E / 2, 0.0), (False, True))
@@ -46,11 +48,15 @@ def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
         hertz = reference.hertz_cylinder(pressed.force / length, R, E)
         y = pressed.points.position[..., 1]
         half_width = radius(pressed, [1], 4.0)
+        patch, faces = extract(pad, pressed), shape.patch_faces
         errors.append(
             (
                 half_width / hertz.radius - 1,
                 pressed.pressure.max() / hertz.peak - 1,
                 profile_error(pad, pressed, y, hertz),
+                contact_area(patch, faces) / (2 * hertz.radius * length) - 1,
+                largest_pressure(patch, faces, shape.per_side) / hertz.peak - 1,
+                patch.area[patch.load > 0].sum() / (2 * hertz.radius * length) - 1,
             )
         )
     return np.sqrt(np.mean(np.square(errors), axis=0))
@@ -66,14 +72,21 @@ def test_cylinder_converges_at_the_expected_orders():
     assert fine[0] < 0.010
     assert fine[1] < 0.006
     assert fine[2] < 0.07
+    # area and peak as a case has them; the area of the faces that bear goes down by halves, at order 1
+    order = np.log2(coarse / fine) / 2
+    assert order[3] > 1.2
+    assert order[4] > 1.8
+    assert fine[3] < 0.25 * fine[5] < 0.025
 
 
 def test_triquadratic_cylinder():
     """A contact of about five elements across, with the figures of a trilinear mesh of twice as many per direction."""
-    half_width, peak, profile = cylinder_errors(12, np.linspace(0.8, 1.2, 4), "hex27", grade=10.0)
+    half_width, peak, profile, area, fitted, _ = cylinder_errors(12, np.linspace(0.8, 1.2, 4), "hex27", grade=10.0)
     assert half_width < 0.03
     assert peak < 0.12
     assert profile < 0.14
+    assert area < 0.06
+    assert fitted < 0.04
 
 
 @pytest.mark.long
@@ -104,6 +117,8 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8",
                 radius(pressed, [0, 1], 2.5) / hertz.radius - 1,
                 pressed.pressure[0] / hertz.peak - 1,
                 profile_error(pad, pressed, r, hertz),
+                contact_area(extract(pad, pressed), pad.shape.patch_faces) / (np.pi * hertz.radius**2) - 1,
+                largest_pressure(extract(pad, pressed), pad.shape.patch_faces, pad.shape.per_side) / hertz.peak - 1,
             )
         )
         lacking.append((hertz.approach - pressed.closing) * E_star * W / pressed.force)
@@ -115,7 +130,7 @@ def test_sphere_converges_at_the_expected_orders():
     meshes = np.array([5, 7, 10])
     errors, lacking = zip(*(sphere_errors(n) for n in meshes), strict=True)
     order = np.log2(errors[0] / errors[2])  # over all three, twice as many elements per direction
-    assert (np.diff(errors, axis=0) < 0).all()
+    assert (np.diff(errors, axis=0)[:, [0, 1, 2, 4]] < 0).all()
     assert order[0] > 1.1
     assert order[1] > 1.8
     assert 0.8 < order[2] < 1.5
@@ -129,6 +144,8 @@ def test_sphere_converges_at_the_expected_orders():
 def test_sphere_on_a_fine_mesh():
     (coarse, _), (errors, lacking) = sphere_errors(10), sphere_errors(16)
     assert np.log(coarse / errors)[0] / np.log(1.6) > 1.4
+    assert np.log(coarse / errors)[3] / np.log(1.6) > 1.0
+    assert errors[3] < 0.06
     assert 0.8 < np.log(coarse / errors)[2] / np.log(1.6) < 1.5
     assert errors[0] < 0.01
     assert errors[1] < 0.015

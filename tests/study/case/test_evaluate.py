@@ -67,15 +67,15 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     values, _ = evaluate(fine, SETTINGS)
     assert values["maps/flags"] & Flag.NOT_ANTIPODAL
     assert values["maps/misalignment"] == pytest.approx(math.radians(8.0), rel=1e-9)
-    errors = mesh_errors(fine, coarse, values, SETTINGS)
+    errors = mesh_errors(fine, coarse, values, {}, SETTINGS)
     other, _ = evaluate(coarse, SETTINGS)
     for name in ("e_n", "f_y_max", "quality"):
         expected = abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    assert not any(mesh_errors(fine, fine, values, SETTINGS).values())
+    assert not any(mesh_errors(fine, fine, values, {}, SETTINGS).values())
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
-    error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, task)["maps/payload_error"]
+    error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
     assert error == pytest.approx(abs(less / held - 1), rel=1e-9)
 
 

@@ -141,7 +141,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
 
 def test_show_has_indentations_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
-        text = as_text(best(dataset(result)), 200).partition("\n\n")[2]
+        text = as_text(best(dataset(result)), 240).partition("\n\n")[2]
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]

@@ -193,7 +193,7 @@ def test_the_payload_has_a_column_in_grams():
     assert "payload [kg]" in as_csv(table).splitlines()[0]
 
 
-WIDE = ("mass", "wall", "two meshes", "two scores")
+WIDE = ("mass", "wall", "two meshes")
 
 
 @pytest.mark.parametrize("width", [60, 80, 100, 200])

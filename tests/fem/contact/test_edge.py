@@ -1,0 +1,97 @@
+"""Area and largest pressure of patches whose pressure is known: Hertz's, flat, at a rim, on one line of nodes."""
+
+import numpy as np
+import pytest
+
+from softjaw.fem.contact.edge import contact_area, largest_pressure
+from softjaw.friction.patch import ContactPatch
+
+LENGTH, WIDTH = 0.050, 0.022
+
+
+def patch_of(pressure, n):
+    """A flat face of ``n`` elements along length and width, two faces each along a side, with Gauss points' loads."""
+    faces = 2 * n[0], 2 * n[1]
+    x, y = (np.linspace(-size / 2, size / 2, count + 1) for size, count in zip((LENGTH, WIDTH), faces, strict=True))
+    grid = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((faces[0] + 1, faces[1] + 1))], axis=-1)
+    corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+    area = np.full(len(corners), LENGTH * WIDTH / len(corners))
+    # means over the faces, as a solution has them
+    s = (np.arange(20) + 0.5) / 20
+    u, v = (a.ravel()[:, None] for a in np.meshgrid(s, s))
+    side = corners[:, 2] - corners[:, 0]
+    mean = pressure(corners[:, 0, 0] + u * side[:, 0], corners[:, 0, 1] + v * side[:, 1]).mean(axis=0)
+    return ContactPatch(corners.mean(axis=1), area, np.tile([0.0, 0.0, 1.0], (len(area), 1)), mean, corners), faces
+
+
+def hertz(a, b, x_0=0.0, y_0=0.0):
+    return lambda x, y: np.sqrt(np.maximum(0.0, 1.0 - ((x - x_0) / a) ** 2 - ((y - y_0) / b) ** 2))
+
+
+def errors(pressure, area, n):
+    patch, faces = patch_of(pressure, n)
+    counted = patch.area[patch.pressure > 0].sum()
+    found = contact_area(patch, faces), largest_pressure(patch, faces, 2), counted
+    return np.abs(np.array(found) / [area, 1.0, area] - 1.0)
+
+
+def test_area_and_peak_of_an_elliptic_contact_converge():
+    """Over places of its middle, which lie anywhere between the lines; counted faces are far off and slow."""
+    places = [(0.0, 0.0), (0.0007, 0.0003), (0.0013, 0.0009), (0.0004, 0.0011)]
+    a, b = 0.012, 0.007
+    found = [np.mean([errors(hertz(a, b, *at), np.pi * a * b, (n, n)) for at in places], axis=0) for n in (6, 12, 24)]
+    coarse, middle, fine = found
+    assert (np.log2(coarse / fine)[:2] / 2 > 1.3).all()
+    assert middle[0] < 0.06  # a line at either tip is wholly counted where it bears in part only
+    assert middle[1] < 0.02
+    assert (fine[:2] < [0.25 * fine[2], 0.01]).all()
+
+
+def test_a_line_contact_ends_at_its_edges_and_at_the_rims():
+    """Hertz's cylinder along the pad: the sums along the length, which cross no edge, do not count."""
+    for half in (0.0046, 0.0053, 0.0061):
+        line = hertz(1e9, half)
+        area, peak, counted = errors(line, 2 * half * LENGTH, (10, 10))
+        assert area < 0.02
+        assert peak < 0.04
+        assert counted > area
+
+
+def test_pressure_that_is_not_hertzian_is_followed_on_a_fine_mesh():
+    """p = sqrt(1 - t^2) (1 - t^2 / 3): of Hertz's shape the second moment alone gives a length 6 % too short."""
+    half = 0.006
+    shape = hertz(1e9, half)
+    for n, bound in ((8, 0.06), (40, 0.006)):
+        assert errors(lambda x, y: shape(x, y) * (1.0 - (y / half) ** 2 / 3.0), 2 * half * LENGTH, (4, n))[0] < bound
+
+
+def test_a_contact_from_a_rim_ends_at_its_edge():
+    """p = sqrt(1 - s / b) (1 + s / (2 b)) from the end of the pad on, exact but for the integration over the faces."""
+    for b in (0.013, 0.0215):
+
+        def pressure(x, y, b=b):
+            s = (x + LENGTH / 2) / b
+            return np.sqrt(np.maximum(0.0, 1.0 - s)) * (1.0 + 0.5 * s)
+
+        patch, faces = patch_of(pressure, (20, 3))
+        assert contact_area(patch, faces) == pytest.approx(b * WIDTH, rel=0.02)
+
+
+def test_a_contact_without_an_edge_is_the_whole_face():
+    patch, faces = patch_of(lambda x, y: 1.0 + 0.0 * x, (4, 3))
+    assert contact_area(patch, faces) == pytest.approx(LENGTH * WIDTH, rel=1e-12)
+    assert largest_pressure(patch, faces, 2) == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("line", [1, 0], ids=["inside", "rim"])
+def test_one_loaded_line_of_nodes_has_about_the_width_of_its_share(line):
+    """Nodal gaps: the loads of both faces beside a node lie on it, so that their second moment is zero."""
+    n = 4
+    patch, faces = patch_of(lambda x, y: 1.0 + 0.0 * x, (n, n))
+    share = WIDTH / n
+    place, load = patch.centroid.reshape(*faces, 3).copy(), np.zeros(faces)
+    place[..., 1] = -WIDTH / 2 + share * np.repeat(np.arange(n + 1), 2)[1:-1]
+    load[:, {0: [0], 1: [1, 2]}[line]] = 1.0
+    found = ContactPatch(place.reshape(-1, 3), patch.area, patch.normal, load.ravel(), patch.corners)
+    assert 0.8 < contact_area(found, faces) / (LENGTH * share * (1.0 if line else 0.5)) < 1.3
+    assert largest_pressure(found, faces, 2) == pytest.approx(1.0, rel=0.35)
