@@ -25,6 +25,7 @@ from softjaw.study.scene.objects import Walled
 FloatArray = NDArray[np.float64]
 RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.quantities lists them
 STIFF = 0.02  # indentation over closing below which a wall is as good as rigid: e_n then changes by less than 0.1 %
+DEEP = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
 SMALL_INDENTATION = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
@@ -135,6 +136,7 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
 def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
     found = Flag.SNAPPED * state.wall.snapped
+    found |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))
     friction = 2.0 * scene.friction.mu * state.force
     found |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
     strength = thin_body(scene.object).material.yield_strength

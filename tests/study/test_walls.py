@@ -181,6 +181,9 @@ def test_a_tube_gives_way_more_than_a_cup_and_less_where_its_rims_are_held():
         for own in (("object.support='clamped'", "object.base='none'"), (), ("object.base='none'",))
     ]
     assert 1.3 * found[0] < found[1] < 0.8 * found[2]
+    values = solved(straight, "object.base='none'", "object.wall_mm=0.25", forces="[0.1, 3]")[1].values
+    assert values["maps/indentation"] > wall.DEEP * 0.030
+    assert values["maps/flags"] & Flag.DENTED
     with pytest.raises(Exception, match="base_wall_mm"):
         solved(straight, "object.base='none'", "object.base_wall_mm=0.8")
 
