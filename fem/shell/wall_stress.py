@@ -19,13 +19,13 @@ from softjaw.fem.shell.wall_mesh import BodyMesh
 
 @dataclass(frozen=True)
 class FaceState:
-    """Strain and stress of one face where grid lines cross.
+    """Strain and stress of one face at some places.
 
     Attributes
     ----------
-    strain, stress : (m + 1, n + 1, 3) arrays
-        Green-Lagrange strains 11, 22, gamma_12 and second Piola-Kirchhoff stresses 11, 22, 12 [Pa] at every theta and s
-        line, 1 along theta where the lines are at right angles.
+    strain, stress : (..., 3) arrays
+        Green-Lagrange strains 11, 22, gamma_12 and second Piola-Kirchhoff stresses 11, 22, 12 [Pa] along the elements'
+        axes: 1 along theta, 2 along s where the lines of these are at right angles.
     """
 
     strain: FloatArray
@@ -33,13 +33,13 @@ class FaceState:
 
     @property
     def von_mises(self) -> FloatArray:
-        """Equivalent stress ``(m + 1, n + 1)`` of plane stress [Pa]."""
+        """Equivalent stress of plane stress at every place [Pa]."""
         a, b, c = np.moveaxis(self.stress, -1, 0)
         return np.sqrt(a * a - a * b + b * b + 3.0 * c * c)
 
     @property
     def principal_strain(self) -> FloatArray:
-        """Smaller and larger principal strain in the wall, ``(m + 1, n + 1, 2)``."""
+        """Smaller and larger principal strain in the wall, ``(..., 2)``."""
         a, b, c = np.moveaxis(self.strain, -1, 0)
         # half of c, because gamma is twice the tensor's shear
         middle, radius = 0.5 * (a + b), np.hypot(0.5 * (a - b), 0.5 * c)
@@ -47,21 +47,29 @@ class FaceState:
 
 
 def faces(shell: Shell[BodyMesh], q: FloatArray) -> tuple[FaceState, FaceState]:
-    """Outer and inner face in the state ``q (6 k,)``."""
+    """Outer and inner face where grid lines cross, ``(m + 1, n + 1)``, in the state ``q (6 k,)``."""
+    outer, inner = (_state(shell, _at_crossings(shell.mesh, own.strain)) for own in middles(shell, q))
+    return outer, inner
+
+
+def middles(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
+    """Outer and inner face in the middles of the ``n`` elements in the state ``q (6 k,)``."""
     parts, e = shell.elements, np.empty((len(shell.elements.nodes), kernel.STRAINS))
     x = np.hstack([shell.mesh.X, shell.mesh.D]) + q.reshape(-1, 6)
     kernel.forms(parts.nodes, parts.plane, parts.twist, x, e)
     e -= parts.start
     membrane, bending = (e[:, first : first + 8].reshape(-1, 4, 2).mean(axis=1) for first in (0, 8))
+    outer, inner = (
+        _state(shell, np.column_stack([membrane + zeta * bending, e[:, 16] + zeta * e[:, 17]])) for zeta in (1.0, -1.0)
+    )
+    return outer, inner
+
+
+def _state(shell: Shell, strain: FloatArray) -> FaceState:
+    """Strain and its stress: plane stress as in the element, whose thickness strain has no coupling with the others."""
     E, nu = shell.young_modulus, shell.poisson_ratio
-    # plane stress, as in the element, whose thickness strain has no coupling with the others
     C = E / (1.0 - nu**2) * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
-    states = []
-    for zeta in (1.0, -1.0):
-        middles = np.column_stack([membrane + zeta * bending, e[:, 16] + zeta * e[:, 17]])
-        strain = _at_crossings(shell.mesh, middles)
-        states.append(FaceState(strain, strain @ C))
-    return states[0], states[1]
+    return FaceState(strain, strain @ C)
 
 
 def _at_crossings(mesh: BodyMesh, values: FloatArray) -> FloatArray:
