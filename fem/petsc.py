@@ -318,7 +318,9 @@ class NonlinearSolver:
 
     def forget(self) -> None:
         """Let the next solve be that of a new solver: MUMPS orders by the first values that it sees."""
-        self._end = None
+        self._end, self._pattern = None, self.problem.pattern
+        if self._pattern.start is not self._stored:
+            self._grow()
         self._snes.getKSP().getPC().reset()
 
     def destroy(self) -> None:

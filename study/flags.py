@@ -63,6 +63,9 @@ class Flag(IntFlag):
     NOT_BORNE = 1 << 19, "no hold", "friction does not bear what the squeeze itself asks of it, so nothing is held", (
         "the normal forces do not face each other: their couple, or their push to one side, comes before any load"
     )  # fmt: skip
+    DENTED = 1 << 22, "dented", "the wall is dented deep", (
+        "by more than a fifth of the object's half width between the fingers: what is held there has another shape"
+    )  # fmt: skip
     # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"

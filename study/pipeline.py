@@ -18,7 +18,7 @@ from softjaw.study.case.effects import Simulated, effects_of
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, misses, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, followed, solver, state_flags
+from softjaw.study.case.solving import PressedContact, Solved, Solver, followed, solver, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import Flag, flag_sentences
@@ -62,7 +62,8 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     coarse = [c for _, *coarser in outcome.contacts for c in coarser]
     if len(coarse) == len(fine):
         views = list(zip(*(c.views for c in coarse), strict=True))
-        values |= mesh_errors(fine, coarse, values, _state_values(coarse), settings, views)
+        other = _state_values(coarse) | solving.wall_values(outcome, 1)
+        values |= mesh_errors(fine, coarse, values, other, settings, views)
         values["maps/flags"] |= Flag.COARSE * misses(values["maps/e_n_error"], scene.accuracy.e_n)
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
@@ -91,7 +92,7 @@ def _outcomes(
     solving: Solver, forces: Sequence[float], wanted: Collection[int] | None
 ) -> Iterator[tuple[int, Solved | CaseFailure]]:
     """For every force the contacts of both fingers, or why there are none."""
-    if isinstance(solving, OnRigid) and solving.apart:
+    if solving.apart:
         for k, found in solving.levels(forces, range(len(forces)) if wanted is None else sorted(wanted)):
             yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
         return

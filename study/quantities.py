@@ -249,11 +249,13 @@ ROWS = (
     ),
     Quantity("indentation", (), "m", "indentation of the wall",
              "Largest inward displacement of the wall, less the motion of the wall as a whole.",
-             needs=("wall",), rank=5),
+             needs=("wall",), rank=5, error="relative"),
     Quantity("wall_stress", (), "Pa", "largest stress in the wall",
-             "Largest von Mises stress on its two faces.", symbol="stress", needs=("wall",), rank=6),
+             "Largest von Mises stress on its two faces, recovered from the middles of the elements.",
+             symbol="stress", needs=("wall",), rank=6, error="relative"),
     Quantity("wall_strain", (), "", "largest strain of the wall",
-             "Largest principal strain, by size, on its two faces.", needs=("wall",)),
+             "Largest principal strain, by size, on its two faces, as the stress.", needs=("wall",),
+             error="relative"),
     Quantity("support_force", (), "N", "force of the support",
              "What the support has to bear in this frictionless contact: the pads push an object with sloping walls "
              "along its axis. Friction takes it in a grasp; where it is more than mu F_N of both fingers can take, "

@@ -22,21 +22,23 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import BALANCE, NEAR
 from softjaw.fem.contact.problem import ContactProblem, Control
-from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
+from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
+Start = TypeVar("Start", bound="PathState")
+Result = TypeVar("Result")
 MOST_STEPS = 60  # under displacement control, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
 MOST_FAILURES = 20  # under displacement control, for one force
@@ -87,6 +89,14 @@ class Work:
     halvings: int = 0
 
 
+class PathState(Protocol):
+    """A state of a load path."""
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether the path has jumped before."""
+
+
 class LoadPath(ABC):
     """What follows a load path with one solver, and may continue with another problem where it has no solution."""
 
@@ -99,6 +109,18 @@ class LoadPath(ABC):
     @abstractmethod
     def _set_up(self) -> None:
         """Make `solver` for the problem as it is now."""
+
+    def _near(self, coarse: Iterable[Start], state: Callable[[Start], Result]) -> Result | None:
+        """What ``state`` finds from the first of a coarser mesh's states that leads to one on the path; else None."""
+        for start in coarse:
+            # beyond a jump the finer mesh may still be before it
+            if start.path_dependent:
+                continue
+            try:
+                return state(start)
+            except (ConvergenceError, CheckError):
+                continue
+        return None
 
     def _start_again(self) -> None:
         """Set up another solver after a change of the problem; clock and iterations that are left go on."""

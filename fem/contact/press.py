@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import NEAR, Checks, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, State, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
@@ -200,26 +200,20 @@ class Press(LoadPath):
         """
         work, elapsed = Work(), self._stopwatch()
         self._begin_afresh()
-        x, reached = self._near(coarse, work)
+        # without following the path nothing would tell a state that lies off it
+        starts = coarse if isinstance(self._stepping, Following) else ()
+        x, reached = self._near(starts, lambda start: self._from(start, work)) or (None, 0.0)
         if x is None or reached < force:
             below, x = x, self._within_budget(x, reached, force, work)
             self._refuse_fall(below, reached, x, force)
         return self._pressed(x, force, work, elapsed())
 
-    def _near(self, coarse: Sequence[Pressed], work: Work) -> tuple[FloatArray | None, float]:
-        """State that was found from a coarser mesh and its force [N]; none if there is none."""
-        steps = self._stepping
-        for start in coarse:
-            # without following the path nothing would tell a state that lies off it
-            if start.path_dependent or not isinstance(steps, Following):
-                continue
-            try:
-                x = steps.from_near(interpolated(start.pad, start.unknowns, self.pad), start.force, work)
-                self._pressed(x, start.force, work, Seconds())
-            except (ConvergenceError, CheckError):
-                continue
-            return x, start.force
-        return None, 0.0
+    def _from(self, start: Pressed, work: Work) -> State:
+        """State at the force of a coarser mesh's, checked."""
+        assert isinstance(self._stepping, Following)
+        x = self._stepping.from_near(interpolated(start.pad, start.unknowns, self.pad), start.force, work)
+        self._pressed(x, start.force, work, Seconds())
+        return x, start.force
 
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""

@@ -9,15 +9,19 @@ from softjaw.fem.pad.mesh import Pad, along_side
 
 FloatArray = NDArray[np.float64]
 Places = tuple[NDArray[np.int64], FloatArray]  # of points along an axis: nodes (n, k) of their element, shape functions
+UPRIGHT = np.ones(3)
 
 
-def interpolated(coarse: Pad, x: FloatArray, fine: Pad) -> FloatArray:
+def interpolated(coarse: Pad, x: FloatArray, fine: Pad, turn: FloatArray = UPRIGHT) -> FloatArray:
     """Unknowns ``(fine.size,)`` of one pad from those ``x (coarse.size,)`` of another, by its shape functions.
 
-    Either may be the half or quarter that symmetry leaves. Pressures that quadratic functions take below zero are zero.
+    Either may be the half or quarter that symmetry leaves, and ``turn`` are signs of the axes of the one in the other's
+    frame, where it is its mirror image or turned by half a turn. Pressures that quadratic functions take below zero are
+    zero.
     """
-    u = _mirrored(coarse, fine.nodes, coarse.nodes, coarse.displacement(x))
-    face, own = coarse.nodes[coarse.contact_nodes, :2], fine.nodes[fine.contact_nodes, :2]
+    places = turn * fine.nodes
+    u = turn * _mirrored(coarse, places, coarse.nodes, coarse.displacement(x))
+    face, own = coarse.nodes[coarse.contact_nodes, :2], places[fine.contact_nodes, :2]
     pressure = _mirrored(coarse, own, face, x[coarse.closing_dof + 1 :, None])
     found = np.zeros(fine.size)
     found[fine.dofs[fine.dofs >= 0]] = u[fine.dofs >= 0]

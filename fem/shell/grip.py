@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softjaw.fem.contact.load_stepping import LoadPath, Settings, Stepping, Work, falls
+from softjaw.fem.contact.load_stepping import STRAY, LoadPath, Settings, Stepping, Work, falls
 from softjaw.fem.contact.press import Pressed, pressed
-from softjaw.fem.contact.problem import Gap, SpringBed
-from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.objects.gap import FloatArray
+from softjaw.fem.contact.problem import Control, Gap, SpringBed
+from softjaw.fem.errors import CheckError, ConvergenceError, SpentError
+from softjaw.fem.objects.gap import FloatArray, Pose
+from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.petsc import NonlinearSolver, Seconds
+from softjaw.fem.shell import interpolation as of_wall
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
@@ -27,7 +29,8 @@ SIDES = 0.3  # of the largest distance from the plane between the fingers on a r
 LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, while a wall snaps in [m]
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-MOST_ITERATIONS = 15  # of a step from one state to the next; good ones take 3 to 8
+LONGEST_SOLVE = 15  # Newton iterations of a step from one state to the next; good ones take 3 to 8
+MOST_ITERATIONS = 300  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
@@ -96,6 +99,7 @@ class WallState:
 
     Parameters
     ----------
+    mesh : BodyMesh
     q : (6 k,) array
         State, see ``fem.shell.element`` [m].
     load : (k, 3) array
@@ -108,6 +112,7 @@ class WallState:
         Of the wall's inner faces towards each other, see ``fem.shell.grip``: 1 undeformed, 0 where they would meet.
     """
 
+    mesh: BodyMesh
     q: FloatArray
     load: FloatArray
     reaction: FloatArray
@@ -117,11 +122,31 @@ class WallState:
 
 @dataclass(frozen=True)
 class Gripped:
-    """Both fingers, or the one that symmetry leaves, and the wall in equilibrium at one normal force."""
+    """Both fingers, or the one that symmetry leaves, where they stand, and the wall in equilibrium at one force."""
 
     force: float
     fingers: tuple[Pressed, ...]
+    poses: tuple[Pose, ...]
     wall: WallState
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether the wall has jumped before: another load path may lead to another state."""
+        return self.fingers[0].path_dependent
+
+
+@dataclass(frozen=True)
+class _Place:
+    """State on the load path: unknowns, force [N], and what is known of the path so far.
+
+    ``compliance`` is that of the last step [m/N], ``snapped`` as in `WallState`, ``fell`` whether the force has fallen.
+    """
+
+    x: FloatArray
+    force: float
+    compliance: float
+    snapped: bool
+    fell: bool
 
 
 @dataclass
@@ -151,7 +176,7 @@ class Grip(LoadPath):
 
     def __post_init__(self) -> None:
         """Set up the solver."""
-        self._wanted = self.problem
+        self._wanted, self._other = self.problem, self.fallback
         super().__post_init__()
 
     def _set_up(self) -> None:
@@ -159,11 +184,16 @@ class Grip(LoadPath):
         self.opening = Opening(self.problem.model.shell.mesh)
         self._beds = [SpringBed(f.pad, gap) for f, gap in zip(fingers, self.gaps, strict=True)]
         self.solver = NonlinearSolver(self.problem, self.options)
-        self._stepping = Stepping(
+        self._stepping = self._steps()
+
+    def _steps(self) -> Stepping:
+        """Steps of the problem as it is now."""
+        fingers = self.problem.fingers
+        return Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda closing: min(bed.force_scale(closing) for bed in self._beds),
             ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
-            None if "contact_snes_max_it" in self.options else MOST_ITERATIONS, self._watch,
+            None if "contact_snes_max_it" in self.options else LONGEST_SOLVE, self._watch,
         )  # fmt: skip
 
     def _guess(self, closing: float) -> FloatArray:
@@ -181,26 +211,79 @@ class Grip(LoadPath):
         ConvergenceError, CheckError
             At the first force without an acceptable state.
         """
-        x, reached, compliance, snapped = None, 0.0, np.inf, False
+        here = None
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
-            try:
-                x, slope, fell = self._level(x, reached, force, compliance, work)
-            except ConvergenceError as error:
-                self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
-                if self.fallback is None:
-                    raise
-                # the unknowns are numbered alike, so the path goes on from the last state
-                last, self.problem, self.fallback = self.opening.last, self.fallback(), None
-                self._start_again()
-                self.opening.last = last
-                try:
-                    x, slope, fell = self._level(x, reached, force, compliance, work)
-                except ConvergenceError as again:
-                    self._refuse_folded(again, INDENTED)
-                    raise
-            reached, compliance, snapped = force, slope, snapped or fell or self._gives_way(x, force)
-            yield self._gripped(x, force, snapped, work, elapsed())
+            here = self._next(here, force, work)
+            yield self._gripped(here, work, elapsed())
+
+    def at(self, force: float, coarse: Sequence[Gripped]) -> Gripped:
+        """State at one normal force per finger [N], as `fem.contact.press.Press.at` has it."""
+        work, elapsed = Work(), self._stopwatch()
+        self._begin_afresh()
+        here = self._near(coarse, lambda start: self._from(start, work))
+        if here is None or here.force < force:
+            here = self._next(here, force, work)
+        return self._gripped(here, work, elapsed())
+
+    def _begin_afresh(self) -> None:
+        """Forget what was solved before, so that not a bit of what follows depends on it."""
+        self.fallback = self._other
+        self._wanted.forget()
+        if self.problem is self._wanted:
+            self.opening.last = 1.0, 0.0
+            self.solver.forget()
+            self._stepping = self._steps()
+        else:
+            self.problem = self._wanted
+            self._start_again()
+        self.solver.left = MOST_ITERATIONS
+
+    def _from(self, start: Gripped, work: Work) -> _Place:
+        """State at the force of a coarser mesh's, by one Newton solve."""
+        x0, force, thickness = self._interpolated(start), start.force, self._stepping.thickness
+        x = self._stepping.solve(x0, Control(force=force), work, self._stepping.most)
+        moved = np.delete(x - x0, np.concatenate([np.r_[f.pressures] for f in self.problem.fingers]))
+        compliance = self._compliance()
+        # beyond a limit more force would open the fingers
+        if not (np.abs(moved).max() <= STRAY * thickness and compliance > 0.0):
+            work.halvings += 1
+            raise ConvergenceError(f"the state at {force:.4g} N is not the one that the coarser mesh has come to")
+        self._watch(x, force)
+        here = _Place(x, force, compliance, start.wall.snapped or self._gives_way(x, force), False)
+        self._gripped(here, work, Seconds())
+        return here
+
+    def _interpolated(self, start: Gripped) -> FloatArray:
+        """Unknowns of a coarser mesh's state."""
+        x, model = np.zeros(self.problem.size), self.problem.model
+        x[: model.size] = of_wall.interpolated(start.wall.mesh, start.wall.q, model.shell.mesh)[model.free]
+        for k, f in enumerate(self.problem.fingers):
+            # where the coarser mesh has one finger, the other one is its image in x = 0
+            image = np.array([-1.0 if k >= len(start.fingers) else 1.0, 1.0, 1.0])
+            other = min(k, len(start.fingers) - 1)
+            own = start.fingers[other]
+            turn = np.einsum("ji,j,ji->i", start.poses[other].rotation, image, f.pose.rotation).round()
+            x[f.own] = interpolated(own.pad, own.unknowns, f.pad, turn)
+        return x
+
+    def _next(self, here: _Place | None, force: float, work: Work) -> _Place:
+        """State at ``force`` from the one before, or from first contact; where it has none, with nodal gaps."""
+        try:
+            return self._level(here, force, work)
+        except ConvergenceError as error:
+            self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
+            if self.fallback is None:
+                raise
+        # the unknowns are numbered alike, so the path goes on from the last state
+        last, self.problem, self.fallback = self.opening.last, self.fallback(), None
+        self._start_again()
+        self.opening.last = last
+        try:
+            return self._level(here, force, work)
+        except ConvergenceError as again:
+            self._refuse_folded(again, INDENTED)
+            raise
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found, or that it may have."""
@@ -217,20 +300,30 @@ class Grip(LoadPath):
                 )
             raise CheckError(f"{text} ({error})") from error
 
-    def _level(
-        self, x: FloatArray | None, reached: float, force: float, compliance: float, work: Work
-    ) -> tuple[FloatArray, float, bool]:
-        """State at ``force``, the mean compliance [m/N] up to it, and whether a limit was passed."""
-        if x is None:
+    def _level(self, here: _Place | None, force: float, work: Work) -> _Place:
+        """State at ``force`` from the one before, or from first contact."""
+        self.solver.left = MOST_ITERATIONS
+        try:
+            return self._climb(here, force, work)
+        except SpentError as error:
+            spent = f"given up after {MOST_ITERATIONS} Newton iterations"
+            raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
+
+    def _climb(self, here: _Place | None, force: float, work: Work) -> _Place:
+        """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
+        if here is None:
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
-            compliance = self.problem.closing(x) / reached  # foam gets stiffer, so this is more than what comes
-        ahead, fell = self._step_to(x, reached, force, compliance, work)
+            # foam gets stiffer, so this is more than what comes
+            here = _Place(x, reached, self.problem.closing(x) / reached, False, False)
+        x, reached = here.x, here.force
+        ahead, fell = self._step_to(x, reached, force, here.compliance, work)
+        slope, gives_way = np.inf, self._gives_way(ahead, force)
         # the first contact may have more force than the first level asks for: no slope yet
-        if not force > reached:
-            return ahead, np.inf, fell
-        slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
-        return ahead, slope, fell or GIVES_WAY * slope > self.problem.closing(x) / reached
+        if force > reached:
+            slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
+            gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
+        return _Place(ahead, force, slope, here.snapped or fell or gives_way, here.fell or fell)
 
     def _step_to(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
@@ -258,14 +351,18 @@ class Grip(LoadPath):
         Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
         when they snap in, and no force falls there.
         """
+        return bool(self._compliance() * force > self.problem.closing(x) / GIVES_WAY)
+
+    def _compliance(self) -> float:
+        """Change of the closing displacement per force where the last solve has ended [m/N]."""
         fingers = self.problem.fingers
         load = np.zeros(self.problem.size)
         load[[f.closing_dof for f in fingers]] = [f.pad.share for f in fingers]
-        return bool(self.problem.closing(self.solver.answer(load)) * force > self.problem.closing(x) / GIVES_WAY)
+        return self.problem.closing(self.solver.answer(load))
 
-    def _gripped(self, x: FloatArray, force: float, snapped: bool, work: Work, seconds: Seconds) -> Gripped:
+    def _gripped(self, here: _Place, work: Work, seconds: Seconds) -> Gripped:
         """State of all parts, checked."""
-        problem, residual = self.problem, np.abs(self.problem.residual(x))
+        x, force, problem, residual = here.x, here.force, self.problem, np.abs(self.problem.residual(here.x))
         fingers = []
         for k, f in enumerate(problem.fingers):
             left_over = residual[f.offset : f.closing_dof + 1].max() / f.pad.share
@@ -273,7 +370,7 @@ class Grip(LoadPath):
             part = seconds if k == 0 else Seconds()
             fingers.append(pressed(
                 f.foam, x[f.own].copy(), problem.contact_state(x, k), left_over, force, self.settings,
-                work if k == 0 else Work(), part, instead=problem is not self._wanted,
+                work if k == 0 else Work(), part, here.fell, problem is not self._wanted,
             ))  # fmt: skip
         load, q = problem.wall_load(x), problem.wall_state(x)
         worst = residual[: problem.model.size].max(initial=0.0)
@@ -283,7 +380,9 @@ class Grip(LoadPath):
                 f"by {worst:.3g} N"
             )
         self._check_balance(fingers, load, force)
-        return Gripped(force, tuple(fingers), WallState(q, load, self._reaction(load), snapped, self.opening(q)))
+        mesh, poses = problem.model.shell.mesh, tuple(f.pose for f in problem.fingers)
+        wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
+        return Gripped(force, tuple(fingers), poses, wall)
 
     def _check_balance(self, fingers: Sequence[Pressed], load: FloatArray, force: float) -> None:
         """Refuse a state in which the wall does not bear what the pads press with."""

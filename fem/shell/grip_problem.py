@@ -16,6 +16,7 @@ All rows are forces [N]. Both pads press with the same force, each with a closin
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,9 +93,17 @@ class GripProblem:
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.area.sum() for f in self.fingers)
         self.control = Control(closing=0.0)
+        self._first_places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
+        self._bare = self._built()
+        self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
+        self.forget()
+
+    def forget(self) -> None:
+        """Be as a new problem, so that not a bit of what follows depends on what was evaluated before."""
         # kept from call to call: where a point was is the best start for where it is now
-        self.places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
-        self._build_pattern()
+        self.places = [places.copy() for places in self._first_places]
+        pattern, self._wall_slots, self._foam_slots, self._balance_slots = self._bare
+        self.pattern = copy(pattern)
 
     @property
     def control(self) -> Control:
@@ -106,17 +115,16 @@ class GripProblem:
         self._control = control
         self._before: FloatArray | None = None
 
-    def _build_pattern(self) -> None:
-        """Everything but the couplings between pads and wall, which come as pads touch."""
+    def _built(self) -> tuple[Pattern, IntArray, list[IntArray], IntArray]:
+        """Pattern of all but the couplings between pads and wall, which come as pads touch, and the parts' slots."""
         rows, columns = zip(self.model.entries, *map(self._own_entries, self.fingers), strict=True)
-        self.pattern = Pattern(self.size, np.concatenate(rows), np.concatenate(columns))
-        self._wall_slots = self.pattern.slots(*self.model.entries)
-        self._foam_slots = [self.pattern.slots(*f.foam_entries) for f in self.fingers]
-        self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
-        if len(self.fingers) == 2:
-            f = self.fingers[0]
-            back = f.foam_entries[1][f.foam.closing_entries]
-            self._balance_slots = self.pattern.slots(np.full_like(back, self.fingers[1].closing_dof), back)
+        pattern = Pattern(self.size, np.concatenate(rows), np.concatenate(columns))
+        # the last finger holds the first one's back in the row of its own closing, if they are two
+        one, last = self.fingers[0], self.fingers[-1]
+        back = one.foam_entries[1][one.foam.closing_entries][: None if last is not one else 0]
+        balance = pattern.slots(np.full_like(back, last.closing_dof), back)
+        foams = [pattern.slots(*f.foam_entries) for f in self.fingers]
+        return pattern, pattern.slots(*self.model.entries), foams, balance
 
     def _own_entries(self, f: Finger) -> tuple[IntArray, IntArray]:
         one, other = pairs(f.dofs[:, :, :, None], f.pressure_dofs[:, None, None, :])
@@ -148,6 +156,8 @@ class GripProblem:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
+        if not np.isfinite(x).all():
+            return np.full(self.size, np.nan)
         R, wall_force = np.zeros(self.size), self._no_force()
         try:
             contacts = self._contact(x, wall_force)
@@ -259,8 +269,7 @@ class GripProblem:
             return np.where(slots >= 0, moved[slots], -1).astype(np.int32)
 
         self._wall_slots, self._foam_slots = move(self._wall_slots), [move(slots) for slots in self._foam_slots]
-        if len(self.fingers) == 2:
-            self._balance_slots = move(self._balance_slots)
+        self._balance_slots = move(self._balance_slots)
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of closing displacements and the compression of every element within reason."""

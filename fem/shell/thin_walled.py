@@ -45,7 +45,8 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
     mesh : BodyMesh
     material : WallMaterial
     support : str
-        "clamped": the flat bottom does not move; "standing": the rim of the bottom keeps its height; "free".
+        "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its
+        height; "free".
     stiffness : float
         Of the weak springs that hold what is left of rigid motions, all together and per direction [N/m].
 
@@ -68,6 +69,9 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
     lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + ON_LINE
+    # the mesh of a tube begins off the axis
+    if mesh.s[0] > 0.0:
+        lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - ON_LINE
     held[np.unique(mesh.number[:, lines])] = True
 
 
@@ -107,7 +111,8 @@ class ThinWalled:
     material : WallMaterial
     support : str
         ``clamped``, ``standing`` or ``free``.
-    open_top : bool
+    open_top, open_bottom : bool
+        Whether it has no lid, and no base.
     base_thickness : float, optional
         [m]
     springs : float
@@ -122,6 +127,7 @@ class ThinWalled:
     open_top: bool = True
     base_thickness: float | None = None
     springs: float = 1e3
+    open_bottom: bool = False
 
 
 @dataclass(frozen=True)
@@ -202,8 +208,9 @@ def object_factors(
 def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
     surface = Turned(body.surface, held.angle, body.round)
     mesh = body_mesh(
-        surface, body.thickness, size, held.mirrors, open_top=body.open_top, base_thickness=body.base_thickness
-    )
+        surface, body.thickness, size, held.mirrors,
+        open_top=body.open_top, open_bottom=body.open_bottom, base_thickness=body.base_thickness,
+    )  # fmt: skip
     return supported(mesh, body.material, body.support, body.springs)
 
 

@@ -219,7 +219,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
 
 def forces_apart(scene: Scene) -> bool:
-    """Whether every force on a rigid object is solved by itself, on a fine mesh that starts from a coarse one.
+    """Whether every force is solved by itself, on a fine mesh that starts from a coarse one.
 
     Not with friction that acts back: its state depends on the load path, which is that of the fine mesh.
     """

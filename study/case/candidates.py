@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.build import forces_apart, has_wall, middle_of, own_frame
+from softjaw.study.case.build import forces_apart, middle_of, own_frame
 from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -245,11 +245,8 @@ class Unit:
 
     @property
     def apart(self) -> bool:
-        """Whether its forces are independent of each other, so that ranks may divide them.
-
-        Whether a wall is simulated is known only when the candidate is solved.
-        """
-        return forces_apart(self.scene) and (not has_wall(self.scene.object) or self.scene.effects.object == "rigid")
+        """Whether its forces are independent of each other, so that ranks may divide them."""
+        return forces_apart(self.scene)
 
 
 def axes(scene: Scene) -> list[Axis]:

@@ -81,7 +81,10 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
     lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
     size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
     try:
-        body_mesh(surface, shape.wall, size, open_top=shape.open_top, base_thickness=shape.base_wall)
+        body_mesh(
+            surface, shape.wall, size,
+            open_top=shape.open_top, open_bottom=shape.base == "none", base_thickness=shape.base_wall,
+        )  # fmt: skip
     except ValueError as error:
         key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
         raise StudyError(USAGE, f"object.{key}: {error}") from error
@@ -96,4 +99,4 @@ def wall_lines(
     """
     accuracy = scene.accuracy
     size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
-    return around(turned, size, mirrors), along(turned, size, False, scene.object.open_top)
+    return around(turned, size, mirrors), along(turned, size, scene.object.base == "none", scene.object.open_top)

@@ -5,10 +5,11 @@ Either follows the load path and gives the contacts of every force; what comes a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -131,29 +132,6 @@ class Solved:
     note: str = ""
 
 
-class Solver(Protocol):
-    """Follows the load path of one candidate.
-
-    ``level`` is None for an object without a wall; ``planes`` of symmetry leave ``fingers_solved`` fingers.
-    """
-
-    fingers_solved: int
-    planes: int
-
-    @property
-    def level(self) -> WallLevel | None:
-        """Of the object's compliance."""
-
-    def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
-        """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
-
-    def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """What the wall bears at one force, keyed as in ``study.quantities``; a rigid object has none."""
-
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
-
-
 def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
     """Solver for both fingers at first touch, at the level of the object's compliance that the candidate calls for."""
     if getattr(scene.object, "wall", None) is None:
@@ -185,28 +163,43 @@ def followed(
             path = load_path(forces[k + 1 :])
 
 
-class OnRigid:
-    """Fingers on a rigid object do not feel each other."""
+class Solver(ABC):
+    """Follows the load path of one candidate on every mesh, or solves each force by itself on the fine one.
 
-    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: WallLevel | None) -> None:
-        self.scene, self.fingers, self.level = scene, fingers, level
-        one, other = poses
-        self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
-        meshes = (False, True)[: scene.accuracy.meshes]
-        solved = fingers[:1] if self.shared else fingers
-        self.presses = [[press_of(scene, f, coarser) for coarser in meshes] for f in solved]
-        self.apart = forces_apart(scene)
-        self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.presses)
+    Parameters
+    ----------
+    scene : Scene
+    fingers : list of Finger
+    level : WallLevel, optional
+        Of the object's compliance; None for an object without a wall.
+
+    Attributes
+    ----------
+    apart : bool
+        Whether its forces are independent of each other.
+    paths : list
+        Of what is pressed by itself, the load path on each mesh, the finest first.
+    fingers_solved, planes : int
+        Fingers that are solved, and planes of symmetry of each.
+    """
+
+    paths: list[list[Any]]
+    fingers_solved: int
+    planes: int
+
+    def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel | None) -> None:
+        self.scene, self.fingers, self.level, self.apart = scene, fingers, level, forces_apart(scene)
+        self.meshes = (False, True)[: scene.accuracy.meshes]
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
-        """See `Solver`."""
+        """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
         if self.apart:
             for _, outcome in self.levels(forces, range(len(forces))):
                 if not isinstance(outcome, Solved):
                     raise outcome
                 yield outcome
         else:
-            paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.presses)
+            paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.paths)
             yield from map(self._solved, zip(*paths, strict=True))
 
     def levels(
@@ -216,7 +209,7 @@ class OnRigid:
 
         Not a bit of one depends on which others are wanted.
         """
-        paths = [_CoarsePath(coarse, forces) for _, coarse in self.presses]
+        paths = [_CoarsePath(coarse, forces) for _, coarse in self.paths]
         for k in wanted:
             try:
                 yield k, self._level(forces[k], k, paths)
@@ -226,14 +219,39 @@ class OnRigid:
     def _level(self, force: float, k: int, paths: Sequence[_CoarsePath]) -> Solved:
         """Contacts at the ``k``-th force [N] from the coarser mesh's states."""
         coarse = [path.state(k) for path in paths]
-        fine = [own[0].at(force, path.starts(k)) for own, path in zip(self.presses, paths, strict=True)]
-        # an error can be told only where both fingers have a coarser state
+        fine = [own[0].at(force, path.starts(k)) for own, path in zip(self.paths, paths, strict=True)]
+        # an error can be told only where all have a coarser state
         if lacking := [path.ended for path, state in zip(paths, coarse, strict=True) if state is None]:
             return replace(self._solved([(state,) for state in fine]), note=NO_ERROR.format(reason=lacking[0]))
         return self._solved(list(zip(fine, coarse, strict=True)))
 
+    @abstractmethod
     def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
-        """Contacts of both fingers from the states of those that are solved, on each mesh."""
+        """Contacts of both fingers from the states of what is pressed by itself, on each mesh."""
+
+    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
+        """What the wall bears at one force on a mesh, keyed as in ``study.quantities``; a rigid object has none."""
+        return {}
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        for path in (p for own in self.paths for p in own):
+            path.destroy()
+
+
+class OnRigid(Solver):
+    """Fingers on a rigid object do not feel each other."""
+
+    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: WallLevel | None) -> None:
+        super().__init__(scene, fingers, level)
+        one, other = poses
+        self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
+        solved = fingers[:1] if self.shared else fingers
+        self.paths = [[press_of(scene, f, coarser) for coarser in self.meshes] for f in solved]
+        self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.paths)
+
+    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
+        """See `Solver`."""
         # Of two fingers that are images only the first has states, so the lengths differ.
         pairs = zip(self.fingers, states, strict=False)
         contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
@@ -241,57 +259,48 @@ class OnRigid:
             contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
         return Solved(contacts, [s for own in states for s in own], [])
 
-    def wall_values(self, solved: Solved) -> dict[str, Any]:
-        """See `Solver`."""
-        return {}
-
-    def destroy(self) -> None:
-        """See `Solver`."""
-        for press in (p for own in self.presses for p in own):
-            press.destroy()
-
 
 class _CoarsePath:
-    """States of a finger on the coarser mesh, from the lowest force upward, as far as they are asked for."""
+    """States on the coarser mesh, from the lowest force upward, as far as they are asked for."""
 
-    def __init__(self, press: Press, forces: Sequence[float]) -> None:
-        self._path, self._states = followed(press.load_path, forces), list[Pressed | None]()
+    def __init__(self, press: Press | Grip, forces: Sequence[float]) -> None:
+        self._path, self._states = followed(press.load_path, forces), list[Any]()
         self.ended = ""  # why there are no more
 
-    def state(self, k: int) -> Pressed | None:
+    def state(self, k: int) -> Pressed | Gripped | None:
         """State at the ``k``-th force; None where the path ends before."""
         while len(self._states) <= k and (found := next(self._path, None)) is not None:
-            self._states.append(found if isinstance(found, Pressed) else None)
-            self.ended = self.ended if isinstance(found, Pressed) else str(found)
+            ends = isinstance(found, Exception)
+            self._states.append(None if ends else found)
+            self.ended = str(found) if ends else self.ended
         return self._states[k] if k < len(self._states) else None
 
-    def starts(self, k: int) -> list[Pressed]:
+    def starts(self, k: int) -> list[Any]:
         """What the fine mesh starts from at the ``k``-th force: the states there and below, the nearest first."""
         return [state for i in range(k, -1, -1) if (state := self.state(i)) is not None][:STARTS]
 
 
-class OnWall:
+class OnWall(Solver):
     """Fingers on a thin wall press against each other through it."""
 
     def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel) -> None:
-        self.scene, self.fingers, self.level = scene, fingers, level
-        meshes = (False, True)[: scene.accuracy.meshes]
-        self.held = [_grasp(scene, fingers, coarser) for coarser in meshes]
-        self.grips = [
-            _grip(scene, fingers, held, level, coarser) for held, coarser in zip(self.held, meshes, strict=True)
-        ]
+        super().__init__(scene, fingers, level)
+        self.held = [_grasp(scene, fingers, coarser) for coarser in self.meshes]
+        grips = [_grip(scene, fingers, *own, level) for own in zip(self.held, self.meshes, strict=True)]
+        self.paths = [grips]
+        self.shells = [grip.problem.model.shell for grip in grips]
         self.fingers_solved, self.planes = len(self.held[0].poses), sum(self.held[0].mirrors)
 
-    def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
+    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
         """See `Solver`."""
-        for states in zip(*(g.load_path(forces) for g in self.grips), strict=True):
-            each = [self._contacts(held, state) for held, state in zip(self.held, states, strict=True)]
-            yield Solved([list(own) for own in zip(*each, strict=True)], [s.fingers[0] for s in states], list(states))
+        [own] = states
+        # the coarser mesh may have no state
+        each = [self._contacts(held, state) for held, state in zip(self.held, own, strict=False)]
+        return Solved([list(c) for c in zip(*each, strict=True)], [state.fingers[0] for state in own], list(own))
 
-    def wall_values(self, solved: Solved) -> dict[str, Any]:
+    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
         """See `Solver`."""
-        shell = self.grips[0].problem.model.shell
-        return wall_values(self.scene, self.held[0], solved.grips[0], shell)
+        return wall_values(self.scene, self.held[mesh], solved.grips[mesh], self.shells[mesh])
 
     def _contacts(self, held: Grasp, state: Gripped) -> list[PressedContact]:
         """Contacts of both fingers in their own frames."""
@@ -307,11 +316,6 @@ class OnWall:
 
             contacts.append(PressedContact(self.scene, self.fingers[1], own, image))
         return contacts
-
-    def destroy(self) -> None:
-        """See `Solver`."""
-        for g in self.grips:
-            g.destroy()
 
 
 def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
@@ -344,7 +348,7 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     return held
 
 
-def _grip(scene: Scene, fingers: list[Finger], held: Grasp, level: WallLevel, coarser: bool) -> Grip:
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool, level: WallLevel) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size

@@ -13,7 +13,7 @@ from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.grip import Gripped
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
-from softjaw.fem.shell.wall_material import faces
+from softjaw.fem.shell.wall_stress import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import MARGIN, surely_below
@@ -25,6 +25,7 @@ from softjaw.study.scene.objects import Walled
 FloatArray = NDArray[np.float64]
 RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.quantities lists them
 STIFF = 0.02  # indentation over closing below which a wall is as good as rigid: e_n then changes by less than 0.1 %
+DEEP = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
 SMALL_INDENTATION = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
@@ -43,6 +44,7 @@ def thin_body(shape: Walled) -> ThinWalled:
         shape.open_top,
         shape.base_wall,
         shape.springs,
+        shape.base == "none",
     )
 
 
@@ -134,6 +136,7 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
 def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
     found = Flag.SNAPPED * state.wall.snapped
+    found |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))
     friction = 2.0 * scene.friction.mu * state.force
     found |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
     strength = thin_body(scene.object).material.yield_strength

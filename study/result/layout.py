@@ -155,10 +155,10 @@ class Layout:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
         parts |= {"session": SESSIONS, "component_2": 3}
-        parts |= {"wrench": 6, "wrench_2": 6} if NEEDS[1] in self.has else {}
+        parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
         if self.cor_grid:
             parts["cor"] = self.cor_grid**2
-        if NEEDS[3] in self.has:
+        if "wall" in self.has:
             parts["wall_place"] = AROUND * ALONG
         if self.sampled:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}

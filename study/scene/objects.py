@@ -88,8 +88,9 @@ class Walled(Shape):
     yield_strength_mpa: Strength | None = Field(None, description="yield strength instead of the material's")
     allowed_dent_mm: Length | None = Field(None, description="largest allowed indentation, for the safe force range")
     open_top: bool = Field(True, description="whether the last section is open, as a cup's and a bottle's without cap")
+    base: Literal["closed", "none"] = Field("closed", description='the bottom: "none" makes a tube, open at both ends')
     support: Literal["standing", "clamped", "free"] = Field(
-        "standing", description="standing on its bottom, clamped there, or held by the fingers alone"
+        "standing", description="standing on its bottom, clamped there (a tube at both ends), or held by the fingers"
     )
     springs_n_per_mm: float = Field(1.0, gt=0, le=1e4, description="total stiffness of springs in place of friction")
     base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
@@ -116,6 +117,8 @@ class Walled(Shape):
                 yield Finding((key,), f"{key} without a wall", "wall_mm beside it", remedy)
 
     def _wall_findings(self) -> Iterator[Finding]:
+        if self.base == "none" and self.base_wall_mm is not None:
+            yield Finding(("base_wall_mm",), 'base = "none" beside it', "one of them", "keep the one that is meant")
         pairs = self.wall_profile_mm or ()
         for i, (low, high) in enumerate(pairwise(pairs), 1):
             if high[0] <= low[0]:

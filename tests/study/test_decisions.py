@@ -211,10 +211,13 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
     state = SimpleNamespace(wall=SimpleNamespace(snapped=False), force=10.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wall, "thin_body", lambda shape: body)
+        place = {"maps/opening": 0.06, "maps/indentation": 5.9e-3}
         values = {"maps/support_force": abs(random.normal(0.0, 1e-12)), "maps/wall_stress": moved([5e7], seed)[0]}
-        assert wall.wall_flags(scene, state, values) == Flag.YIELDS
+        assert wall.wall_flags(scene, state, place | values) == Flag.YIELDS
         values = {"maps/support_force": 1.0, "maps/wall_stress": 4e7}
-        assert wall.wall_flags(scene, state, values) == Flag.SLIDES_OUT
+        assert wall.wall_flags(scene, state, place | values) == Flag.SLIDES_OUT
+        values = {"maps/support_force": 0.0, "maps/wall_stress": 4e7, "maps/indentation": moved([6e-3], seed)[0]}
+        assert wall.wall_flags(scene, state, place | values) == Flag.DENTED
 
 
 # --- look-ups and probes ----------------------------------------------------------------------------------------------

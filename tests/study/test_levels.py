@@ -1,4 +1,4 @@
-"""Forces of a candidate on a rigid object on two meshes: each solved by itself, from the coarse one."""
+"""Forces of a candidate on two meshes, on a rigid object and on a thin wall: each by itself, from the coarse one."""
 
 from __future__ import annotations
 
@@ -30,6 +30,10 @@ normal_force_n = [1, 2, 5]
 [accuracy]
 meshes = 2
 """
+WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_around_mm=5",
+        "accuracy.wall_along_mm=8", "accuracy.wall_coarse_mm=16", "load.normal_force_n=[1, 2, 3]",
+        "gripper.elements=[6, 4, 2]")  # fmt: skip
+BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
 
 
 def unit_of(*overrides):
@@ -39,9 +43,9 @@ def unit_of(*overrides):
 
 
 @lru_cache
-def whole():
+def whole(overrides):
     """All forces in one go."""
-    return dict(pipeline.solve_unit(unit_of()))
+    return dict(pipeline.solve_unit(unit_of(*overrides)))
 
 
 def bits(result):
@@ -50,26 +54,32 @@ def bits(result):
     return values, {k: v.tobytes() for k, v in result.patch.items()}, result.message, result.effects
 
 
-def test_a_force_has_the_same_bits_whichever_others_are_asked_for():
-    assert list(whole()) == [0, 1, 2]
-    for wanted in ([2], [1], (2, 0)):
-        found = dict(pipeline.solve_unit(unit_of(), wanted))
+@BOTH
+def test_a_force_has_the_same_bits_whichever_others_are_asked_for(overrides):
+    assert list(whole(overrides)) == [0, 1, 2]
+    for wanted in ([2], [1], (2, 0)) if not overrides else ([2], [1]):
+        found = dict(pipeline.solve_unit(unit_of(*overrides), wanted))
         assert list(found) == sorted(wanted)
         for k, result in found.items():
-            assert bits(result) == bits(whole()[k])
+            assert bits(result) == bits(whole(overrides)[k])
 
 
-def test_the_fine_mesh_has_the_state_that_it_has_along_a_load_path():
-    for k, alone in pipeline.solve_unit(unit_of("accuracy.meshes=1")):
-        both = whole()[k].values
-        assert both["work/load_steps"] == [1, 1]
-        assert both["maps/e_n_error"] > 0
-        for name in ("maps/e_n", "maps/quality", "maps/p_max", "maps/closing", "fingers/f_x_max"):
-            assert both[name] == pytest.approx(alone.values[name], rel=1e-8), name
+@BOTH
+def test_the_fine_mesh_has_the_state_that_it_has_along_a_load_path(overrides):
+    names = ["maps/e_n", "maps/quality", "maps/p_max", "maps/closing", "fingers/f_x_max"]
+    names += ["maps/indentation", "maps/wall_stress", "maps/support_force", "wall/place"] if overrides else []
+    for k, alone in pipeline.solve_unit(unit_of(*overrides, "accuracy.meshes=1")):
+        both = whole(overrides)[k].values
+        assert max(both["work/load_steps"]) == 1
+        errors = ["e_n", "closing", "indentation", "wall_stress", "wall_strain"][: 5 if overrides else 2]
+        assert all(0.0 < both[f"maps/{name}_error"] < 1.5 for name in errors)
+        assert both["maps/flags"] == alone.values["maps/flags"]
+        for name in names:
+            assert both[name] == pytest.approx(alone.values[name], rel=1e-8, abs=1e-9), name
 
 
 def test_a_failure_at_one_force_leaves_the_others_alone(monkeypatch):
-    at = Press.at
+    at, expected = Press.at, whole(())
 
     def fails(press, force, coarse):
         if force == 2.0:
@@ -80,11 +90,11 @@ def test_a_failure_at_one_force_leaves_the_others_alone(monkeypatch):
     found = dict(pipeline.solve_unit(unit_of()))
     assert isinstance(found[1], CaseFailure)
     for k in (0, 2):
-        assert bits(found[k]) == bits(whole()[k])
+        assert bits(found[k]) == bits(expected[k])
 
 
 def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unknown(monkeypatch):
-    load_path = Press.load_path
+    load_path, expected = Press.load_path, whole(())
 
     def ends(press, forces):
         yield next(load_path(press, forces))
@@ -92,19 +102,18 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
 
     monkeypatch.setattr(Press, "load_path", ends)
     found = dict(pipeline.solve_unit(unit_of()))
-    assert bits(found[0]) == bits(whole()[0])
+    assert bits(found[0]) == bits(expected[0])
     for k in (1, 2):
         assert "maps/e_n_error" not in found[k].values
         assert "the force stays below 2 N" in found[k].message
         assert min(found[k].values["work/load_steps"]) > 1
         for name in ("maps/e_n", "maps/quality", "maps/closing"):
-            assert found[k].values[name] == pytest.approx(whole()[k].values[name], rel=1e-8), name
+            assert found[k].values[name] == pytest.approx(expected[k].values[name], rel=1e-8), name
         assert not found[k].values["maps/flags"] & Flag.JUMPED
 
 
-def test_friction_that_acts_back_and_walls_follow_one_load_path():
-    assert unit_of().apart
-    assert not unit_of("accuracy.meshes=1").apart
+def test_forces_are_apart_on_two_meshes_but_not_with_friction_that_acts_back():
+    for overrides in ((), WALL):
+        assert unit_of(*overrides).apart
+        assert not unit_of(*overrides, "accuracy.meshes=1").apart
     assert not unit_of("effects.friction_pressure_coupling='tangential'").apart
-    assert not unit_of("object.wall_mm=0.5").apart
-    assert unit_of("object.wall_mm=0.5", "effects.object='rigid'").apart

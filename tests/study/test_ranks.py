@@ -52,6 +52,17 @@ mu = 0.05
 pose_mm = 1
 """
 CASES = 12
+BOX, CUP = (
+    """shape = "box"
+size_mm = [50, 40, 120]
+edge_radius_mm = 8
+""",
+    """shape = "revolution"
+profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
+wall_mm = 0.4
+wall_material = "PP"
+""",
+)
 # The same program with a pause before every case, so that there is time to interrupt it.
 SLOWLY = """
 import os, sys, time
@@ -76,6 +87,7 @@ def scene(tmp_path_factory, comm):
     if comm.rank == 0:
         path = tmp_path_factory.mktemp("scene") / "box.toml"
         path.write_text(SCENE)
+        path.with_name("cup.toml").write_text(SCENE.replace(BOX, CUP))
     return comm.bcast(path)
 
 
@@ -108,14 +120,18 @@ def test_two_ranks_divide_the_forces_of_a_candidate():
 
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", [2, 3, 4])
-def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_path, scene, ranks):
+@pytest.mark.parametrize("name", ["box", "cup"])
+def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_path, scene, ranks, name):
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
                "uncertainty.mu=0", "uncertainty.pose_mm=0", "uncertainty.probes=2",
                "limit_surface.wrench_samples='none'")  # fmt: skip
+    if name == "cup":
+        changes += ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",
+                    "gripper.pad_length_mm=30")  # fmt: skip
     place = [word for change in changes for word in ("--set", change)]
     whole, path = shared_path / "whole.hdf", shared_path / "divided.hdf"
     for where, count in ((whole, 0), (path, ranks)):
-        code, _, errors = once(run, count, scene, where, *place)
+        code, _, errors = once(run, count, scene.with_stem(name), where, *place)
         assert code == 0, errors
     assert once(differing, path, once(contents, whole)) == []
 

@@ -120,9 +120,11 @@ def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
     grip._stepping.first = lambda closing, F, work: (first, grip.problem.normal_force(first))
     grip._beds = [SimpleNamespace(closing=lambda F: 0.1 * MM)]
     grip._stepping.problem.closing = lambda x: float(x[0])
-    x, _, fell = grip._level(None, 0.0, 6.0, np.inf, Work())
-    assert x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
-    assert fell
+    grip._gives_way = lambda x, F: False
+    found = grip._climb(None, 6.0, Work())
+    assert found.x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
+    assert found.fell
+    assert found.snapped
 
 
 def test_steps_that_keep_failing_end_the_walk():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.shell.element import Shell, ShellMesh, grid_elements, patch
-from softjaw.fem.shell.wall_material import faces
 from softjaw.fem.shell.wall_model import LinearShell
+from softjaw.fem.shell.wall_stress import middles
 
 E, NU, THICKNESS = 2e9, 0.38, 0.02
 RNG = np.random.default_rng(7)
@@ -119,7 +119,7 @@ def test_membrane_patch():
 
     shell, q, exact = solved_patch(stretched)
     assert np.abs(q - exact).max() < 1e-15 * 0.24
-    stress = 1e4 * faces(shell, 1e-4 * q)[0].stress  # small enough for the squares of the strains to vanish
+    stress = 1e4 * middles(shell, 1e-4 * q)[0].stress  # small enough for the squares of the strains to vanish
     middle, half = 0.5 * (stress[..., 0] + stress[..., 1]), 0.5 * (stress[..., 0] - stress[..., 1])
     assert middle == pytest.approx(1e3 / 0.75, rel=1e-6)
     assert half**2 + stress[..., 2] ** 2 == pytest.approx(400**2, rel=1e-6)
@@ -135,7 +135,7 @@ def test_bending_patch():
 
     shell, q, exact = solved_patch(bent)
     assert np.abs(q - exact).max() < 1e-11 * np.abs(exact).max()
-    outer, inner = faces(shell, q)
+    outer, inner = middles(shell, q)
     stress = 0.5 * (outer.stress - inner.stress)
     # E t/2 (kappa_x + nu kappa_y) / (1 - nu^2), compressed on the side to which it curves: 0.667 and shear 0.2
     middle, half = 0.5 * (stress[..., 0] + stress[..., 1]), 0.5 * (stress[..., 0] - stress[..., 1])

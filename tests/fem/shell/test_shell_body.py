@@ -7,9 +7,10 @@ from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
-from softjaw.fem.shell.wall_material import WallMaterial, faces, wall_material
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell
+from softjaw.fem.shell.wall_stress import faces
 from tests.fem.shell.shell_path import ShellProblem, load_steps
 
 FLASK = Revolution(

@@ -120,6 +120,11 @@ def test_every_dimension_has_a_scale_beside_the_data(path):
             assert all(name in found.parent for name in names)
 
 
+@pytest.mark.parametrize("need", NEEDS)
+def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(need):
+    assert all(len(dataset.shape) > 0 for dataset in small(has=(need,)).datasets)
+
+
 def test_every_dataset_says_what_it_is(tmp_path):
     layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), pad_faces=(2, 2),
                    probes=(1,), variations=("mu", "pose"))  # fmt: skip
