@@ -2,8 +2,9 @@
 
 ``newtonls`` with full steps on the semismooth (primal-dual active set) form is the default; the option
 ``-contact_snes_type vinewtonrsls`` solves the same problem as a mixed complementarity problem with bounds.  Every
-linear system is factorised by MUMPS; its symbolic analysis is kept as long as the pattern is. Steps that older factors
-are good enough for do without a factorisation of their own, see `NonlinearSolver`.
+linear system is factorised by MUMPS, by L D L^T where the problem can make its tangent symmetric, else by LU; the
+symbolic analysis is kept as long as the pattern is. Steps that older factors are good enough for do without a
+factorisation of their own, see `NonlinearSolver`.
 
 The BLAS libraries of this process take their work memory here, while there is room for it: OpenBLAS takes its own, 32
 or 128 MiB of addresses, at its first larger operation. Where a limit (``ulimit -v``, a batch system, ``run.memory_gb``)
@@ -24,7 +25,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 import scipy.linalg
@@ -92,6 +93,7 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 NEAR, FAST = 1e5, 0.05  # see NonlinearSolver
 STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
+DISSECTED = 2500  # unknowns from which on the analysis of a better ordering pays
 RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors
 PRINTING = re.compile("monitor|view|converged_reason")
 
@@ -117,6 +119,16 @@ class Problem(Protocol):
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
+
+
+class SymmetricProblem(Problem, Protocol):
+    """A problem whose tangent has a symmetric form, if it says so; the solver sets ``condensed`` to get that one."""
+
+    symmetric: bool
+    condensed: bool
+
+    def right_side(self, R: FloatArray) -> FloatArray:
+        """Right-hand side ``(size,)`` with which the symmetric tangent gives the step that belongs to ``R``."""
 
 
 @dataclass
@@ -171,6 +183,7 @@ class NonlinearSolver:
         self.seconds, self.thrifty, self.left = Seconds(), True, math.inf
         self._pattern = self.problem.pattern
         self._stored = self._pattern.start
+        self._condensed: SymmetricProblem | None = None
         self._norms: list[float] = []  # of the residual, at every step of this solve
         self._end: FloatArray | None = None  # solution of the solve before
         self._matrix = PETSc.Mat().createAIJ(
@@ -182,11 +195,7 @@ class NonlinearSolver:
         snes.setType("newtonls")
         snes.setFunction(self._on_residual, self._f)
         snes.setJacobian(self._on_tangent, self._matrix)
-        ksp = snes.getKSP()
-        # direct factors: contact makes the matrix indefinite or not symmetric, and thin walls make it ill-conditioned
-        ksp.setType("preonly")
-        ksp.getPC().setType("lu")
-        ksp.getPC().setFactorSolverType("mumps")
+        self._condense()
         with self._options_in_effect():
             snes.setFromOptions()
         self.problem.complementarity = snes.getType().startswith("vi")
@@ -196,16 +205,32 @@ class NonlinearSolver:
             snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in (lower, upper)))
         snes.setLineSearchPreCheck(self._on_step)
 
+    def _condense(self) -> None:
+        """Ask for the symmetric form of the tangent if there is one and the solver is one that gets on with it."""
+        kind = (PETSc.Options().getAll() | self.options).get(f"{self.prefix}snes_type", "newtonls")
+        # others use residual and tangent for more than a step, so these have to belong together
+        if kind == "newtonls" and getattr(self.problem, "symmetric", False):
+            self._condensed = cast(SymmetricProblem, self.problem)
+            self._condensed.condensed = True
+            self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
     @contextmanager
     def _options_in_effect(self) -> Iterator[None]:
         """Our defaults and the caller's options in its database, then out again; PETSC_OPTIONS wins over defaults."""
         database = PETSc.Options()
         given = database.getAll()
         # thin structures jump by orders of magnitude in the first iteration; a line search on the residual stalls there
-        defaults = {
+        defaults: dict[str, Any] = {
             "snes_linesearch_type": "basic", "snes_divergence_tolerance": 1e30, "snes_stol": 0.0, "snes_rtol": 1e-50,
             "snes_max_it": 25,
+            # direct: contact makes the matrix indefinite or not symmetric, and thin walls make it ill-conditioned
+            "ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps",
         }  # fmt: skip
+        if self._condensed:
+            # entries of pads are of one size: to scale them takes time and gains no digit
+            defaults |= {"pc_type": "cholesky", "mat_mumps_icntl_8": 0}
+            if self.problem.size > DISSECTED:
+                defaults["mat_mumps_icntl_7"] = 4  # PORD; METIS and SCOTCH are rarely built in
         mine = {self.prefix + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
         for key, value in mine.items():
@@ -309,7 +334,7 @@ class NonlinearSolver:
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
         b, y = self._f.duplicate(), self._f.duplicate()
-        b.array[:] = right
+        b.array[:] = self._condensed.right_side(right) if self._condensed else right
         self._snes.getKSP().solve(b, y)
         solution = y.array.copy()
         b.destroy()
@@ -337,18 +362,20 @@ class NonlinearSolver:
     def _on_residual(self, _snes, x, f) -> None:
         f.array[:] = self._timed(lambda: self.problem.residual(x.array_r))
 
-    def _on_tangent(self, _snes, x, matrix, _preconditioner) -> None:
-        self._norms.append(self._snes.getFunctionNorm())
-        if self._keeps(x.array_r):
-            return  # a matrix that nobody touches is not factorised again
+    def _on_tangent(self, snes, x, matrix, _preconditioner) -> None:
+        self._norms.append(snes.getFunctionNorm())
+        # a matrix that nobody touches is not factorised again
+        if not self._keeps(x.array_r):
+            self._timed(lambda: self._fill(x.array_r, matrix))
+        if self._condensed:
+            # between the norm of the residual and the linear system with it: nobody asks for it again
+            self._f.array[:] = self._condensed.right_side(self._f.array_r)
 
-        def fill() -> None:
-            self.problem.tangent(x.array_r)
-            if self._pattern.start is not self._stored:
-                self._grow()
-            _set_values(matrix, self._pattern.values)
-
-        self._timed(fill)
+    def _fill(self, x: FloatArray, matrix: PETSc.Mat) -> None:
+        self.problem.tangent(x)
+        if self._pattern.start is not self._stored:
+            self._grow()
+        _set_values(matrix, self._pattern.values)
 
     def _keeps(self, x: FloatArray) -> bool:
         """Whether the step from ``x`` is made with the factors at hand."""

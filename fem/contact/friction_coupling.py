@@ -42,6 +42,8 @@ def load_steps(reached: float, force: float) -> list[float]:
 class CoupledProblem(ContactProblem):
     """A pad pressed on an object with friction coefficient ``mu``; for the rest a `ContactProblem`."""
 
+    symmetric = False  # slip grows with the pressure, but no pressure with slip
+
     def __init__(self, pad: Pad, gap: Gap, mu: float) -> None:
         super().__init__(pad, gap)
         self.mu, self.stick = mu, STICK * self.kappa

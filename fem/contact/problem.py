@@ -149,6 +149,8 @@ class ContactProblem(PressedPad):
     Implements the protocol ``fem.petsc.Problem``.
     """
 
+    symmetric, condensed = True, False
+
     def __init__(self, pad: Pad, gap: Gap) -> None:
         super().__init__(pad)
         self.gap, self.control, self.complementarity = gap, Control(closing=0.0), False
@@ -179,6 +181,7 @@ class ContactProblem(PressedPad):
         self.pattern = Pattern(self.size, rows, columns)
         self._slots = self.pattern.slots(rows, columns)
         self._ends = np.cumsum([len(part[0]) for part in parts])
+        self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
         self._values = np.zeros(rows.size)
         self._K_uu = self._parts()[1].reshape(m, 3, k, 3, k)
 
@@ -220,8 +223,10 @@ class ContactProblem(PressedPad):
         return R
 
     def tangent(self, x: FloatArray) -> None:
-        """Fill ``pattern.values`` with the tangent at ``x``."""
+        """Fill ``pattern.values`` with the tangent at ``x``, or its symmetric form if ``condensed``."""
         self._evaluate_entries(x)
+        if self.condensed:
+            self._closing_column = self._condense()
         self._add_up(self.pattern.values)
 
     def _add_up(self, values: FloatArray) -> None:
@@ -246,6 +251,32 @@ class ContactProblem(PressedPad):
             # this row holds the control instead of the foam's force on the backing plate
             elements[self.foam.closing_entries] = 0.0
             own[0] = self.closing_stiffness
+
+    def _condense(self) -> FloatArray:
+        """Make the entries symmetric; returns what was the column of the closing displacement, 0 under force control.
+
+        Rows of nodes in contact change their sign. Idle pressures, and a closing that is given, have nothing but a
+        diagonal in their rows, so their part of a step is known beforehand (`right_side`) and their columns go.
+        """
+        elements, _, by_pressure, by_displacement, _ = self._parts()
+        by_displacement *= -1.0
+        by_pressure[~np.repeat(self._tangent_set[self.nodes], by_pressure.size // self.nodes.size)] = 0.0
+        if self._by_force:
+            return np.zeros(self.size)
+        rows, column = self.foam.rows[self._closing_entries], elements[self._closing_entries]
+        elements[self._closing_entries] = 0.0
+        return gather(rows, column, self.size)
+
+    def right_side(self, R: FloatArray) -> FloatArray:
+        """Right-hand side ``(size,)`` with which the condensed tangent has the step that belongs to the residual."""
+        right, active = R.copy(), self._tangent_set
+        idle = np.where(active, 0.0, R[self.pressures] / (self.kappa * self.area))
+        if idle.any():
+            right += gather(self.dofs, self.kappa * np.einsum("faib,fa->fib", self._K_ul, idle[self.nodes]), self.size)
+        right[self.pressures] = np.where(active, -1.0, 1.0) * R[self.pressures]
+        if not self._by_force:
+            right -= self._closing_column * (R[self.closing_dof] / self.closing_stiffness)
+        return right
 
     def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
         """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
@@ -280,13 +311,10 @@ class ContactProblem(PressedPad):
         # any force will do: the kind of control enters the tangent, its value does not
         self.control = Control(force=1.0)
         self._evaluate_entries(x)
+        # pressures are multipliers with the sign that makes the matrix symmetric
+        self._condense()
         active = self._tangent_set
         self.control, self._tangent_set, self._by_force = before
-        _, _, by_pressure, by_displacement, _ = self._parts()
-        # the sign with which the pressures are multipliers and the matrix is symmetric
-        by_displacement *= -1.0
-        # columns of idle pressures go, as their rows have gone by the active set
-        by_pressure[~np.repeat(active[self.nodes], by_pressure.size // self.nodes.size)] = 0.0
         # not into the pattern's own values, which stay those of the last tangent
         values = np.empty_like(self.pattern.values)
         self._add_up(values)

@@ -53,4 +53,4 @@ def _solve(plan) -> tuple[float, int, np.ndarray]:
 
 
 def _factorisations() -> int:
-    return PETSc.Log.Event("MatLUFactorNum").getPerfInfo()["count"]
+    return sum(PETSc.Log.Event(f"Mat{kind}Num").getPerfInfo()["count"] for kind in ("LUFactor", "CholFctr"))

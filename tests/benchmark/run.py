@@ -24,7 +24,7 @@ from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad import foam as element_kernel
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.case.model import approach
+from softjaw.study.case.model import Finger, touching
 from softjaw.study.doctor import launch_environment, mpirun
 from tests.benchmark import factors, kernels
 from tests.benchmark.table import fastest, line, title
@@ -61,7 +61,7 @@ def contact_solve() -> None:
     title("Contact solve")
     cylinder = EllipticCylinder(0.025, 0.025, 0.2)
     pose = Pose(np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]), np.array([-1.0, 0, 0]))
-    finger = approach(cylinder, pose, SIZE)
+    finger = Finger(touching(cylinder, pose, SIZE), cylinder)
     for elements, forces, goal in (((24, 12, 6), (3.0, 10.0, 30.0), 40), ((48, 24, 12), (3.0,), 25)):
         press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), finger.gap)
         states = list(press.load_path(forces))

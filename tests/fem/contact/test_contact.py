@@ -7,11 +7,12 @@ from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.pad.shape import BackingPlate, PadShape
 from tests.fem import reference
 
 G = 0.020e6
 SIZE = (0.02, 0.012, 0.008)
+PLATE = BackingPlate(0.002, 1e6, 0.3, (0.005, 0.003))
 OBJECTS = {
     "sphere": reference.placed(Sphere(0.012), reference.facing(0.012)),
     "elliptic cylinder": reference.placed(EllipticCylinder(0.012, 0.005, 0.1), reference.facing(0.012)),
@@ -19,8 +20,8 @@ OBJECTS = {
 }
 
 
-def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), law="blatz_ko"):
-    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material(law, G), symmetry, contact)
+def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), law="blatz_ko", plate=None):
+    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material(law, G), symmetry, contact, plate)
     return ContactProblem(pad, gap)
 
 
@@ -78,6 +79,24 @@ def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed
     assert np.abs(K[:n, :n] - K[:n, :n].T).max() < 1e-13 * np.abs(K).max()
     assert np.abs(K[:n, n:] + K[n:, :n].T).max() < 1e-15 * np.abs(K).max()
     assert not K[n:, n:].any()
+
+
+@pytest.mark.parametrize("plate", [None, PLATE], ids=["rigid plate", "elastic plate"])
+@pytest.mark.parametrize("control", [Control(force=2.0), Control(closing=1e-3)], ids=["force", "closing"])
+@pytest.mark.parametrize("contact", ["weighted", "nodal"])
+def test_the_condensed_tangent_is_symmetric_and_gives_the_same_step(contact, control, plate):
+    """From a state with pressure on idle nodes and a closing that is not yet the wanted one."""
+    problem = problem_of(OBJECTS["sphere"], contact, plate=plate)
+    problem.control = control
+    x = contacting_state(problem)
+    K, R = reference.dense(problem, x), problem.residual(x)
+    problem.condensed = True
+    S = reference.dense(problem, x)
+    assert R[problem.pressures][~problem._tangent_set].any()
+    assert np.abs(K - K.T).max() > 1e-3 * np.abs(K).max()
+    assert np.abs(S - S.T).max() < 1e-14 * np.abs(S).max()
+    step = np.linalg.solve(K, R)
+    np.testing.assert_allclose(np.linalg.solve(S, problem.right_side(R)), step, atol=1e-9 * np.abs(step).max())
 
 
 @pytest.mark.parametrize("symmetry", [(False, False), (True, False), (True, True)])

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
+from softjaw.fem.contact.friction_coupling import CoupledProblem
 from softjaw.fem.contact.press import Press
+from softjaw.fem.contact.problem import ContactProblem
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.petsc import PETSc
 from tests.fem import reference
 
 G = 0.040e6
@@ -255,9 +258,28 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     assert first.halvings == last.halvings == 0
 
 
-def test_petsc_options_are_taken_back():
-    from petsc4py import PETSc
+@pytest.mark.parametrize(
+    ("options", "problem_of", "count"),
+    [
+        ({}, ContactProblem, "MatCholFctrNum"),
+        ({"contact_pc_type": "lu"}, ContactProblem, "MatLUFactorNum"),
+        (VI, ContactProblem, "MatLUFactorNum"),
+        ({}, lambda pad, gap: CoupledProblem(pad, gap, 0.5), "MatLUFactorNum"),
+    ],
+    ids=["symmetric", "on demand", "bounds", "friction"],
+)
+def test_symmetric_tangents_have_symmetric_factors(options, problem_of, count):
+    press = Press(pad_of(), OVAL, options, problem_of=problem_of)
+    before = factorisations()
+    list(press.load_path([1.0]))
+    assert {name for name, number in factorisations().items() if number > before[name]} == {count}
 
+
+def factorisations():
+    return {name: PETSc.Log.Event(name).getPerfInfo()["count"] for name in ("MatLUFactorNum", "MatCholFctrNum")}
+
+
+def test_petsc_options_are_taken_back():
     before = dict(PETSc.Options().getAll())
     Press(pad_of((4, 2, 2)), OVAL, VI | {"contact_snes_max_it": 7})
     assert dict(PETSc.Options().getAll()) == before
