@@ -17,11 +17,14 @@ _HOMES = {
     "convex_quartic": "lsfit.quartic_fit",
     "score": "scoring.quality",
     "Scene": "study.scene",
+    "press": "study.solve",
+    "run": "study.solve",
     "load_scene": "study.scene",
     "open": "study.result.read",
     "read_patch": "study.result.read",
     "read_field": "study.result.read",
     "GraspMap": "study.lookup",
+    "StudyError": "study.messages",
 }
 __all__ = sorted(_HOMES)
 
