@@ -32,8 +32,8 @@ def press(
 ) -> Case:
     """Solve one case in memory: press both fingers at one place with one force, and judge the grasp.
 
-    The numbers are those that `run` stores for this case, bit for bit where both have the same number of BLAS threads.
-    A grasp or a force that the scene does not have is added to its own.
+    The numbers are those that `run` stores for this case, bit for bit. A grasp or a force that the scene does not have
+    is added to its own.
 
     Parameters
     ----------
@@ -80,10 +80,14 @@ def press(
     if force is None:
         raise TypeError("force is missing: give the normal force per finger in N")
     try:
+        from threadpoolctl import threadpool_limits
+
         from softjaw.study.one_case import solved_case
     except ImportError as error:
         raise ImportError(MISSING.format(what="press", error=error), name=error.name) from error
-    return solved_case(scene, station, angle, force, candidate, pose)
+    # The order of a sum, so its last bits, depends on the number of threads; numpy has been loaded with any.
+    with threadpool_limits(1):
+        return solved_case(scene, station, angle, force, candidate, pose)
 
 
 def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool = False) -> int:
@@ -127,8 +131,10 @@ def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool 
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses some launchers
     try:
         from mpi4py import MPI
+        from threadpoolctl import threadpool_limits
 
         from softjaw.study.launch import solve_scene
     except ImportError as error:
         raise ImportError(MISSING.format(what="run", error=error), name=error.name) from error
-    return solve_scene(scene, path, MPI.COMM_WORLD if comm is None else comm, retry_failed=retry_failed)
+    with threadpool_limits(1):
+        return solve_scene(scene, path, MPI.COMM_WORLD if comm is None else comm, retry_failed=retry_failed)

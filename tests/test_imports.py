@@ -22,7 +22,7 @@ ALLOWED = {
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "vtkmodules"}
-    | {"xarray", "(computed)"}
+    | {"xarray", "threadpoolctl", "(computed)"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
