@@ -24,7 +24,11 @@ def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) 
     if not isinstance(patch, ContactPatch):
         expected = "a ContactPatch of centroid, area, normal and pressure"
         raise TypeError(f"patch is a {type(patch).__name__}: expected {expected}")
-    found = Contact(patch, checked_mu(mu), x_hint=principal_direction(patch) if x_axis is None else x_axis)
+    mu = checked_mu(mu)
+    try:
+        found = Contact(patch, mu, x_hint=principal_direction(patch) if x_axis is None else x_axis)
+    except ValueError as error:
+        raise type(error)(str(error).replace("x_hint", "x_axis")) from error
     if found.frame.flag & FrameFlag.ORIENTATION:
         raise ValueError("patch: found normals that oppose their neighbours, expected all to one side; turn the others")
     return found

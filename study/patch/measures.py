@@ -132,7 +132,7 @@ def friction_limits(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = N
 
 
 def friction_wrench(
-    patch: ContactPatch, motion: ArrayLike, mu: float, model: str = "ccm", x_axis: ArrayLike | None = None
+    patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm", x_axis: ArrayLike | None = None
 ) -> FloatArray:
     """Friction wrench of a patch that slips, Eqs. (6)-(8), as the load that drives the motion.
 
@@ -140,7 +140,7 @@ def friction_wrench(
     ----------
     patch, mu, x_axis
         As for `friction_limits`.
-    motion : (m, 3) or (m, 6) array
+    twist : (m, 3) or (m, 6) array
         ``[v_x, v_y, omega_z]`` or ``[v, omega]`` about the origin of the contact frame; only the direction counts.
     model : str
         ``ccm``, ``pcm`` or ``pcm_projected``.
@@ -153,7 +153,7 @@ def friction_wrench(
     Raises
     ------
     ValueError
-        As for `friction_limits`; a motion of another shape, or that is not finite.
+        As for `friction_limits`; a twist of another shape, or that is not finite.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def friction_wrench(
     >>> friction_wrench(patch, [0, 0, 1], mu=0.8).round(9)[0, 5]
     0.016
     """
-    return wrench_in_frame(contact_of(patch, mu, x_axis).local, motion, mu, _checked(model))
+    return wrench_in_frame(contact_of(patch, mu, x_axis).local, twist, mu, _checked(model))
 
 
 def fit_ellipsoid(

@@ -8,6 +8,7 @@ import io
 import numpy as np
 import pytest
 from mpi4py import MPI
+from threadpoolctl import threadpool_limits
 
 import softjaw as sj
 from softjaw.study.one_case import CaseError
@@ -77,6 +78,16 @@ def test_an_image_by_symmetry_stands_where_the_run_has_it(solved):
     case = sj.press(scene, station=0.0, angle=np.pi, force=1)
     assert case.angle == pytest.approx(np.pi)
     assert_stored(case, path, (0, 2, 0))
+
+
+def test_the_threads_of_a_script_change_no_bit():
+    pressed = []
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            pressed.append(sj.press(SMOKE, 0.0, 0.0, 2.0))
+    one, two = (case.result.values for case in pressed)
+    for key in one:
+        assert key.startswith("work/") or np.array_equal(one[key], two[key], equal_nan=True), key
 
 
 @pytest.mark.long
