@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 import subprocess
 import sys
@@ -69,3 +70,19 @@ def test_scripts_that_solve(name, tmp_path):
     if name == "planner":
         assert int(output.partition(" better grasps are out of reach")[0].rpartition("\n")[2]) > 0
         assert "the jerk holds" in output
+
+
+PAGE = "\n".join(re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs" / "python.md").read_text(), re.M | re.S))
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_the_page_on_python_runs_as_it_stands(here, capsys):
+    (here / "jobs").symlink_to(ROOT / "jobs")
+    found = {}
+    exec(compile(PAGE, "docs/python.md", "exec"), found)
+    assert found["code"] == 0
+    assert found["case"].e_n == float(found["ds"]["e_n"].sel(model="ccm", angle=0, normal_force=2).item())
+    assert "67000 mm" in capsys.readouterr().out
+    text = (ROOT / "docs" / "python.md").read_text()
+    assert all(f"`{name}`" in text for name in sj.__all__)

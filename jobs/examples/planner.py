@@ -49,14 +49,17 @@ surface = point.limit_surface(finger=1)
 half = 0.5 * 0.15 * 9.81 * 2  # weight and jerk, on one of two fingers [N]
 print("the jerk", "holds" if surface.holds([half, 0.0, 0.01])[0] else "slips", "with forces up to", surface.semi_axes)
 
-# %% Between the solved stations and forces, with the error of the interpolation; arrays go in, arrays come out
-station = np.linspace(0.03, 0.17, 141)
-e_n = grasps.value("e_n", station, 0.0, 7.0)
-error = grasps.error("e_n", station, 0.0, 7.0)
+# %% Between the solved stations, with the error of the interpolation; arrays go in, arrays come out
+station = np.linspace(0.025, 0.175, 301)
+e_n = grasps.value("e_n", station, 0.0, 5.0)
+error = grasps.error("e_n", station, 0.0, 5.0)
+solved = sj.open(FILE)["e_n"].sel(model="ccm", angle=0.0, normal_force=5.0)
 figure, plot = plt.subplots(figsize=(6, 4))
-plot.fill_between(1e3 * station, 1e3 * (e_n - error), 1e3 * (e_n + error), alpha=0.3)
-plot.plot(1e3 * station, 1e3 * e_n)
-plot.set(xlabel="station [mm]", ylabel="e_n [mm]", title="e_n at 7 N, between solved cases")
+plot.fill_between(1e3 * station, 1e3 * (e_n - error), 1e3 * (e_n + error), alpha=0.3, label="error")
+plot.plot(1e3 * station, 1e3 * e_n, label="look-up")
+plot.plot(1e3 * solved["station"], 1e3 * solved, "ko", label="solved")
+plot.set(xlabel="station [mm]", ylabel="e_n [mm]", title="e_n at 5 N; no value where the contact changes its kind")
+plot.legend()
 figure.savefig("results/planner.png", dpi=150)
 print("drawn: results/planner.png")
 
