@@ -86,3 +86,4 @@ def test_the_page_on_python_runs_as_it_stands(here, capsys):
     assert "67000 mm" in capsys.readouterr().out
     text = (ROOT / "docs" / "python.md").read_text()
     assert all(f"`{name}`" in text for name in sj.__all__)
+    assert f"gives {len(sj.__all__)} names" in text

@@ -117,3 +117,31 @@ def test_a_result_file_has_its_ending(file, error, tmp_path):
         sj.run(scene, tmp_path / file)
     with pytest.raises(TypeError, match="expected a Scene"):
         sj.run("smoke.toml", tmp_path / "a.hdf")
+
+
+USER = """
+import softjaw as sj
+
+scene = sj.Scene.load("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
+case = sj.press(scene, station=0.067, angle=0.0, force=5.0)
+force: tuple[float, ...] = scene.load.normal_force_n
+e_n: float = case.limits["ccm"].e_n
+error: dict[str, float] = case.errors
+point: float = sj.GraspMap("a.hdf").best(5, by="payload")[0].place[0, 0]
+code: int = sj.run(scene, "a.hdf")
+quality: float = sj.grasp_quality(case.patch, mu=0.8, distance=0.1).quality
+sj.press("x", force=1)
+sj.fit_quartic(case.patch, mu="0.8")
+"""
+
+
+@pytest.mark.long
+def test_a_type_checker_knows_them(tmp_path):
+    (tmp_path / "user.py").write_text(USER)
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", "user.py"], cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    wrong = [line.partition(": ")[0] for line in done.stdout.splitlines() if line.startswith("user.py")]
+    assert wrong == ["user.py:12", "user.py:13"], done.stdout
+    assert (ROOT / "softjaw" / "py.typed").exists()
