@@ -14,12 +14,13 @@ import pytest
 
 import softjaw as sj
 from softjaw.study.messages import StudyError
-from tests.study.formula_results import make
+from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT
 
 SOURCE = ast.parse((ROOT / "softjaw" / "__init__.py").read_text(encoding="utf-8"))
-EXAMPLES = ("Scene.load", "Scene.from_dict", "Scene.with_values", "press", "ContactPatch", "read_pressure",
-            "friction_limits", "friction_wrench", "fit_ellipsoid", "fit_quartic", "grasp_quality")  # fmt: skip
+EXAMPLES = ("Scene.load", "Scene.from_dict", "Scene.with_values", "press", "open", "GraspMap", "ContactPatch",
+            "read_pressure", "friction_limits", "friction_wrench", "fit_ellipsoid", "fit_quartic",
+            "grasp_quality")  # fmt: skip
 BLOCKED = """
 import json, sys
 
@@ -77,8 +78,12 @@ def test_every_name_says_what_it_takes_gives_and_refuses(name):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_the_example_of_a_name_is_true(name, monkeypatch):
-    monkeypatch.chdir(ROOT)
+def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    (tmp_path / "results").mkdir()
+    if name in ("open", "GraspMap"):
+        make(tmp_path / "results" / "smoke.hdf", axes=grid_axes([0.0], [0.0, 1.5], [1.0, 2.0]))
+    monkeypatch.chdir(tmp_path)
     what = sj
     for part in name.split("."):
         what = getattr(what, part)

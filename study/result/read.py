@@ -46,7 +46,9 @@ def open(file: str | Path) -> xr.Dataset:
 
     Examples
     --------
-    ``open("results/smoke.hdf")["e_n"].sel(model="ccm").interp(normal_force=1.5)``
+    >>> ds = open("results/smoke.hdf")
+    >>> ds["e_n"].attrs["units"], ds["e_n"].sel(model="ccm").interp(normal_force=1.5).dims
+    ('m', ('station', 'angle'))
     """
     with open_result(file) as result:
         return dataset(result)
