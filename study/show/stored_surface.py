@@ -123,8 +123,8 @@ def stored_surface(
     ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
     unit = planar * np.array([1.0, 1.0, rho]) * SHOWN
     patch = _patch(ds, index, finger, faces or {})
-    P, A = (field(ds, f"limit_surface_{name}") for name in ("coefficients", "matrix"))
-    chosen = None if P is None or A is None else fitted_surface(P[index][finger, m], A[index][finger, m])
+    fits = (field(ds, f"limit_surface_{name}") for name in ("coefficients", "matrix"))
+    chosen = fitted_surface(*(np.full(1, np.nan) if fit is None else fit[index][finger, m] for fit in fits))
     return StoredSurface(unit, float(rho), ellipsoid, chosen, patch, model)
 
 
