@@ -15,6 +15,7 @@ from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactEr
 MAX_ITERATIONS = 100
 STILL = 1e-12  # change of the unit normal at which the iteration ends
 NEARLY = 1e-9  # change at which it may end too, after all passes: far from the file's origin rounding allows no less
+EQUAL = 1e-6  # relative difference of extents, and difference of components, that decide nothing
 HALVED = 20  # passes after which the steps on a whole face are halved, again and again
 
 
@@ -105,6 +106,24 @@ def contact_frame(patch: ContactPatch, x_hint: ArrayLike, whole_face: bool = Fal
         flag |= FrameFlag.WINDING
     share = float(faces.load[turned].sum() / S)
     return Frame(origin, _axes(N, x_hint), iterations, flag, cop, int(turned.sum()), share)
+
+
+def principal_direction(patch: ContactPatch) -> FloatArray:
+    """Direction ``(3,)`` in which the loaded faces extend most, across their mean normal.
+
+    Where no direction is longer it is the file's axis that lies most nearly in the contact plane. Its largest component
+    is positive; of equally large ones the first.
+    """
+    faces = patch.loaded
+    N = faces.load @ faces.normal
+    N = N / max(np.linalg.norm(N), np.finfo(float).tiny)
+    across = np.eye(3) - np.outer(N, N)
+    offset = (faces.centroid - faces.area @ faces.centroid / faces.area.sum()) @ across
+    spread, directions = np.linalg.eigh(offset.T @ (faces.area[:, None] * offset))
+    if spread[2] - spread[1] <= EQUAL * spread[2]:
+        return np.eye(3)[np.argmax(np.abs(N) <= np.abs(N).min() + EQUAL)]
+    longest = directions[:, 2]
+    return longest * np.sign(longest[np.argmax(np.abs(longest) >= np.abs(longest).max() - EQUAL)])
 
 
 def in_frame(patch: ContactPatch, frame: Frame) -> ContactPatch:

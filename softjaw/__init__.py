@@ -1,27 +1,45 @@
 """How well a two-finger gripper with soft jaws holds an object at each place where it could grasp it.
 
-The names below are what a script needs; each is loaded when it is first asked for, so ``import softjaw`` takes no time
-and needs neither PETSc nor MPI.
+The names below are what a script needs, and docs/python.md shows them on one page. Each is loaded when it is first
+asked for, so ``import softjaw`` takes no time. Only `press` and `run` need PETSc, and only `run` needs MPI.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from softjaw.friction.patch import ContactPatch as ContactPatch
+    from softjaw.study.lookup import GraspMap as GraspMap
+    from softjaw.study.messages import StudyError as StudyError
+    from softjaw.study.patch.measures import fit_ellipsoid as fit_ellipsoid
+    from softjaw.study.patch.measures import fit_quartic as fit_quartic
+    from softjaw.study.patch.measures import friction_limits as friction_limits
+    from softjaw.study.patch.measures import friction_wrench as friction_wrench
+    from softjaw.study.patch.measures import grasp_quality as grasp_quality
+    from softjaw.study.patch.measures import read_pressure as read_pressure
+    from softjaw.study.result.read import open as open
+    from softjaw.study.result.read import read_patch as read_patch
+    from softjaw.study.scene import Scene as Scene
+    from softjaw.study.solve import press as press
+    from softjaw.study.solve import run as run
 
 _HOMES = {
-    "ContactPatch": "friction.patch",
-    "friction_limits": "friction.wrench",
-    "friction_wrench": "friction.wrench",
-    "axis_aligned_ellipsoid": "lsfit.ellipsoid",
-    "convex_quartic": "lsfit.quartic_fit",
-    "score": "scoring.quality",
     "Scene": "study.scene",
-    "load_scene": "study.scene",
+    "press": "study.solve",
+    "run": "study.solve",
     "open": "study.result.read",
     "read_patch": "study.result.read",
-    "read_field": "study.result.read",
     "GraspMap": "study.lookup",
+    "ContactPatch": "friction.patch",
+    "read_pressure": "study.patch.measures",
+    "friction_limits": "study.patch.measures",
+    "friction_wrench": "study.patch.measures",
+    "fit_ellipsoid": "study.patch.measures",
+    "fit_quartic": "study.patch.measures",
+    "grasp_quality": "study.patch.measures",
+    "StudyError": "study.messages",
 }
 __all__ = sorted(_HOMES)
 
@@ -30,6 +48,8 @@ def __getattr__(name: str) -> Any:
     """A public name, from the module that defines it."""
     if name not in _HOMES:
         raise AttributeError(f"module 'softjaw' has no attribute {name!r}")
+    # Before numba is loaded, which refuses to compile where it cannot keep what it compiles.
+    import_module("softjaw.study.doctor").keep_compiled_loops()
     return getattr(import_module(f"softjaw.{_HOMES[name]}"), name)
 
 

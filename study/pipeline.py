@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,9 @@ from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.scene import Scene
 
 
-def solve_unit(unit: Any, wanted: Collection[int] | None = None) -> Iterator[tuple[int, CaseResult | CaseFailure]]:
+def solve_unit(
+    unit: Any, wanted: Collection[int] | None = None
+) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
     """Cases of one candidate, force by force upward, of which ``wanted`` are asked for, else all.
 
     Each force starts from the state at the one before, so that all up to the last one are solved; or it is independent
@@ -69,7 +71,8 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
     message = _notes(values["maps/flags"], fine, outcome.note)
-    return CaseResult(values, patch, message, effects_of(Simulated(scene, fine, fits, solving)))
+    effects = effects_of(Simulated(scene, fine, fits, solving))
+    return CaseResult(values, patch, message, effects, tuple(fine))
 
 
 def _notes(flags: int, contacts: Sequence[PressedContact], note: str) -> str:

@@ -22,7 +22,7 @@ ALLOWED = {
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "vtkmodules"}
-    | {"xarray", "(computed)"}
+    | {"xarray", "threadpoolctl", "(computed)"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
@@ -50,8 +50,8 @@ DOORS = {
 # everything, and imports what a command needs when it runs.
 ORDER = (
     "messages", "units", "flags", "quantities", "pictures", "templates", "page",
-    "scene", "case", "pipeline", "result", "ranking", "run", "accuracy", "lookup", "export", "patch", "show",
-    "doctor", "cli",
+    "scene", "case", "pipeline", "result", "one_case", "ranking", "run", "accuracy", "lookup", "export", "patch",
+    "show", "doctor", "launch", "solve", "cli",
 )  # fmt: skip
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in (ROOT / folder).rglob("*.py"))
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]

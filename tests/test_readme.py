@@ -16,7 +16,8 @@ from softjaw.study.doctor import launch_environment, mpirun
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
-BLOCKS = [block.strip().splitlines() for block in re.findall(r"^```\w*\n(.*?)^```$", TEXT, re.M | re.S)]
+FENCED = re.findall(r"^```(\w*)\n(.*?)^```$", TEXT, re.M | re.S)
+BLOCKS = [block.strip().splitlines() for language, block in FENCED if language != "python"]
 TYPED = re.compile(r"^(mkdir|cat) |softjaw ")
 TYPED_IN = [[line for line in block if TYPED.search(line)] for block in BLOCKS if not block[0].startswith("conda")]
 SOFTJAW = [list(block) for block in dict.fromkeys(map(tuple, TYPED_IN))]

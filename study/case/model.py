@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
 from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
 from softjaw.study.case.effects import backing_plate, backing_plate_level, pad_material
@@ -216,3 +218,18 @@ def _passes(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> boo
     except NoContactError:
         return True
     return False
+
+
+def check_petsc(wanted: dict[str, Any]) -> None:
+    """Refuse PETSc options that no solver asks for, or that PETSc itself refuses."""
+    try:
+        strange = unknown_options(wanted)
+    except PETSc.Error as error:
+        # the last line says what, the ones above it where in PETSc
+        reason = str(error).strip().splitlines()[-1].partition("] ")[2] or str(error)
+        given = " ".join(f"-{name} {value}" for name, value in wanted.items())
+        text = f"petsc: PETSc refuses the options {given}: {reason.strip()}; correct them or leave them out"
+        raise StudyError(USAGE, text) from error
+    if strange:
+        text = f"petsc: no solver asks for the option{'s' * (len(strange) > 1)} {', '.join(strange)}"
+        raise StudyError(USAGE, f"{text}; correct the spelling, or remove what does not apply to this solver")

@@ -14,13 +14,15 @@ class CaseResult:
     """Values of one case (candidate x force), keyed ``group/name`` as in ``study.quantities``.
 
     ``patch`` holds the faces of both fingers, keyed by dataset name, each ``(2, faces, ...)``; ``message`` is empty or
-    says what the reader should know about a result that is valid.
+    says what the reader should know about a result that is valid. ``contacts`` are both fingers as they were solved,
+    in the object's frame, for who has the case in memory; no file holds them.
     """
 
     values: dict[str, Any]
     patch: dict[str, Any] | None = None
     message: str = ""
     effects: dict[str, Any] = field(default_factory=dict)
+    contacts: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, write_file
-from softjaw.study.result.layout import DONE, MISSING
-from softjaw.study.result.read import dataset, open
+from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.show.tables import export as exported
@@ -19,7 +15,6 @@ from softjaw.study.show.tables.columns import terminal_width
 from softjaw.study.show.tables.compare import compare as compared
 from softjaw.study.show.tables.compare import comparison_csv, comparison_json, comparison_text
 from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
-from softjaw.study.show.tables.status import counts, reasons, time_split
 
 
 def watch(options: Namespace) -> int:
@@ -53,15 +48,6 @@ def export(options: Namespace) -> str:
         return text
     write_file(Path(options.output), f"{text}\n")
     return f"written: {options.output}"
-
-
-def summary(result: Any) -> str:
-    """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
-    width = terminal_width()
-    table = [as_text(best(dataset(result), whole_lines=True), width)] if np.any(result.status == DONE) else []
-    again = "; run the same command again to resume" if np.any(result.status == MISSING) else ""
-    lines = [counts(result), *reasons(result, width), *time_split(result), *table]
-    return "\n".join([*lines, f"results are in {result.path}{again}"])
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:

@@ -69,6 +69,12 @@ class GraspMap:
     the error of the cases themselves, which ``mesh_error`` of a point tells if the scene has ``accuracy.meshes = 2``.
     Along an axis of two values there is no second derivative, and half of their difference stands in. What is
     narrower than the spacing of the candidates stays unseen.
+
+    Examples
+    --------
+    >>> grasps = GraspMap("results/smoke.hdf")
+    >>> len(grasps.best(2, by="quality", force=2.0)), grasps.quantities["e_n"][0]
+    (2, 'm')
     """
 
     def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:

@@ -12,6 +12,7 @@ from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.lookup.pads import pad_poses
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
+from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.units import shown_text
 
 if TYPE_CHECKING:
@@ -162,9 +163,7 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
-        from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
-        from softjaw.lsfit.form import exponents
-        from softjaw.lsfit.quartic import Quartic
+        from softjaw.lsfit.ellipsoid import Ellipsoid
 
         if finger not in (1, 2):
             raise ValueError(f"finger is {finger!r}: expected 1 or 2")
@@ -178,11 +177,9 @@ class GraspPoint:
         mu = self.fingers("f_x_max", "pcm")[finger - 1] / S
         P, A = self.coefficients(model)[finger - 1], self.fingers("limit_surface/matrix", model)[finger - 1]
         unit = mu * S * np.array([1.0, 1.0, rho])
-        if np.isfinite(P).all():
-            return Quartic(P, exponents(3, 4)).scaled(unit)
-        if np.isfinite(A).all():
-            return TiltedEllipsoid(A).scaled(unit)
-        raise ValueError("the cases around have no fitted surface of one kind: take fitted=False")
+        if (surface := fitted_surface(P, A)) is None:
+            raise ValueError("the cases around have no fitted surface of one kind: take fitted=False")
+        return surface.scaled(unit)
 
     def __str__(self) -> str:
         """Main quantities at one point, in a few lines."""

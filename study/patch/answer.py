@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import Pose
-from softjaw.friction.frame import FrameFlag, behind, wound
-from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
+from softjaw.friction.frame import FrameFlag, behind, principal_direction, wound
+from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.evaluate import exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
 from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.patch.contacts import check_facing, exact_surface, grasp_lengths, opposite
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene.problems import Problem
@@ -32,10 +31,7 @@ SURFACES = {  # as a scene names them, and in the text
     "quartic": "convex quartic",
 }
 FITTED_ON = 500  # motions; a fit is judged on others
-EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
-EQUAL = 1e-6  # relative difference of extents, and difference of cosines, that decide nothing
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
-HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
 LIMITS = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "e_n": "e_n", "e_n_projected": "e_n_projected"}
 FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
 UNITS = {
@@ -128,12 +124,8 @@ def evaluate_patch(read: ReadPatch, mu: float, long_side: FloatArray | None = No
         remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
         refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
 
-    def exact(model: str) -> ExactSurface:
-        share = mu / contact.limits[model].S
-        return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, EXACT)
-
     fits = {m: fit_surfaces(contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS}
-    return EvaluatedPatch(read, contact, long_side is not None, fits, {m: exact(m) for m in MODELS})
+    return EvaluatedPatch(read, contact, long_side is not None, fits, {m: exact_surface(contact, m) for m in MODELS})
 
 
 def _minority(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -145,24 +137,6 @@ def _count(read: ReadPatch, chosen: NDArray[np.bool_]) -> str:
     """How many of the loaded faces ``(n,)`` are chosen, and where the first of them stands in the file."""
     first = f", the first in {read.place(int(np.argmax(chosen)))}" if chosen.any() else ""
     return f"{int(chosen.sum())} of {len(chosen)} loaded faces{first}"
-
-
-def principal_direction(patch: ContactPatch) -> FloatArray:
-    """Direction ``(3,)`` in which the loaded faces extend most, across their mean normal.
-
-    Where no direction is longer it is the file's axis that lies most nearly in the contact plane. Its largest component
-    is positive; of equally large ones the first.
-    """
-    faces = patch.loaded
-    N = faces.load @ faces.normal
-    N = N / max(np.linalg.norm(N), np.finfo(float).tiny)
-    across = np.eye(3) - np.outer(N, N)
-    offset = (faces.centroid - faces.area @ faces.centroid / faces.area.sum()) @ across
-    spread, directions = np.linalg.eigh(offset.T @ (faces.area[:, None] * offset))
-    if spread[2] - spread[1] <= EQUAL * spread[2]:
-        return np.eye(3)[np.argmax(np.abs(N) <= np.abs(N).min() + EQUAL)]
-    longest = directions[:, 2]
-    return longest * np.sign(longest[np.argmax(np.abs(longest) >= np.abs(longest).max() - EQUAL)])
 
 
 # --- grasp ------------------------------------------------------------------------------------------------------------
@@ -192,42 +166,18 @@ def grasp_record(
         longer side of the larger contact [m].
     """
     both = one, two or one
-    contacts = one.contact, two.contact if two else _opposite(one.contact, float(distance or 0.0))
+    contacts = one.contact, two.contact if two else opposite(one.contact, float(distance or 0.0))
     if two is not None:
-        check_facing(contacts, (one.read.file, two.read.file))
-    d = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
-    lengths = object_length or d, contact_length or max(c.rho for c in contacts)
+        try:
+            check_facing(contacts, (one.read.file, two.read.file))
+        except ValueError as error:
+            raise StudyError(USAGE, f"--other: {error}") from error
+    d, *lengths = grasp_lengths(contacts, object_length, contact_length)
     score = {m: exact_score(soft(contacts, [p.surface(m, kind) for p in both]), *lengths) for m in MODELS}
     return {
         "surface": kind, "distance": d, "object_length": lengths[0], "contact_length": lengths[1],
         "misalignment": max(angles(*contacts)), "slips": bool(pose_flags(contacts) & Flag.SLIPS), "score": score,
     }  # fmt: skip
-
-
-def _opposite(contact: Contact, distance: float) -> Contact:
-    """The same contact facing this one, half a turn about its x away."""
-    axes, origin = contact.frame.axes, contact.frame.origin
-    # half a turn that leaves the contact's own x where it is, seen from the object
-    turn = axes.T @ HALF_TURN @ axes
-    return contact.at(Pose(turn, origin + distance * axes[2] - turn @ origin))
-
-
-def check_facing(contacts: Sequence[Contact], files: Sequence[str]) -> None:
-    """Refuse contacts at one place, and normals that point away from the other contact."""
-    line = contacts[1].origin - contacts[0].origin
-    distance = float(np.linalg.norm(line))
-    if distance <= 1e-9 * max(c.rho for c in contacts):
-        text = f"--other: {files[1]} has its contact at the same place as {files[0]}"
-        raise StudyError(USAGE, f"{text}; both files have to use the coordinates of one object")
-    pairs = zip(contacts, files, (line, -line), strict=True)
-    away = [file for c, file, to in pairs if c.normal @ to < -EQUAL * distance]
-    if away:
-        found, remedy = f"the normals of {away[0]} and {away[-1]} point away from each other", "add --flip-normals"
-        if len(away) == 1:
-            found = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
-            remedy = f"turn the normals of {away[0]}"
-        expected = "expected the direction in which each finger presses, into the object"
-        raise StudyError(USAGE, f"--other: {found}, {expected}; {remedy}")
 
 
 # --- record -----------------------------------------------------------------------------------------------------------

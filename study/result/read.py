@@ -43,6 +43,12 @@ def open(file: str | Path) -> xr.Dataset:
     ------
     StudyError
         The file cannot be read, is damaged, or is not a result file of this program.
+
+    Examples
+    --------
+    >>> ds = open("results/smoke.hdf")
+    >>> ds["e_n"].attrs["units"], ds["e_n"].sel(model="ccm").interp(normal_force=1.5).dims
+    ('m', ('station', 'angle'))
     """
     with open_result(file) as result:
         return dataset(result)
@@ -76,7 +82,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
     with open_result(file) as result:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
         rows = rows.isel(at)
-        faces = [result.patch(int(row)) for row in rows.values.ravel()]
+        faces = [result.patch(int(row)) for row in rows.values.ravel()] if result.layout.patches else []
         found = {}
         for name in faces[0] if faces else ():
             values = np.stack([one[name] for one in faces]).reshape(rows.shape + faces[0][name].shape)

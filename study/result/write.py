@@ -27,12 +27,15 @@ from softjaw.study.scene.text import differences
 class ResultWriter:
     """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not.
 
-    With ``comm = None`` this process has it alone and needs no MPI.
+    With ``comm = None`` this process has it alone and needs no MPI; nor does a single rank.
     """
 
     def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
         if comm is not None and not h5py.get_config().mpi:
-            raise StudyError(CANNOT_WRITE, "this h5py was built without MPI; 'softjaw doctor' says how to cure that")
+            if comm.size > 1:
+                text = "this h5py was loaded without MPI; 'softjaw doctor' says how to cure that"
+                raise StudyError(CANNOT_WRITE, f"{text}, and a script reads results after softjaw.run only")
+            comm = None
         self.path, self.layout = path, layout
         shared = {} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(path, "r+", libver=LIBVER, **shared)

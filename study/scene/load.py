@@ -19,6 +19,7 @@ from softjaw.study.scene.model import (
     Scene,
     checked_sections,
     keys_by_place,
+    plain_tables,
     put,
     section_model,
 )
@@ -68,8 +69,20 @@ def parse_scene(
 
     ``check_files = False`` leaves out whether a mesh exists, for a text kept in a result file.
     """
-    path, given = Path(path), dict[KeyPath, Place]()
-    data = parse_toml(text, str(path))
+    path = Path(path)
+    return _scene(parse_toml(text, str(path)), text, path, overrides, check_files)
+
+
+def scene_of(tables: Mapping[str, Any]) -> Scene:
+    """The scene of tables as a file would have them; see `Scene.from_dict`."""
+    return _scene(plain_tables(tables), "", Path("scene"))
+
+
+def _scene(
+    data: dict[str, Any], text: str, path: Path, overrides: Sequence[str] = (), check_files: bool = True
+) -> Scene:
+    """The scene of tables that stand in a text, if any, of the file ``path``."""
+    given = dict[KeyPath, Place]()
     if isinstance(data.get("sweep"), dict):
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     problems = _put_overrides(data, overrides, given)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -54,14 +54,56 @@ def _optional(model: type[SceneSection]) -> Any:
     return Field(default_factory=model)
 
 
-class Scene(SceneSection):
+class _Loaded(type(SceneSection)):  # type: ignore[misc]
+    """Gives the class `Scene` a function that its instances have a section for: ``Scene.load``."""
+
+    def load(cls, file: str | Path, overrides: Sequence[str] = ()) -> Scene:
+        """The scene of a file.
+
+        Parameters
+        ----------
+        file : path
+            Scene as TOML; a mesh that it names is looked for from the file's folder.
+        overrides : sequence of str
+            ``section.key=value`` as behind ``--set``.
+
+        Raises
+        ------
+        SceneError
+            With every problem found, each a sentence with file, line and key. It is a `ValueError`.
+
+        Examples
+        --------
+        >>> Scene.load("jobs/smoke.toml", ["gripper.pad_width_mm=20"]).gripper.pad_width
+        0.02
+        """
+        from softjaw.study.scene.load import load_scene  # which makes scenes, so it stands above this module
+
+        return load_scene(file, overrides)
+
+
+if TYPE_CHECKING:
+
+    class _SectionOrLoader(Protocol):
+        """What ``load`` is of a scene, and of the class `Scene`."""
+
+        @overload
+        def __get__(self, scene: None, owner: type[Scene], /) -> Callable[..., Scene]: ...
+        @overload
+        def __get__(self, scene: Scene, owner: type[Scene], /) -> Load: ...
+
+else:
+    _SectionOrLoader = Load
+
+
+class Scene(SceneSection, metaclass=_Loaded):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
     object: Object
     gripper: Gripper = _optional(Gripper)
     friction: Friction = _optional(Friction)
     candidates: Candidates
-    load: Load
+    load: _SectionOrLoader = Field(...)  # or the function of the class would be its default
     limit_surface: LimitSurfaceKeys = _optional(LimitSurfaceKeys)
     score: ScoreKeys = _optional(ScoreKeys)
     task: TaskKeys = _optional(TaskKeys)
@@ -160,9 +202,58 @@ class Scene(SceneSection):
         data["sweep"] = list(self.sweep.items())  # the order of the axes counts
         return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
-    def with_values(self, values: Mapping[str, Option]) -> Scene:
-        """The scene with values of dotted keys put in and without a sweep; `SceneError` where that is no scene."""
-        sections, wrong = checked_sections(put(self.effective(), values))
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any]) -> Scene:
+        """The scene of tables like those of a file: sections with their keys, units in the keys.
+
+        Parameters
+        ----------
+        tables : mapping of mappings
+            A mesh that it names is looked for from the working directory.
+
+        Raises
+        ------
+        SceneError
+            With every problem found, each a sentence with its key. It is a `ValueError`.
+
+        Examples
+        --------
+        >>> ball = {"shape": "sphere", "radius_mm": 30}
+        >>> tables = {"object": ball, "candidates": {"stations_mm": [0]}, "load": {"normal_force_n": [1, 2]}}
+        >>> Scene.from_dict(tables).object.radius
+        0.03
+        """
+        from softjaw.study.scene.load import scene_of
+
+        return scene_of(tables)
+
+    def with_values(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> Scene:
+        """The scene with values of dotted keys put in, and without its sweep.
+
+        Parameters
+        ----------
+        values, **more
+            Values by dotted key, in the key's own unit: ``scene.with_values(**{"gripper.shear_modulus_kpa": 60})``.
+            None takes a key out, which then has its default.
+
+        Raises
+        ------
+        SceneError
+            With everything that is wrong then. It is a `ValueError`.
+
+        Examples
+        --------
+        >>> ball = {"shape": "sphere", "radius_mm": 30}
+        >>> tables = {"object": ball, "candidates": {"stations_mm": [0]}, "load": {"normal_force_n": [1, 2]}}
+        >>> Scene.from_dict(tables).with_values(**{"object.radius_mm": 20}).object.radius
+        0.02
+        """
+        return Scene.of_tables(put(self.effective(), plain_tables({**(values or {}), **more})))
+
+    @classmethod
+    def of_tables(cls, tables: Mapping[str, Any]) -> Scene:
+        """The scene of tables in which everything is filled in, as `effective` gives them, and without a sweep."""
+        sections, wrong = checked_sections(tables)
         if wrong:
             raise _scene_error(wrong)
         return Scene(**sections)
@@ -194,6 +285,27 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
         section, _, name = key.partition(".")
         tables.setdefault(section, {})[name] = value
     return {**data, **tables, "sweep": {}}
+
+
+def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of tables, or of values by dotted key, with lists and numbers instead of numpy's.
+
+    Raises
+    ------
+    TypeError
+        For what is no mapping by text.
+    """
+    if not isinstance(tables, Mapping) or not all(isinstance(key, str) for key in tables):
+        raise TypeError(f"tables of a scene: found {shown(tables)}, expected a mapping of sections, {{'object': ...}}")
+    return {key: _plain(value) for key, value in tables.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return plain_tables(value)
+    if isinstance(value, list | tuple):
+        return [_plain(member) for member in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _scene_error(wrong: Iterable[Finding]) -> SceneError:

@@ -11,13 +11,12 @@ import xarray as xr
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
-from softjaw.lsfit.form import exponents
-from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
 from softjaw.study.result.layout import DONE
+from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.show.grasps import Index, field
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface
@@ -124,16 +123,9 @@ def stored_surface(
     ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
     unit = planar * np.array([1.0, 1.0, rho]) * SHOWN
     patch = _patch(ds, index, finger, faces or {})
-    return StoredSurface(unit, float(rho), ellipsoid, _chosen(ds, index, finger, m), patch, model)
-
-
-def _chosen(ds: xr.Dataset, index: Index, finger: int, m: int) -> LimitSurface | None:
-    for name in ("coefficients", "matrix"):
-        found = field(ds, f"limit_surface_{name}")
-        if found is not None and np.isfinite(found[index][finger, m]).all():
-            known = found[index][finger, m]
-            return Quartic(known, exponents(3, 4)) if name == "coefficients" else TiltedEllipsoid(known)
-    return None
+    fits = (field(ds, f"limit_surface_{name}") for name in ("coefficients", "matrix"))
+    chosen = fitted_surface(*(np.full(1, np.nan) if fit is None else fit[index][finger, m] for fit in fits))
+    return StoredSurface(unit, float(rho), ellipsoid, chosen, patch, model)
 
 
 def _patch(ds: xr.Dataset, index: Index, finger: int, faces: dict[str, np.ndarray]) -> ContactPatch | None:

@@ -137,9 +137,9 @@ def main():
     options = parser.parse_args()
     from mpi4py import MPI
 
-    from softjaw.study.cli.results import summary
     from softjaw.study.messages import StudyError, complain
     from softjaw.study.run.session import Work, run_study
+    from softjaw.study.show.tables.summary import summary
 
     comm = MPI.COMM_WORLD
     if options.file_limit:

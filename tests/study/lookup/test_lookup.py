@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import timeit
@@ -338,27 +337,6 @@ def test_it_needs_neither_mpi_nor_petsc(tmp_path):
     value, loaded = done.stdout.splitlines()
     assert float(value) == pytest.approx(linear(0.01, 0.1, 2))
     assert loaded == "[]"
-
-
-def test_the_notebook_runs(tmp_path, monkeypatch):
-    """Its cells in order, on a file that stands where the notebook's own run would put it."""
-    pytest.importorskip("matplotlib").use("Agg")
-    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
-    (tmp_path / "results").mkdir()
-    make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
-    monkeypatch.chdir(tmp_path)
-    book = json.loads((ROOT / "jobs" / "lookup.ipynb").read_text(encoding="utf-8"))
-    assert (book["nbformat"], book["nbformat_minor"] >= 5) == (4, True)
-    assert all({"id", "cell_type", "metadata", "source"} <= set(cell) for cell in book["cells"])
-    assert len({cell["id"] for cell in book["cells"]}) == len(book["cells"])
-    names: dict = {"__name__": "__main__"}
-    for cell in book["cells"]:
-        if cell["cell_type"] == "code":
-            assert cell["outputs"] == []
-            assert cell["execution_count"] is None
-            exec(compile("".join(cell["source"]), f"cell {cell['id']}", "exec"), names)
-    assert names["point"].ok
-    assert names["surface"].semi_axes.shape == (3,)
 
 
 def test_the_readme_says_how(tmp_path, monkeypatch):

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from softjaw.friction.frame import FrameFlag
+from softjaw.friction.frame import FrameFlag, principal_direction
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
-from softjaw.study.messages import StudyError
-from softjaw.study.patch.answer import SURFACES, check_facing, evaluate_patch, principal_direction
+from softjaw.study.patch.answer import SURFACES, evaluate_patch
 from softjaw.study.patch.answer_text import PLANES, section
+from softjaw.study.patch.contacts import check_facing
 from softjaw.study.patch.faces import corner_geometry
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from tests.friction.closed_forms import cylinder_torque
@@ -343,9 +343,9 @@ def test_a_grasp_across_its_line_hangs_on_no_rounding():
 
     _, Y, Z = np.eye(3)
     for turn in Rotation.random(200, random_state=1):
-        with pytest.raises(StudyError, match="away from the other contact and those of the other towards it"):
+        with pytest.raises(ValueError, match="away from the other contact and those of the other towards it"):
             facing(turn, Y)  # the second one looks away, the first one neither way
-        with pytest.raises(StudyError, match="point away from each other"):
+        with pytest.raises(ValueError, match="point away from each other"):
             facing(turn, [0, 1, -1e-5])
 
 

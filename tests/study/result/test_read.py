@@ -15,7 +15,7 @@ from softjaw.study.flags import Flag
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.quantities import STATES
 from softjaw.study.result.layout import DONE, FAILED, MISSING
-from softjaw.study.result.read import FIELDS
+from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
@@ -126,7 +126,7 @@ def test_what_is_no_sound_result_file_is_refused(half, tmp_path):
         softjaw.open(torn)
     assert refused.value.code == OTHER_FILE
     with pytest.raises(KeyError):
-        softjaw.read_field(half, "wall/place")
+        read_field(half, "wall/place")
 
 
 @pytest.mark.launches

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from argparse import Namespace
 
 import pytest
 
 from softjaw.study.case.build import build_object, check_object, shapes_of, warnings
 from softjaw.study.cli import main
 from softjaw.study.cli.quick import petsc_overrides
-from softjaw.study.cli.running import prepare
+from softjaw.study.launch import prepare
 from softjaw.study.messages import StudyError
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.scene.objects import SphereShape
@@ -106,7 +105,7 @@ def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
 def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options, sentence):
     scene = load_scene(ROOT / "jobs" / "smoke.toml", petsc_overrides(options.split()))
     with pytest.raises(StudyError, match=f"^{sentence}") as refused:
-        prepare(scene, Namespace(scene="smoke.toml", overrides=[], petsc=options.split()))
+        prepare(scene, "smoke.toml", [])
     assert refused.value.code == 2
 
 
@@ -195,7 +194,7 @@ def test_plan_and_run_warn_as_check_does(tmp_path, capsys):
     for command in ("check", "plan"):
         assert main([command, str(scene)]) == 0
         said.append(warned())
-    prepare(load_scene(scene), Namespace(scene=str(scene), overrides=[], petsc=[]))  # what a run begins with
+    prepare(load_scene(scene), str(scene), [])  # what a run begins with
     said.append(warned())
     assert len(said[0]) == 1
     assert said[1:] == said[:1] * 2

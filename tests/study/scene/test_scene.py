@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -509,3 +510,29 @@ def test_a_mass_is_given_in_grams_and_the_centre_of_mass_in_mm():
     assert scene.object.mass == 0.25
     assert scene.task.centre_of_mass == (0.0, 0.0, 0.005)
     assert parse_scene(BALL).task.centre_of_mass is None
+
+
+def test_a_scene_from_tables_is_that_of_a_file_and_takes_numpy(tmp_path):
+    ball = {"shape": "sphere", "radius_mm": np.float64(30)}
+    made = Scene.from_dict({
+        "object": ball, "candidates": {"stations_mm": np.array([0, 10])}, "load": {"normal_force_n": [np.int64(1), 2]},
+        "sweep": {"friction": {"mu": [0.5, 0.8]}}, "output": {"file": "results/scene.hdf"},
+    })  # fmt: skip
+    file = tmp_path / "ball.toml"
+    file.write_text(made.effective_toml())
+    assert Scene.load(file) == made == load_scene(str(file))
+    assert Scene.load(file, ["object.radius_mm=20"]).object.radius == 0.02
+    assert made.with_values(**{"gripper.elements": np.array([8, 4, 2])}).gripper.elements == (8, 4, 2)
+    assert type(made.load.normal_force[0]) is float  # the section, not the function of the class
+
+
+@pytest.mark.parametrize("tables", [5, {5: {}}, {"object": {5: 1}}])
+def test_tables_that_are_none_are_refused(tables):
+    with pytest.raises(TypeError, match="expected a mapping of sections"):
+        Scene.from_dict(tables)
+
+
+def test_what_is_wrong_with_tables_is_named_by_its_key():
+    with pytest.raises(SceneError) as refused:
+        Scene.from_dict({"object": {"shape": "mesh", "mesh": "none.stl", "unit": "mm"}, "load": 5})
+    assert [p.key for p in refused.value.problems] == ["candidates", "load", "object.mesh"]

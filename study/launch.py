@@ -1,0 +1,109 @@
+"""A study from its scene to its finished file: plan, how cases are solved, what is written and said at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from softjaw.study import pipeline
+from softjaw.study.accuracy.target import settled
+from softjaw.study.case.build import check_object, told, with_sampled_grasps
+from softjaw.study.case.model import check_petsc, check_poses
+from softjaw.study.result import derived
+from softjaw.study.result.read import dataset
+from softjaw.study.run.plan import make_plan
+from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
+from softjaw.study.run.session import Growth, Work, on_rank0, run_study
+from softjaw.study.scene import Scene
+from softjaw.study.show.report.verdict import plain_report
+from softjaw.study.show.tables.summary import summary
+
+
+def solve_scene(
+    scene: Scene,
+    path: Path,
+    comm: Any,
+    *,
+    scene_file: str = "",
+    overrides: Sequence[str] = (),
+    retry_failed: bool = False,
+) -> int:
+    """Solve a scene into its file, or what is missing there; collective over ``comm``.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+        Result file.
+    comm : mpi4py communicator
+    scene_file, overrides : str, sequence of str
+        Where the scene comes from, and what was changed by ``--set``; kept in the file.
+    retry_failed : bool
+        Whether cases that failed before are tried again.
+
+    Returns
+    -------
+    int
+        Exit code, the same on every rank; `study.messages.MEANING` says what it means.
+
+    Raises
+    ------
+    StudyError
+        On every rank: nothing was started, or the file is in use or cannot be written.
+    """
+    scene, choice = on_rank0(comm, with_target_met, scene, path)
+    given = [*overrides, *(choice.overrides() if choice else [])]
+    plan = on_rank0(comm, prepare, scene, scene_file, given)
+    growth = _growth(scene, plan, choice, comm)
+    return run_study(plan, work(scene, choice), path, comm, retry_failed=retry_failed, growth=growth)
+
+
+def _growth(scene: Scene, plan: Any, choice: Any, comm: Any) -> Growth:
+    """How the grasps of a scene are refined; also a file that has been refined already needs it."""
+    each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
+
+    def study(rounds: Rounds) -> tuple[Any, Work]:
+        made = on_rank0(comm, make_plan, scene, *about, True, rounds)
+        return made, work(refined(scene, rounds), choice)
+
+    return Growth(study, lambda result: next_round(result, scene, each))
+
+
+def with_target_met(scene: Scene, path: Path) -> tuple[Scene, Any]:
+    """The scene with its sampled grasps and what its target of accuracy chooses, and the choice; by one rank."""
+    scene = with_sampled_grasps(scene)
+    if scene.accuracy.e_n is None:
+        return scene, None
+    check_object(scene)
+    return settled(scene, path, lambda text: print(text, flush=True))
+
+
+def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
+    """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
+    # A wrong option would fail every case alike, after hours of a large study.
+    check_petsc(dict(scene.petsc))
+    plan = make_plan(scene, scene_file, overrides, ordered=True)
+    check_poses(scene, [unit.scene for unit in plan.units])
+    for line in told(scene):
+        print(line, flush=True)
+    return plan
+
+
+def work(scene: Scene, choice: Any = None) -> Work:
+    """How the cases of a scene are solved; ``choice`` is what its target of accuracy chose."""
+
+    def finalise(writer: Any) -> None:
+        if choice is not None:
+            choice.fill(writer)
+        derived.finalise(writer, scene)
+        writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
+
+    return Work(
+        solve_unit=pipeline.solve_unit,
+        image=pipeline.image,
+        finalise=finalise,
+        summary=summary,
+        time_limit=scene.run.time_limit_s,
+        memory=scene.run.memory_gb,
+    )

@@ -1,0 +1,343 @@
+"""One case in memory: the numbers that a run of the scene stores for a grasp candidate and a force, without a file.
+
+A grasp or a force that the scene does not have is added to its own, so the case is that of a run with it: its load
+path leads through the scene's forces below, and a candidate that is an image of another one is solved there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.fem.objects.gap import Pose
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import FrictionLimits
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.study import pipeline
+from softjaw.study.case.build import check_object, with_sampled_grasps
+from softjaw.study.case.candidates import units
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.fit import decided
+from softjaw.study.case.model import check_petsc
+from softjaw.study.case.result import CaseFailure, CaseResult
+from softjaw.study.flags import Flag, flags_in
+from softjaw.study.messages import SOME_FAILED, StudyError
+from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE
+from softjaw.study.result.surfaces import fitted_surface
+from softjaw.study.scene import Scene
+from softjaw.study.units import converted, shown_text
+
+if TYPE_CHECKING:
+    from softjaw.lsfit.surface import LimitSurface
+
+FloatArray = NDArray[np.float64]
+SAME = {"rel_tol": 1e-9, "abs_tol": 1e-12}  # stations [m], angles [deg] and forces [N] that are the scene's own
+ERROR, OF_MESH = "_error", ("two meshes", "two scores")  # how the names of error estimates end, and what they need
+
+
+class CaseError(StudyError):
+    """A case without values: it failed, or its gripper does not fit round the object."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(SOME_FAILED, message)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A grasp candidate at a normal force, solved; made by `softjaw.press`.
+
+    Attributes
+    ----------
+    scene : Scene
+        With this case among its own.
+    station, angle, force : float
+        [m], [rad], [N]; with explicit poses ``station`` is the candidate's number and the angle is 0.
+    label : str
+        Name of the candidate.
+    result : CaseResult
+        All that a run stores, in ``result.values`` by ``group/name``, in SI units.
+    """
+
+    scene: Scene
+    station: float
+    angle: float
+    force: float
+    label: str
+    result: CaseResult
+
+    def value(self, name: str, model: str = "ccm") -> float:
+        """A quantity of the grasp in SI units, of one friction model where it has several.
+
+        Raises
+        ------
+        KeyError
+            For a name that the case does not have.
+        """
+        found = np.asarray(self._read(f"maps/{name}"))
+        return float(found[MODELS.index(_checked(model))] if found.ndim else found)
+
+    def fingers(self, name: str, model: str = "ccm") -> FloatArray:
+        """A quantity of both fingers ``(2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
+        key = name if "/" in name else f"fingers/{name}"
+        found = np.asarray(self._read(key))
+        return found[:, MODELS.index(_checked(model))] if "model" in BY_KEY[key].dims else found
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Error estimates by quantity, in its unit: differences to a mesh half as fine; none where there is one mesh.
+
+        They are those of the curved model.
+        """
+        found = {}
+        for q in TABLE:
+            if q.group == "maps" and q.needs in OF_MESH and q.name.endswith(ERROR) and q.key in self.result.values:
+                of = q.relative_to or q.name.removesuffix(ERROR)
+                found[of] = self.value(q.name) * (abs(self.value(of)) if q.relative_to else 1.0)
+        return found
+
+    @property
+    def e_n(self) -> float:
+        """Eccentricity parameter of the weaker finger, CCM [m]."""
+        return self.value("e_n")
+
+    @property
+    def quality(self) -> float:
+        """Grasp quality, CCM [-]."""
+        return self.value("quality")
+
+    @property
+    def payload(self) -> float:
+        """Largest mass that is held, CCM [kg]."""
+        return self.value("payload")
+
+    @property
+    def opening(self) -> float:
+        """Distance of the undeformed pads as they touch the object [m]: open the gripper wider."""
+        return self.value("opening")
+
+    @property
+    def pose(self) -> tuple[FloatArray, FloatArray]:
+        """Rotations ``(2, 3, 3)`` and origins ``(2, 3)`` [m] of both pads at first touch; see `GraspPoint.pose`."""
+        return self.fingers("pose_rotation"), self.fingers("pose_origin")
+
+    @property
+    def flags(self) -> Flag:
+        """What there is to know of the case, as flags; `notes` says it."""
+        return Flag(int(self.value("flags")))
+
+    @property
+    def notes(self) -> str:
+        """The same and more in sentences; empty where all is well."""
+        return self.result.message
+
+    @property
+    def contacts(self) -> tuple[Contact, Contact]:
+        """Both fingers: patch, contact frame, friction limits, in the frame of the object's own file."""
+        one, two = (c.at(Pose(R, x)) for c, R, x in zip(self.result.contacts, *self.pose, strict=True))
+        return one, two
+
+    @property
+    def weaker(self) -> int:
+        """The finger with the smaller e_n (CCM), 1 or 2; 1 where they are alike."""
+        one, two = (c.limits["ccm"].e_n for c in self.result.contacts)
+        return 2 if two < one else 1
+
+    @property
+    def patch(self) -> ContactPatch:
+        """Contact patch of the weaker finger, in its pad's frame; ``contacts`` has both."""
+        return self.contacts[self.weaker - 1].patch
+
+    @property
+    def limits(self) -> dict[str, FrictionLimits]:
+        """Friction limits of the weaker finger by friction model (ccm, pcm, pcm_projected)."""
+        return self.contacts[self.weaker - 1].limits
+
+    def limit_surface(self, finger: int, model: str = "ccm", fitted: bool = True) -> LimitSurface:
+        """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m]; see `GraspPoint.limit_surface`."""
+        if finger not in (1, 2):
+            raise ValueError(f"finger is {finger!r}: expected 1 or 2")
+        contact = self.result.contacts[finger - 1]
+        S = contact.limits[_checked(model)].S
+        if not fitted:
+            return Ellipsoid(contact.ellipsoids[model].semi_axes * S)
+        names = ("limit_surface/coefficients", "limit_surface/matrix")
+        surface = fitted_surface(*(self.fingers(name, model)[finger - 1] for name in names))
+        if surface is None:
+            raise ValueError("the contact carries no load in some direction, so no body was fitted: take fitted=False")
+        return surface.scaled(contact.mu * S * np.array([1.0, 1.0, contact.rho]))
+
+    def __str__(self) -> str:
+        """Main quantities in a few lines, with their errors where they are known."""
+        lines, errors = [f"{self.label}, {self.force:g} N"], self.errors
+        for name in (n for n in MAIN if f"maps/{n}" in self.result.values):
+            units = BY_KEY[f"maps/{name}"].unit
+            error = f"  +- {shown_text(errors[name], units, 2)}" if name in errors else ""
+            lines.append(f"  {name:<14} {shown_text(self.value(name), units, 5)}{error}")
+        return "\n".join([*lines, *(f"  {flag.sentence}" for flag in flags_in(self.flags))])
+
+    def _read(self, key: str) -> Any:
+        if key not in self.result.values:
+            group = key.partition("/")[0]
+            known = sorted(name.partition("/")[2] for name in self.result.values if name.startswith(f"{group}/"))
+            raise KeyError(f"{key} is not a value of this case; {group}/ has {', '.join(known)}")
+        return self.result.values[key]
+
+
+def _checked(model: str) -> str:
+    if model not in MODELS:
+        raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
+    return model
+
+
+# --- from the question to the case ------------------------------------------------------------------------------------
+
+
+def solved_case(
+    scene: Scene,
+    station: float | None,
+    angle: float | None,
+    force: float,
+    candidate: int | None = None,
+    pose: Any = None,
+) -> Case:
+    """Solve one case; arguments and errors as for `softjaw.press`."""
+    _refuse_open_questions(scene)
+    scene, number = _asked(scene, station, angle, candidate, pose)
+    scene, k = _at_force(scene, force)
+    try:
+        check_object(scene)
+    except StudyError as error:  # here a station off a mesh is an argument
+        raise ValueError(str(error)) from error
+    if scene.petsc:
+        check_petsc(dict(scene.petsc))
+    row = number * len(scene.load.normal_force_n) + k
+    served = ((u, c) for u in units(scene, lambda s: s.axis_symmetry) for c, own in enumerate(u.rows) if row in own)
+    unit, c = next(served)
+    place, what = unit.served[c], f"{unit.served[c].label}, {scene.load.normal_force_n[k]:g} N"
+    unit = decided([unit])[0]
+    if unit.state:
+        raise CaseError(f"{what}: {STATES[unit.state]}: {unit.reason}")
+    result = pipeline.image(_outcome(unit, k, what), unit, c)
+    return Case(scene, place.station, place.angle, scene.load.normal_force[k], place.label, result)
+
+
+def _outcome(unit: Any, k: int, what: str) -> CaseResult:
+    """Result of the ``k``-th force of a unit."""
+    outcomes = pipeline.solve_unit(unit, [k])
+    try:
+        found = next(result for number, result in outcomes if number == k)
+    except (ArithmeticError, MemoryError, RuntimeError, ValueError) as error:  # a run stores it as the case's failure
+        raise CaseError(f"{what}: {type(error).__name__}: {error}") from error
+    finally:
+        outcomes.close()
+    if isinstance(found, CaseFailure):
+        raise CaseError(f"{what}: {found.message}")
+    return found
+
+
+def _refuse_open_questions(scene: Scene) -> None:
+    """A case needs a scene that says all: no sweep, and no target that would choose a mesh."""
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.load(file) gives")
+    if scene.sweep:
+        key, values = next(iter(scene.sweep.items()))
+        remedy = f"choose a point of it by scene.with_values(**{{{key!r}: {values[0]!r}}})"
+        raise ValueError(f"scene has a sweep of {', '.join(scene.sweep)}, a case has one value of each; {remedy}")
+    if scene.accuracy.e_n is not None:
+        remedy = "take it out by scene.with_values(**{'accuracy.e_n': None}), or set gripper.elements"
+        raise ValueError(f"accuracy.e_n = {scene.accuracy.e_n:g} chooses the mesh of a whole run; {remedy}")
+
+
+def _asked(
+    scene: Scene, station: float | None, angle: float | None, candidate: int | None, pose: Any
+) -> tuple[Scene, int]:
+    """The scene with the candidate that is asked for among its own, and the candidate's number."""
+    given = {"station": station is not None, "candidate": candidate is not None, "pose": pose is not None}
+    if sum(given.values()) != 1:
+        found = " and ".join(name for name in given if given[name]) or "none of them"
+        raise ValueError(f"found {found}, expected one of station (with an angle), candidate and pose")
+    if pose is not None:
+        poses = [*scene.effective()["candidates"].get("poses", ()), grasp_pose(pose)]
+        return _with_candidates(scene, {"poses": poses}), len(poses) - 1
+    if candidate is not None:
+        scene = with_sampled_grasps(scene)
+        count = len(scene.candidates.poses)
+        if not count:
+            raise ValueError("the candidates of this scene are stations and angles: give station and angle")
+        if candidate not in range(count):
+            raise ValueError(f"candidate is {candidate}: expected a number from 0 to {count - 1}")
+        return _with_candidates(scene, {"poses": scene.effective()["candidates"]["poses"]}), int(candidate)
+    return _at_station(scene, _number("station", station, "m"), angle)
+
+
+def _at_station(scene: Scene, station: float, angle: float | None) -> tuple[Scene, int]:
+    where = scene.candidates
+    if not where.station_values_mm:
+        raise ValueError("the candidates of this scene are explicit poses: give candidate=0 or a pose")
+    if angle is None:
+        if len(where.angles_deg) > 1 and scene.axis_symmetry:
+            raise ValueError(f"angle is missing: give it in rad, as {where.angles[0]:.4g}")
+        angle = where.angles[0]
+    angle = _number("angle", angle, "rad")
+    stations, s = _joined(where.station_values_mm, converted(station, "m", "mm"))
+    angles, a = _joined(where.angles_deg, converted(angle, "rad", "deg"))
+    table = {"stations_mm": stations, "angles_deg": angles, "roll_deg": where.roll_deg}
+    return _with_candidates(scene, table), s * len(angles) + a
+
+
+def _number(name: str, value: Any, unit: str) -> float:
+    """A finite number."""
+    if isinstance(value, str | bool) or np.ndim(value) or not np.isreal(value):
+        raise TypeError(f"{name} is {value!r}: expected one number [{unit}]")
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {value}: expected a finite number [{unit}]")
+    return float(value)
+
+
+def _joined(values: Sequence[float], value: float) -> tuple[list[float], int]:
+    """Rising values with one more, unless it is there already, and its position."""
+    for i, known in enumerate(values):
+        if math.isclose(known, value, **SAME):
+            return list(values), i
+    joined = sorted([*values, value])
+    return joined, joined.index(value)
+
+
+def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
+    """The scene with these candidates; what names others by number or label changes no value of a case."""
+    tables = scene.effective() | {"candidates": table}
+    tables["limit_surface"] = tables["limit_surface"] | {"wrench_samples": "none"}
+    return Scene.of_tables({name: part for name, part in tables.items() if name != "uncertainty"})
+
+
+def _at_force(scene: Scene, force: float) -> tuple[Scene, int]:
+    """The scene with the force among its own, and the force's position."""
+    forces, k = _joined(scene.load.normal_force_n, _number("force", force, "N"))
+    return scene.with_values({"load.normal_force_n": forces}), k
+
+
+def grasp_pose(pose: Any) -> Mapping[str, Any]:
+    """A pose as a scene's ``[[candidates.poses]]`` has it, from one, or from a matrix ``(4, 4)``.
+
+    Raises
+    ------
+    ValueError
+        The matrix is none of a motion.
+    TypeError
+        It is neither.
+    """
+    if isinstance(pose, Mapping):
+        return pose
+    matrix = np.asarray(pose, dtype=float) if not isinstance(pose, str) else np.zeros(0)
+    if matrix.shape != (4, 4):
+        text = "a mapping with point_mm, approach and long_side, or a matrix (4, 4) with the translation in m"
+        raise TypeError(f"pose has the shape {matrix.shape}: expected {text}")
+    R = matrix[:3, :3]
+    if not np.isfinite(matrix).all() or np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
+        raise ValueError(f"pose has the rotation {R.tolist()}: expected columns long side, short side and approach")
+    return {"point_mm": (1e3 * matrix[:3, 3]).tolist(), "approach": R[:, 2].tolist(), "long_side": R[:, 0].tolist()}

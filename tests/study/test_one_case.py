@@ -1,0 +1,174 @@
+"""One case in memory is the case that a run stores; what names no case is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+import softjaw as sj
+from softjaw.study.one_case import CaseError
+from softjaw.study.quantities import BY_KEY, MODELS
+from softjaw.study.result.store import open_result
+from tests.study.launching import ROOT
+
+JOBS = ROOT / "jobs"
+COARSE = "gripper.elements=[8, 4, 2]"
+SMOKE = sj.Scene.load(JOBS / "smoke.toml", [COARSE])
+BOXES = sj.Scene.load(JOBS / "box-poses.toml", [COARSE])
+FLASK = sj.Scene.load(JOBS / "flask-mesh.toml", [COARSE])
+
+
+def run(scene, path):
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert sj.run(scene, path, comm=MPI.COMM_SELF) == 0
+    return path
+
+
+def stored(result, key, index):
+    """What a file holds of a value of a case, by friction model where it has several."""
+    group, name = key.split("/")
+    q = BY_KEY[key]
+    if group == "maps" and q.by_model:
+        return np.array([result.read(f"{name}/{model}")[index] for model in MODELS])
+    return result.read(f"{name}/{name}" if group == "maps" else key)[index]
+
+
+def assert_stored(case, path, index):
+    """All values of a case but its work stand in the file, bit for bit, and so do its patches and its message."""
+    with open_result(path) as result:
+        for key, value in case.result.values.items():
+            if not key.startswith("work/"):  # an image costs nothing
+                kept = np.asarray(stored(result, key, index), float)
+                assert np.array_equal(kept, np.asarray(value, float), equal_nan=True), key
+        row = np.ravel_multi_index(index, result.layout.shape)
+        for name, faces in result.patch(int(row)).items():
+            assert np.array_equal(faces, case.result.patch[name]), name
+        assert result.messages[index] == case.notes
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A scene with two meshes, an image by symmetry, and two forces; its file, and one of its cases."""
+    scene = SMOKE.with_values(**{"accuracy.meshes": 2, "candidates.angles_deg": [0, 180]})
+    path = run(scene, tmp_path_factory.mktemp("solved") / "two.hdf")
+    return scene, path, sj.press(scene, station=0.0, angle=0.0, force=2.0)
+
+
+def test_a_case_is_that_of_a_run_bit_for_bit(solved):
+    _, path, case = solved
+    assert_stored(case, path, (0, 0, 1))
+    ds = sj.open(path).isel(station=0, angle=0, normal_force=1)
+    assert case.limits["pcm"].e_n == ds.e_n.sel(model="pcm")
+    assert case.errors["e_n"] == pytest.approx(float(ds.e_n_error * ds.e_n.sel(model="ccm")), rel=1e-12)
+    assert set(case.errors) >= {"e_n", "quality", "payload", "f_x_overestimate"}
+    assert case.contacts[0].tau_pure == ds.finger_tau_pure.values[0]
+    point = sj.GraspMap(path).at(0.0, 0.0, 2.0)
+    for fitted in (True, False):
+        mine, its = (one.limit_surface(2, "pcm", fitted).semi_axes for one in (case, point))
+        assert mine == pytest.approx(its, rel=1e-12)
+
+
+def test_an_image_by_symmetry_stands_where_the_run_has_it(solved):
+    scene, path, _ = solved
+    case = sj.press(scene, station=0.0, angle=np.pi, force=1)
+    assert case.angle == pytest.approx(np.pi)
+    assert_stored(case, path, (0, 1, 0))
+
+
+@pytest.mark.long
+def test_the_threads_of_a_script_change_no_bit():
+    scene, pressed = sj.Scene.load(JOBS / "smoke.toml"), []  # whose payload differs by 1e-4 with two threads
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            pressed.append(sj.press(scene, 0.0, np.pi / 2, 2.0))
+    one, two = (case.result.values for case in pressed)
+    for key in one:
+        assert key.startswith("work/") or np.array_equal(one[key], two[key], equal_nan=True), key
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "asked", "index"),
+    [
+        (SMOKE, {"station": 0.0, "angle": 0.0, "force": 2}, (0, 0, 1)),  # one mesh: a load path
+        (BOXES, {"candidate": 1, "force": 5}, (1, 0, 1)),
+        (FLASK.with_values(**{"candidates.stations_mm": [30], "candidates.angles_deg": [0]}),
+         {"station": 0.03, "force": 5}, (0, 0, 1)),
+        (sj.Scene.load(JOBS / "sampled.toml", [COARSE, "candidates.count=2"]), {"candidate": 1, "force": 2}, (1, 0, 0)),
+        (sj.Scene.load(JOBS / "cup.toml", [
+            COARSE, "candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]", "accuracy.wall_around_mm=4",
+            "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12", "accuracy.meshes=1",
+        ]), {"station": 0.055, "force": 2}, (0, 0, 1)),
+    ],
+    ids=["one mesh", "poses", "mesh", "sampled", "wall"],
+)  # fmt: skip
+def test_cases_of_every_kind_of_scene_are_those_of_a_run(scene, asked, index, tmp_path):
+    assert_stored(sj.press(scene, **asked), run(scene, tmp_path / "a.hdf"), index)
+
+
+@pytest.mark.long
+def test_what_the_scene_lacks_is_added_to_it(tmp_path):
+    case = sj.press(SMOKE, station=0.01, angle=0.5, force=1.5)
+    added = {"candidates.stations_mm": [0, 10], "candidates.angles_deg": [0, np.degrees(0.5), 90]}
+    path = run(SMOKE.with_values(**added, **{"load.normal_force_n": [1, 1.5, 2]}), tmp_path / "a.hdf")
+    assert_stored(case, path, (1, 1, 1))
+    across = sj.press(SMOKE, pose={"point_mm": [0, 0, 0], "approach": [-1, 0, 0], "long_side": [0, 0, 1]}, force=1)
+    assert across.e_n == pytest.approx(sj.press(SMOKE, 0.0, 0.0, 1).e_n, rel=1e-9)
+    matrix = np.array([[0, 0, -1, 0], [0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1.0]])
+    assert sj.press(SMOKE, pose=matrix, force=1).e_n == pytest.approx(across.e_n, rel=1e-9)
+
+
+POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("scene", "asked", "error", "words"),
+    [
+        ("smoke.toml", {}, TypeError, "expected a Scene"),
+        (SMOKE, {"station": 0.5, "angle": 0}, ValueError, r"500 mm.*-40 to 40 mm"),
+        (SMOKE, {"station": "0"}, TypeError, r"station is '0'.*\[m\]"),
+        (SMOKE, {"station": np.nan}, ValueError, r"station is nan.*\[m\]"),
+        (SMOKE, {"station": 0, "angle": [0.0, 1.0]}, TypeError, r"angle is .*\[rad\]"),
+        (SMOKE, {"station": 0}, ValueError, "angle is missing"),
+        (SMOKE, {}, ValueError, "station .*candidate and pose"),
+        (SMOKE, {"station": 0, "candidate": 1}, ValueError, "station and candidate"),
+        (SMOKE, {"candidate": 0}, ValueError, "give station and angle"),
+        (SMOKE, {"station": 0, "angle": 0, "force": -1}, ValueError, r"load\.normal_force_n.*-1"),
+        (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(3, 3\).*\(4, 4\)"),
+        (SMOKE, {"pose": "x"}, TypeError, r"\(4, 4\)"),
+        (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "approach"),
+        (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\].*passes the object"),
+        (SMOKE, {"pose": {"point_mm": [0, 0, 0]}}, ValueError, r"approach: found nothing"),
+        (BOXES, {"station": 0.0, "angle": 0.0}, ValueError, "candidate=0"),
+        (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),
+        (FLASK, {"station": 5.0, "angle": 0}, ValueError, "5000 mm.*0 to 120 mm"),
+        (SMOKE.with_values(**{"gripper.max_opening_mm": 20.0}), {"station": 0, "angle": 0}, CaseError, "to 20 mm"),
+        (SMOKE.with_values(**{"accuracy.e_n": 0.02}), {"station": 0, "angle": 0}, ValueError, r"accuracy\.e_n"),
+        (sj.Scene.load(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]), {"station": 0, "angle": 0}, ValueError,
+         r"sweep of friction\.mu.*with_values"),
+        (SMOKE.with_values(**{"petsc.contact_snes_tpye": "x"}), {"station": 0, "angle": 0}, sj.StudyError, "tpye"),
+        (SMOKE.with_values(**{"petsc.contact_snes_max_it": 1}), {"station": 0, "angle": 0}, CaseError, "MAX_IT"),
+    ],
+)  # fmt: skip
+def test_what_names_no_case_is_refused(scene, asked, error, words):
+    with pytest.raises(error, match=words):
+        sj.press(scene, **{"force": 1.0, **asked})
+
+
+def test_a_name_that_a_case_does_not_have_is_refused(solved):
+    case = solved[2]
+    for ask in (lambda: case.value("enn"), lambda: case.fingers("enn")):
+        with pytest.raises(KeyError, match="enn is not a value of this case"):
+            ask()
+    for ask in (lambda: case.value("e_n", "x"), lambda: case.limit_surface(1, "x")):
+        with pytest.raises(ValueError, match="expected one of ccm"):
+            ask()
+    with pytest.raises(ValueError, match="expected 1 or 2"):
+        case.limit_surface(0)
+    with pytest.raises(TypeError, match="force is missing"):
+        sj.press(solved[0], 0.0, 0.0)

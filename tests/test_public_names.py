@@ -1,0 +1,152 @@
+"""``import softjaw``: its names, what it needs, and the example of each."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import inspect
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+import softjaw as sj
+from softjaw.study.messages import StudyError
+from tests.study.formula_results import grid_axes, make
+from tests.study.launching import ROOT
+
+SOURCE = ast.parse((ROOT / "softjaw" / "__init__.py").read_text(encoding="utf-8"))
+EXAMPLES = ("Scene.load", "Scene.from_dict", "Scene.with_values", "press", "open", "GraspMap", "ContactPatch",
+            "read_pressure", "friction_limits", "friction_wrench", "fit_ellipsoid", "fit_quartic",
+            "grasp_quality")  # fmt: skip
+BLOCKED = """
+import json, sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("mpi4py", "petsc4py"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Missing())
+sys.path.insert(0, sys.argv[1])
+import softjaw as sj
+early = {"numpy", "scipy", "numba", "pydantic", "h5py"} & set(sys.modules)
+assert all(getattr(sj, name).__doc__ for name in sj.__all__)
+scene = sj.Scene.load(sys.argv[1] + "/jobs/smoke.toml")
+ds = sj.open(sys.argv[2])
+assert len(sj.read_patch(sys.argv[2], station=0)) == 0  # it holds none
+point = sj.GraspMap(sys.argv[2]).best()[0]
+patch = sj.read_pressure(sys.argv[1] + "/jobs/cylinder-pressure.csv")
+limits = sj.friction_limits(patch, mu=0.8)["ccm"]
+found = [sj.friction_wrench(patch, [0, 0, 1], 0.8)[0, 5] / limits.tau_z, sj.fit_ellipsoid(patch, 0.8).fit_error.Erad,
+         sj.fit_quartic(patch, 0.8).fit_error.Erad, sj.grasp_quality(patch, mu=0.8, distance=0.06).quality]
+refused = []
+for call in (lambda: sj.press(scene, 0.0, 0.0, 1.0), lambda: sj.run(scene, sys.argv[2])):
+    try:
+        call()
+    except ImportError as error:
+        refused.append(str(error))
+print(json.dumps([sorted(early), found, point.e_n, float(ds.e_n.max()), refused]))
+"""
+
+
+def test_every_name_is_there_for_people_and_for_type_checkers():
+    typed = {
+        alias.name: node.module
+        for block in SOURCE.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        for alias in node.names
+    }
+    assert typed == {name: f"softjaw.{home}" for name, home in sj._HOMES.items()}
+    assert set(sj.__all__) <= set(dir(sj))
+    with pytest.raises(AttributeError, match="no attribute 'prss'"):
+        _ = sj.prss
+
+
+@pytest.mark.parametrize("name", sj.__all__)
+def test_every_name_says_what_it_takes_gives_and_refuses(name):
+    what = getattr(sj, name)
+    text = inspect.getdoc(what)
+    if inspect.isfunction(what):
+        assert all(f"{part}\n---" in text for part in ("Parameters", "Returns", "Raises", "Examples")), name
+        signature = inspect.signature(what)
+        assert signature.return_annotation is not inspect.Signature.empty
+        assert all(p.annotation is not p.empty for p in signature.parameters.values())
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    (tmp_path / "results").mkdir()
+    if name in ("open", "GraspMap"):
+        make(tmp_path / "results" / "smoke.hdf", axes=grid_axes([0.0], [0.0, 1.5], [1.0, 2.0]))
+    monkeypatch.chdir(tmp_path)
+    what = sj
+    for part in name.split("."):
+        what = getattr(what, part)
+    module = sys.modules[what.__module__]
+    [example] = doctest.DocTestFinder(recurse=False).find(what, name, module=False, globs=vars(module).copy())
+    assert example.examples
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
+@pytest.mark.long
+@pytest.mark.launches
+def test_all_but_solving_works_anywhere_without_petsc_and_mpi(once, shared_path):
+    path = once(make, shared_path / "a.hdf")
+
+    def told():
+        outside = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PMI_", "H5PY_"))}
+        command = [sys.executable, "-W", "ignore", "-c", BLOCKED, str(ROOT), str(path)]
+        return subprocess.run(command, cwd="/", env=outside, capture_output=True, text=True, check=False)
+
+    done = once(told)
+    assert done.returncode == 0, done.stderr
+    early, (turned, ellipsoid, quartic, quality), e_n, largest, refused = json.loads(done.stdout)
+    assert early == []
+    assert turned == pytest.approx(1.0)
+    assert quartic < ellipsoid < 0.04
+    assert quality == pytest.approx(1.459, abs=1e-3)
+    assert 0 < e_n <= largest
+    assert [text.partition(" ")[0] for text in refused] == ["press", "run"]
+    assert all("doctor" in text for text in refused)
+
+
+@pytest.mark.parametrize(("file", "error"), [("a.h5", StudyError), ("results", StudyError)])
+def test_a_result_file_has_its_ending(file, error, tmp_path):
+    scene = sj.Scene.load(ROOT / "jobs" / "smoke.toml")
+    with pytest.raises(error, match=r"\.hdf"):
+        sj.run(scene, tmp_path / file)
+    with pytest.raises(TypeError, match="expected a Scene"):
+        sj.run("smoke.toml", tmp_path / "a.hdf")
+
+
+USER = """
+import softjaw as sj
+
+scene = sj.Scene.load("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
+case = sj.press(scene, station=0.067, angle=0.0, force=5.0)
+force: tuple[float, ...] = scene.load.normal_force_n
+e_n: float = case.limits["ccm"].e_n
+error: dict[str, float] = case.errors
+point: float = sj.GraspMap("a.hdf").best(5, by="payload")[0].place[0, 0]
+code: int = sj.run(scene, "a.hdf")
+quality: float = sj.grasp_quality(case.patch, mu=0.8, distance=0.1).quality
+sj.press("x", force=1)
+sj.fit_quartic(case.patch, mu="0.8")
+"""
+
+
+@pytest.mark.long
+def test_a_type_checker_knows_them(tmp_path):
+    (tmp_path / "user.py").write_text(USER)
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", "user.py"], cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    wrong = [line.partition(": ")[0] for line in done.stdout.splitlines() if line.startswith("user.py")]
+    assert wrong == ["user.py:12", "user.py:13"], done.stdout
+    assert (ROOT / "softjaw" / "py.typed").exists()
