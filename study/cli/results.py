@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.study.export import cases as exported
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, write_file
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import dataset, open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene.problems import SceneError
-from softjaw.study.show.tables import export as exported
 from softjaw.study.show.tables import watch as watching
 from softjaw.study.show.tables.columns import terminal_width
 from softjaw.study.show.tables.compare import compare as compared

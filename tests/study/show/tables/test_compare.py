@@ -12,11 +12,11 @@ import pytest
 import softjaw
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.cli import main
+from softjaw.study.export.cases import FINGER, MEANING, as_csv, as_json, cases
 from softjaw.study.lookup import GraspMap
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, RANK, USAGE, StudyError
 from softjaw.study.result.store import StoredAxis, open_result
 from softjaw.study.show.tables.compare import compare, comparison_csv, comparison_json, comparison_text
-from softjaw.study.show.tables.export import FINGER, MEANING, as_csv, as_json, cases
 from tests.study.formula_results import (
     FORCES,
     SCENE,

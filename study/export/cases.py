@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from softjaw.study.export.text import csv_text, with_unit
 from softjaw.study.flags import flags_in
 from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, maps_in, values_of
-from softjaw.study.show.tables.columns import csv_text, with_unit
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
