@@ -19,6 +19,21 @@ KINDS = {
     "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
+FORMATS = {  # of export: what stands in the file
+    "csv": "every case: maps, pads, contact frames, limit surfaces; SI units",
+    "json": "the same, with units, meanings and the words of the flags",
+    "isaac_grasp": "grasps for Isaac Sim and Isaac ROS (YAML)",
+    "graspgen": "grasps as GraspGen keeps them (JSON), with all that is known",
+    "moveit": "a list of moveit_msgs/Grasp for ROS 2 (YAML)",
+    "mjcf": "a MuJoCo scene of one grasp, with the friction of each finger",
+    "sdf": "the fingers of one grasp for Gazebo Classic with ODE",
+    "physx": "the fingers of one grasp for PhysX and Isaac Sim (USD, .usda)",
+}
+NO_DRAKE = (
+    "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
+    " pressure field, and with it e_n, of its own; expected"
+)
+APPROACHES = ("x", "minus-x", "y", "minus-y")
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words, its module
     "prepare": (
@@ -48,8 +63,8 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results"),
     ),
     "use the numbers": (
-        ("export", "every case for planners: maps, frames, limit surfaces",
-         "export results/smoke.hdf --csv -o results/smoke.csv", "cli.results"),
+        ("export", "grasps and their friction for planners and simulators",
+         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.results"),
         ("patch", "judge a pressure field from elsewhere: friction, score",
          "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
     ),
@@ -191,10 +206,15 @@ def _add_result_options(made: dict[str, Any]) -> None:
         form = made[name].add_mutually_exclusive_group(required=name == "export")
         form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
         form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
-    made["show"].add_argument("--force", type=_positive, metavar="N", help="normal force [N], solved or between two "
-                              "solved ones (default: the lowest that holds the object, else the largest)")  # fmt: skip
-    made["show"].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where the "
-                              "scene has a mass or the direction of a weight, else quality)")  # fmt: skip
+        if name == "export":
+            form.add_argument("--format", type=_format, choices=tuple(FORMATS), dest="form", metavar="FORMAT",
+                              help="one of those below")  # fmt: skip
+    for name in ("show", "export"):
+        made[name].add_argument("--force", type=_positive, metavar="N", help="normal force [N], solved or between "
+                                "two solved ones (default: the lowest that holds the object, else the largest)"
+                                )  # fmt: skip
+        made[name].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where "
+                                "the scene has a mass or the direction of a weight, else quality)")  # fmt: skip
     made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
                                  "(default e_n)")  # fmt: skip
     for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
@@ -202,9 +222,34 @@ def _add_result_options(made: dict[str, Any]) -> None:
     for name in ("compare", "export"):
         made[name].add_argument("--model", choices=("ccm", "pcm", "pcm_projected"), default="ccm",
                                 help="friction model (default ccm)")  # fmt: skip
-    made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    _add_export_options(made["export"])
     _add_choice(made["report"])
     made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+
+
+def _add_export_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--top", type=_whole(0), metavar="K", help="how many grasps, the best first, 0: all (default: 1 for a "
+        "simulator, else all; a simulator gets a file for each)")  # fmt: skip
+    add("--min", type=_least, metavar="NAME=VALUE", action="append", default=[], dest="least", help="leave out grasps "
+        "with less, in the unit of 'softjaw show': payload=200 is 200 g; repeatable")  # fmt: skip
+    add("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    add = parser.add_argument_group("the gripper, for isaac_grasp, graspgen and moveit").add_argument
+    add("--approach", choices=APPROACHES, action="append", dest="approaches", help="from palm to fingertips: along "
+        "the long side (x) or the short side (y) of finger 1's pad, or against it; repeatable (default minus-x)"
+        )  # fmt: skip
+    add("--closing", choices=("x", "y"), help="axis of the gripper's frame from finger 1 to finger 2; z approaches "
+        "(default x for graspgen, else y)")  # fmt: skip
+    add("--depth", type=_not_negative, default=0.0, metavar="MM", help="from the origin of the gripper's frame to the "
+        "middle of the pads (default 0)")  # fmt: skip
+    add("--wider", type=_not_negative, default=20.0, metavar="MM", help="how far the gripper opens beyond first touch "
+        "(default 20)")  # fmt: skip
+    add("--joints", type=_names, default=("finger_joint1", "finger_joint2"), metavar="A,B", help="joints of the "
+        "fingers, each at half the opening (default finger_joint1,finger_joint2)")  # fmt: skip
+    add("--gripper-frame", default="gripper", metavar="NAME", help="name of the gripper's frame (default gripper)")
+    add("--object-frame", default="object", metavar="NAME", help="name of the object's frame (default object)")
+    listed = "\n".join(f"  {name:<12} {text}" for name, text in FORMATS.items())
+    parser.epilog = f"{parser.epilog}\n\nformats:\n{listed}"
 
 
 def _add_cost_options(parser: argparse.ArgumentParser) -> None:
@@ -274,6 +319,33 @@ def _whole(least: int) -> Callable[[str], int]:
         return value
 
     return count
+
+
+def _format(text: str) -> str:
+    if text == "drake":
+        raise argparse.ArgumentTypeError(f"{NO_DRAKE} {', '.join(FORMATS)}")
+    return text
+
+
+def _least(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, _finite(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"found {text}, expected a map and a number, such as payload=200") from None
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"found {text}, expected names with commas between them")
+    return names
+
+
+def _not_negative(text: str) -> float:
+    if not 0 <= (value := float(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"found {text}, expected a number, 0 or above")
+    return value
 
 
 def _counts(text: str) -> tuple[int, ...]:
