@@ -64,7 +64,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
     ),
     "use the numbers": (
         ("export", "grasps and their friction for planners and simulators",
-         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.results"),
+         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.exporting"),
         ("patch", "judge a pressure field from elsewhere: friction, score",
          "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
     ),

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
+from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import APPROACHES, FORMATS
-from softjaw.study.cli.results import PLANNERS, SIMULATORS, TABLES
 from softjaw.study.export import grasps as module
 from softjaw.study.export.grasps import Choice, Gripper, grasps, quaternion
 from softjaw.study.export.planners import CLOSING
@@ -66,7 +66,7 @@ def path(tmp_path_factory):
 def said(path, capsys, monkeypatch):
     for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("softjaw.study.cli.results.open", lambda _: opened(path))  # read once, not by every command
+    monkeypatch.setattr("softjaw.study.cli.exporting.open", lambda _: opened(path))  # read once, not by every command
 
     def say(*words):
         assert main(["export", str(path), *map(str, words)]) == 0
