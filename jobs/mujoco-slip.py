@@ -76,7 +76,7 @@ def rows(file: str, count: int = 5) -> Iterator[list[str]]:
     for force in ds.normal_force.values:
         for grasp in grasps(ds, Choice(force=float(force), top=count), Gripper(closing="x")):
             contact = cell(grasp).contacts[0]
-            place = grasp.remark.splitlines()[0].rpartition(",")[0]
+            place = grasp.place.rpartition(",")[0]
             axes = [contact.mu_x * contact.F_N, contact.mu_y * contact.F_N, 1e3 * contact.r * contact.F_N]
             found = [f"{value:.3f}" for value in ratios(grasp)]
             yield [place, f"{force:g}", *(f"{value:.3f}" for value in axes), *found]

@@ -12,6 +12,7 @@ or against one of them.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,13 +25,15 @@ from scipy.spatial.transform import Rotation
 from softjaw.study.export.cases import cases
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import FORCE_RANGE, MAIN
 from softjaw.study.ranking import at_level, judged, ranked, score_of, task_keys
 from softjaw.study.result.read import axes_of, maps_in
+from softjaw.study.result.store import place_text
 from softjaw.study.units import in_si, shown, shown_text
 
 FloatArray = NDArray[np.float64]
 APPROACHES = {"x": (0, 1.0), "minus-x": (0, -1.0), "y": (1, 1.0), "minus-y": (1, -1.0)}  # axis of finger 1's pad, sign
-SAID = ("payload", "quality", "e_n", "opening", "opening_loaded")  # of each grasp in formats that only take comments
+COMMENT = 100  # characters in a line of a comment
 
 
 @dataclass(frozen=True)
@@ -69,16 +72,16 @@ class Gripper:
 class Grasp:
     """A solved case as planners take it.
 
-    ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m] its place; ``merit`` is what the
-    grasp is ranked by, over the largest of all that are written: 1 for the best, 0 where there is nothing. ``mass`` of
-    the object [kg] is NaN where the scene has none.
+    ``place`` is the case in words. ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m]
+    is where it stands. ``merit`` is what the grasp is ranked by over the largest of all that are written: 1 for the
+    best, 0 where there is nothing. ``mass`` of the object [kg] is NaN where the scene has none.
     """
 
     name: str
+    place: str
     case: dict[str, Any]
     rotation: FloatArray
     origin: FloatArray
-    approach: str
     merit: float
     force: float
     mass: float
@@ -118,18 +121,14 @@ class Grasp:
     @property
     def remark(self) -> str:
         """Place, force, and what the format has no field for, in a few lines."""
-        place = self.case["label"] or ", ".join(
-            f"{name} {shown_text(value, self.units.get(name, ''))}"
-            for name, value in self.case["place"].items()
-            if name != "normal_force"
-        )
         known = []
-        for name in (n for n in SAID if np.isfinite(self.maps.get(n, np.nan))):
+        for name in (n for n in (*MAIN, *FORCE_RANGE) if np.isfinite(self.maps.get(n, np.nan))):
             error = self.maps.get(f"{name}_error", np.nan)
             doubt = f" +- {100 * error:.2g} %" if np.isfinite(error) else ""
             known.append(f"{name} {shown_text(self.maps[name], self.units[name])}{doubt}")
         words = flag_words(self.case["flags"], self.maps.get("misalignment", np.nan)) or "none"
-        return "\n".join([f"{place}, {self.force:g} N per finger", ", ".join(known), f"warnings: {words}"])
+        lines = textwrap.wrap(", ".join(known), COMMENT)
+        return "\n".join([f"{self.place} per finger", *lines, f"warnings: {words}"])
 
 
 def quaternion(rotation: FloatArray) -> FloatArray:
@@ -138,9 +137,7 @@ def quaternion(rotation: FloatArray) -> FloatArray:
     >>> quaternion(np.diag([1.0, -1.0, -1.0])).tolist()
     [1.0, 0.0, 0.0, 0.0]
     """
-    found = np.asarray(Rotation.from_matrix(rotation).as_quat())
-    sign = np.sign(found[np.flatnonzero(np.abs(found[::-1]) > 1e-12)[0] * -1 - 1])
-    return found * sign + 0.0  # adding 0 turns -0 into 0
+    return np.asarray(Rotation.from_matrix(rotation).as_quat(canonical=True)) + 0.0  # adding 0 turns -0 into 0
 
 
 def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: float) -> tuple[FloatArray, FloatArray]:
@@ -153,8 +150,8 @@ def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: floa
     return np.column_stack(columns), middle - depth * z
 
 
-def chosen(ds: xr.Dataset, choice: Choice) -> tuple[list[dict[str, Any]], str]:
-    """Cases of the chosen grasps, the best first, and the map that they are ranked by.
+def chosen(ds: xr.Dataset, choice: Choice) -> tuple[list[dict[str, Any]], list[str], str]:
+    """Cases of the chosen grasps, the best first, the same in words, and the map that they are ranked by.
 
     Raises
     ------
@@ -165,33 +162,35 @@ def chosen(ds: xr.Dataset, choice: Choice) -> tuple[list[dict[str, Any]], str]:
         at, k, _ = at_level(ds, choice.force)
     except ValueError as error:
         raise StudyError(USAGE, f"--force: {error}") from error
-    by, units = score_of(at, choice.by), maps_in(at)
+    units = maps_in(at)
     if unknown := [name for name in choice.least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
     at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))
-    order = ranked(at, k, choice.by, each=choice.force is None)
-    shape = at.status.shape[:-1]
+    shape, order = at.status.shape[:-1], ranked(at, k, choice.by, each=choice.force is None)
     which = [(*(int(i) for i in np.unravel_index(c, shape)), k) for c in order]
     least = {name: value / shown(1.0, units[name]) for name, value in choice.least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
-    found = [c for c in cases(at, choice.model, which) if all(c["maps"][name] >= v for name, v in least.items())]
-    return found[: choice.top or None], by
+    found = [
+        (case, place_text(axes_of(at), at.label.values, index))
+        for index, case in zip(which, cases(at, choice.model, which), strict=True)
+        if all(case["maps"][name] >= value for name, value in least.items())
+    ][: choice.top or None]
+    return [case for case, _ in found], [place for _, place in found], score_of(at, choice.by)
 
 
 def grasps(ds: xr.Dataset, choice: Choice, gripper: Gripper) -> list[Grasp]:
     """The chosen grasps with the gripper's pose, one for each direction of approach."""
-    found, by = chosen(ds, choice)
-    units = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
+    found, places, by = chosen(ds, choice)
     score = np.nan_to_num([max(float(case["maps"][by]), 0.0) for case in found])
     best, mass = max(score, default=0.0), in_si("mass_g", task_keys(ds, "object").get("mass_g"))
+    mass, units = np.nan if mass is None else mass, maps_in(ds)
     made = []
-    for i, case in enumerate(found):
+    for i, (case, place) in enumerate(zip(found, places, strict=True)):
+        merit = float(score[i] / best) if best > 0 else 0.0
         for approach in gripper.approach:
             R, o = gripper_frame(case, approach, gripper.closing, gripper.depth)
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
-            merit = float(score[i] / best) if best > 0 else 0.0
-            force = case["place"]["normal_force"]
-            made.append(Grasp(name, case, R, o, approach, merit, force, np.nan if mass is None else mass, units))
+            made.append(Grasp(name, place, case, R, o, merit, case["place"]["normal_force"], mass, units))
     return made
 
 

@@ -62,7 +62,7 @@ def _pose(rotation: FloatArray, origin: FloatArray) -> str:
 
 def _finger(f: int, contact: Contact) -> list[str]:
     """A link in the contact frame, with a ball that touches at its origin."""
-    size = numbers(*[PAD_MASS * RADIUS**2 * 2 / 5] * 1)
+    size = numbers(0.4 * PAD_MASS * RADIUS**2)
     return [
         f'    <link name="finger{f}">',
         f"      <pose>{_pose(contact.rotation, contact.origin)}</pose>",

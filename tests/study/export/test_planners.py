@@ -244,7 +244,7 @@ def test_what_cannot_be_written_is_refused(path, words, code, capsys):
     assert "error: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("value", [1e-5, -2e-300, 5e-324, 1.0, -0.0, 1e22, 0.1, 123456789.0])
+@pytest.mark.parametrize("value", [1e-5, -2e-300, 5e-324, 1.0, -0.0, 1e22, 0.1, 123456789.0, np.inf, -np.inf])
 def test_numbers_of_yaml_are_numbers(value):
     """PyYAML, which reads YAML 1.1, takes 1e-05 for a text."""
     found = read_yaml(yaml_text({"a": value, "b": [value], "c": {"d": [{"e": value}]}, "f": str(value)}))
