@@ -80,9 +80,9 @@ def all_grasps(path, force, **choice):
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 
-def slipping():
-    """The script that loads a finger in MuJoCo."""
-    spec = importlib.util.spec_from_file_location("mujoco_slip", ROOT / "jobs/mujoco-slip.py")
+def slipping(simulator):
+    """The script that loads a finger in this simulator."""
+    spec = importlib.util.spec_from_file_location(f"{simulator}_slip", ROOT / f"jobs/{simulator}-slip.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

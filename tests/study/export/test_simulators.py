@@ -26,7 +26,7 @@ def path(tmp_path_factory):
 @pytest.fixture(scope="module")
 def slip():
     pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
-    return slipping()
+    return slipping("mujoco")
 
 
 def numbers(text):
@@ -112,6 +112,18 @@ def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
         for depth in (0.0, 1e-3):
             assert mu * 16.0 * max(r_min, math.sqrt(r * depth)) == pytest.approx(E_N[i] * mu * 16.0)
         assert values["physxScene:solverType"] == '"TGS"'
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("force", FORCES)
+def test_physx_carries_what_the_file_says_and_both_at_once(path, force):
+    """In the program itself; slide and torque are independent there."""
+    pytest.importorskip("sapien", reason="PhysX is not installed: pip install sapien")
+    module = slipping("physx")
+    for grasp in all_grasps(path, force):
+        found = module.ratios(cell(grasp).contacts[0])
+        for name, shares in module.LOADS.items():
+            assert found[name] == pytest.approx(shares, abs=0.005)
 
 
 def test_usd_reads_the_stage(path):
