@@ -125,9 +125,10 @@ class Grasp:
         for name in (n for n in (*MAIN, *FORCE_RANGE) if np.isfinite(self.maps.get(n, np.nan))):
             error = self.maps.get(f"{name}_error", np.nan)
             doubt = f" +- {100 * error:.2g} %" if np.isfinite(error) else ""
-            known.append(f"{name} {shown_text(self.maps[name], self.units[name])}{doubt}")
+            text = f"{name} {shown_text(self.maps[name], self.units[name])}{doubt}"
+            known.append(text.replace(" ", "\xa0"))  # a value stays in one line with its name and unit
         words = flag_words(self.case["flags"], self.maps.get("misalignment", np.nan)) or "none"
-        lines = textwrap.wrap(", ".join(known), COMMENT)
+        lines = [line.replace("\xa0", " ") for line in textwrap.wrap(", ".join(known), COMMENT)]
         return "\n".join([f"{self.place} per finger", *lines, f"warnings: {words}"])
 
 
