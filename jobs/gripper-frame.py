@@ -2,7 +2,7 @@
 
     python jobs/gripper-frame.py -o docs/gripper-frame.png
 
-Pads and gripper stand where `study.case.candidates` and `study.export.grasps` put them, at angle 0 and roll 0.
+Pads and gripper stand where `study.case.candidates` and `study.export.selection` put them, at angle 0 and roll 0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from softjaw.study import pictures
 from softjaw.study.case.candidates import axis_poses
-from softjaw.study.export.grasps import gripper_frame
+from softjaw.study.export.selection import gripper_frame
 
 RADIUS, HEIGHT, LONG, SHORT, DEPTH = 20.0, 70.0, 30.0, 24.0, 75.0  # [mm]
 LOOKS = {"x": "#c05a00", "y": "#2a8c82", "z": "#12436d"}

@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from softjaw.study.export.contact import cell
-from softjaw.study.export.grasps import Choice, Grasp, Gripper, grasps
 from softjaw.study.export.mjcf import as_mjcf
+from softjaw.study.export.point_contact import cell
+from softjaw.study.export.selection import GripperFrame, RankedGrasp, Selection, grasps
 from softjaw.study.result.read import open as open_result
 
 # Shares of the largest f_x, f_y and tau_z in a load.
@@ -57,14 +57,14 @@ def slip(model: mujoco.MjModel, load: np.ndarray, top: float = TOP, steps: int =
     return float("inf")
 
 
-def predicted(grasp: Grasp, finger: int, shares: tuple[int, ...]) -> np.ndarray:
+def predicted(grasp: RankedGrasp, finger: int, shares: tuple[int, ...]) -> np.ndarray:
     """The load ``(3,)`` with these shares that lies on the ellipsoid from three motions [N, N, N m]."""
     contact = cell(grasp).contacts[finger - 1]
     w = np.asarray(shares) / np.linalg.norm(shares)
     return w * contact.F_N * np.array([contact.mu_x, contact.mu_y, contact.r])
 
 
-def ratios(grasp: Grasp, finger: int = 1) -> list[float]:
+def ratios(grasp: RankedGrasp, finger: int = 1) -> list[float]:
     """Simulated over predicted load of every one of `LOADS`."""
     model = fixture(as_mjcf(grasp), finger)
     return [slip(model, predicted(grasp, finger, shares)) for shares in LOADS.values()]
@@ -74,7 +74,7 @@ def rows(file: str, count: int = 5) -> Iterator[list[str]]:
     """Lines of the table: the first ``count`` grasps at every force."""
     ds = open_result(file)
     for force in ds.normal_force.values:
-        for grasp in grasps(ds, Choice(force=float(force), top=count), Gripper(closing="x")):
+        for grasp in grasps(ds, Selection(force=float(force), top=count), GripperFrame(closing="x")):
             contact = cell(grasp).contacts[0]
             place = grasp.place.rpartition(",")[0]
             axes = [contact.mu_x * contact.F_N, contact.mu_y * contact.F_N, 1e3 * contact.r * contact.F_N]

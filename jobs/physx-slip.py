@@ -15,9 +15,9 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from softjaw.study.export.contact import RADIUS, Contact, cell
-from softjaw.study.export.grasps import Choice, Gripper, grasps
 from softjaw.study.export.physx import torsional_radius
+from softjaw.study.export.point_contact import RADIUS, PointContact, cell
+from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 
 LOADS = {"slide": (1, 0), "torque": (0, 1), "slide, torque": (1, 1)}  # shares of mu F_N and of tau_z
@@ -26,7 +26,7 @@ MASS, INERTIA = 0.02, 1e-3  # [kg, kg m^2]; PhysX turns nothing faster than 100 
 FREE_BUT_TILT = [False, False, False, True, True, False]
 
 
-def scene(contact: Contact) -> tuple[sapien.Scene, physx.PhysxRigidDynamicComponent]:
+def scene(contact: PointContact) -> tuple[sapien.Scene, physx.PhysxRigidDynamicComponent]:
     """A plate at z > 0, and a ball below it that cannot tilt."""
     settings = physx.PhysxSceneConfig()
     settings.gravity, settings.enable_tgs = [0, 0, 0], True
@@ -51,7 +51,7 @@ def scene(contact: Contact) -> tuple[sapien.Scene, physx.PhysxRigidDynamicCompon
     return made, body
 
 
-def ratios(contact: Contact) -> dict[str, tuple[float, float]]:
+def ratios(contact: PointContact) -> dict[str, tuple[float, float]]:
     """Friction force and torque over the predicted largest ones, of every load."""
     largest = contact.F_N * np.array([contact.mu, contact.r])
     found = {}
@@ -74,7 +74,7 @@ def main() -> None:
     """Print a line for each of the first five grasps at every force."""
     ds, worst = open_result(sys.argv[1]), 0.0
     for force in ds.normal_force.values:
-        for grasp in grasps(ds, Choice(force=float(force), top=5), Gripper(closing="x")):
+        for grasp in grasps(ds, Selection(force=float(force), top=5), GripperFrame(closing="x")):
             found = ratios(cell(grasp).contacts[0])
             print(grasp.place, {name: tuple(f"{v:.3f}" for v in pair) for name, pair in found.items()}, flush=True)
             for pair, shares in zip(found.values(), LOADS.values(), strict=True):

@@ -7,11 +7,11 @@ from argparse import Namespace
 from pathlib import Path
 
 from softjaw.study.export.cases import as_csv, as_json
-from softjaw.study.export.grasps import Choice, Gripper, chosen, grasps, usable
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
 from softjaw.study.export.sdf import as_sdf
+from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.result.read import open
 from softjaw.study.units import in_si
@@ -25,12 +25,12 @@ def export(options: Namespace) -> str:
     """Write grasps for planners and simulators; files that were written, or the text itself."""
     ds = open(options.file)
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
-    choice = Choice(options.model, options.force, options.by, few, dict(options.least))
+    choice = Selection(options.model, options.force, options.by, few, dict(options.least))
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
         return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, choice)[0] if asked else None)])
     closing = options.closing or CLOSING.get(options.form, "x")
-    gripper = Gripper(
+    gripper = GripperFrame(
         tuple(options.approaches or ("minus-x",)), closing, in_si("depth_mm", options.depth),
         in_si("wider_mm", options.wider), options.joints, options.gripper_frame, options.object_frame,
     )  # fmt: skip

@@ -6,7 +6,7 @@ MuJoCo bounds the friction forces of a contact (f_1, f_2 along its tangents, the
 
 (MuJoCo documentation, "Computation", section on friction cones, and "XML reference", pair, friction): an ellipsoid with
 semi-axes mu_i f_N. With mu_1 = f_x / F_N, mu_2 = f_y / F_N and mu_3 = tau_z / F_N, a length [m], it is the ellipsoid
-from three motions of `study.export.contact`: torque, slides and all loads between them slip where the result file
+from three motions of `study.export.point_contact`: torque, slides and all loads between them slip where the result file
 says, at its F_N, and scale with the normal force beside it. What the fitted quartic knows beyond it is lost.
 
 Four things belong to it.
@@ -29,8 +29,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softjaw.study.export.contact import OBJECT_MASS, PAD_MASS, RADIUS, Cell, Contact, cell, heading, numbers
-from softjaw.study.export.grasps import FloatArray, Grasp, quaternion
+from softjaw.study.export.point_contact import OBJECT_MASS, PAD_MASS, RADIUS, Cell, PointContact, cell, heading, numbers
+from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
 PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
@@ -48,7 +48,7 @@ def tangents(normal: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def friction(contact: Contact) -> tuple[float, float, float]:
+def friction(contact: PointContact) -> tuple[float, float, float]:
     """Both slides along MuJoCo's tangents [-], and torsion [m]."""
     first = tangents(contact.rotation[:, 2])[0]
     along_x, along_y = np.abs(contact.rotation[:, :2].T @ first)
@@ -57,7 +57,7 @@ def friction(contact: Contact) -> tuple[float, float, float]:
     return (contact.mu_y, contact.mu_x, contact.r) if along_x < ALONG else (contact.mu, contact.mu, contact.r)
 
 
-def as_mjcf(grasp: Grasp) -> str:
+def as_mjcf(grasp: RankedGrasp) -> str:
     """A MuJoCo model of one grasp."""
     found = cell(grasp)
     known = grasp.mass if np.isfinite(grasp.mass) else OBJECT_MASS
@@ -102,7 +102,7 @@ def _pose(rotation: FloatArray, origin: FloatArray) -> str:
     return f'pos="{numbers(*origin)}" quat="{numbers(turn[3], *turn[:3])}"'
 
 
-def _plate(f: int, contact: Contact, found: Cell) -> str:
+def _plate(f: int, contact: PointContact, found: Cell) -> str:
     """The object's side of a contact, in the object's own frame: a plate whose face is the contact plane."""
     centre = contact.origin + PLATE * contact.rotation[:, 2]
     placed = _pose(found.rotation.T @ contact.rotation, found.rotation.T @ (centre - found.origin))
@@ -110,7 +110,7 @@ def _plate(f: int, contact: Contact, found: Cell) -> str:
     return f'      <geom name="plate{f}" type="box" size="{size}" {placed} contype="0" conaffinity="0"/>'
 
 
-def _finger(f: int, contact: Contact) -> list[str]:
+def _finger(f: int, contact: PointContact) -> list[str]:
     """A ball on a rail along the contact normal."""
     geom = f'type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" contype="0" conaffinity="0"'
     return [

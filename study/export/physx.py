@@ -21,16 +21,16 @@ other material: give the object no more friction than the pads.
 
 from __future__ import annotations
 
-from softjaw.study.export.contact import RADIUS, Contact, cell, heading, numbers
-from softjaw.study.export.grasps import FloatArray, Grasp, quaternion
+from softjaw.study.export.point_contact import RADIUS, PointContact, cell, heading, numbers
+from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 
-def torsional_radius(contact: Contact) -> float:
+def torsional_radius(contact: PointContact) -> float:
     """Radius [m] for which PhysX's largest torque is the contact's."""
     return contact.r / contact.mu
 
 
-def as_usd(grasp: Grasp) -> str:
+def as_usd(grasp: RankedGrasp) -> str:
     """A stage of both fingers at one grasp, with the frame of the object's own file, as USD in text form (.usda)."""
     found = cell(grasp)
     return "\n".join(
@@ -74,7 +74,7 @@ def _placed(rotation: FloatArray, origin: FloatArray) -> list[str]:
     ]
 
 
-def _finger(f: int, contact: Contact) -> list[str]:
+def _finger(f: int, contact: PointContact) -> list[str]:
     """A body in the contact frame, with a ball that touches at its origin, and its material."""
     schemas = '"PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI"'
     return [

@@ -1,7 +1,7 @@
 """Grasps in the files that motion planners read: isaac_grasp, GraspGen and moveit_msgs/Grasp.
 
-All three take the pose of the gripper's frame in the frame of the object's own file; `study.export.grasps` says how the
-frame lies in the pads. Lengths are in m.
+All three take the pose of the gripper's frame in the frame of the object's own file; `study.export.selection` says how
+the frame lies in the pads. Lengths are in m.
 
 isaac_grasp (Isaac Sim, "Grasp Editor"; Isaac ROS, "Isaac Grasp File", format version 1.0): ``position``,
 ``orientation`` as ``{w, xyz}``, ``confidence`` from 0 to 1, ``cspace_position`` of the joints in the grasp and
@@ -27,8 +27,8 @@ from typing import Any
 import xarray as xr
 
 from softjaw.study.export.cases import MEANING, plain
-from softjaw.study.export.grasps import Grasp, Gripper
-from softjaw.study.export.text import yaml_text
+from softjaw.study.export.csv_yaml import yaml_text
+from softjaw.study.export.selection import GripperFrame, RankedGrasp
 from softjaw.study.ranking import task_keys
 from softjaw.study.units import UNITS
 
@@ -36,7 +36,7 @@ CLOSING = {"isaac_grasp": "y", "graspgen": "x", "moveit": "y"}  # as Franka's ha
 WAY, LEAST_WAY = 0.1, 0.05  # of approach and retreat [m]: wanted, and enough
 
 
-def as_isaac_grasp(found: Sequence[Grasp], gripper: Gripper, ds: xr.Dataset) -> str:
+def as_isaac_grasp(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """An isaac_grasp file; what it has no field for stands in comments."""
     made: dict[str, Any] = {"#": _about(ds, gripper), "format": "isaac_grasp", "format_version": 1.0}
     for key, name in (("object_frame", gripper.object_frame), ("gripper_frame", gripper.gripper_frame)):
@@ -45,7 +45,7 @@ def as_isaac_grasp(found: Sequence[Grasp], gripper: Gripper, ds: xr.Dataset) -> 
     return yaml_text(made)
 
 
-def _isaac_grasp(grasp: Grasp, gripper: Gripper) -> dict[str, Any]:
+def _isaac_grasp(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
     x, y, z, w = grasp.quaternion.tolist()
     return {
         "#": grasp.remark,
@@ -57,7 +57,7 @@ def _isaac_grasp(grasp: Grasp, gripper: Gripper) -> dict[str, Any]:
     }
 
 
-def as_graspgen(found: Sequence[Grasp], gripper: Gripper, ds: xr.Dataset) -> str:
+def as_graspgen(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them."""
     keys = task_keys(ds, "object")
     made = {
@@ -81,12 +81,12 @@ def as_graspgen(found: Sequence[Grasp], gripper: Gripper, ds: xr.Dataset) -> str
     return json.dumps(made, indent=1)
 
 
-def as_moveit(found: Sequence[Grasp], gripper: Gripper, ds: xr.Dataset) -> str:
+def as_moveit(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """A list of moveit_msgs/Grasp under ``grasps``; what a message has no field for stands in comments."""
     return yaml_text({"#": _about(ds, gripper), "grasps": [_moveit(grasp, gripper) for grasp in found]})
 
 
-def _moveit(grasp: Grasp, gripper: Gripper) -> dict[str, Any]:
+def _moveit(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
     pose = {
         "position": dict(zip("xyz", grasp.origin.tolist(), strict=True)),
         "orientation": dict(zip("xyzw", grasp.quaternion.tolist(), strict=True)),
@@ -111,7 +111,7 @@ def _header(frame: str) -> dict[str, Any]:
     return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame}
 
 
-def _posture(gripper: Gripper, position: float, effort: list[float]) -> dict[str, Any]:
+def _posture(gripper: GripperFrame, position: float, effort: list[float]) -> dict[str, Any]:
     """A trajectory_msgs/JointTrajectory of one point."""
     count = len(gripper.joints)
     point = {
@@ -124,13 +124,13 @@ def _posture(gripper: Gripper, position: float, effort: list[float]) -> dict[str
     return {"header": _header(""), "joint_names": list(gripper.joints), "points": [point]}
 
 
-def _way(gripper: Gripper, z: float) -> dict[str, Any]:
+def _way(gripper: GripperFrame, z: float) -> dict[str, Any]:
     """A moveit_msgs/GripperTranslation along the gripper's own z axis."""
     direction = {"header": _header(gripper.gripper_frame), "vector": {"x": 0.0, "y": 0.0, "z": z}}
     return {"direction": direction, "desired_distance": WAY, "min_distance": LEAST_WAY}
 
 
-def _about(ds: xr.Dataset, gripper: Gripper) -> str:
+def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     """What to know about all grasps of a file."""
     return "\n".join(
         [

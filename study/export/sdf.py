@@ -26,19 +26,19 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.export.contact import PAD_MASS, RADIUS, Contact, cell, heading, numbers
-from softjaw.study.export.grasps import FloatArray, Grasp
+from softjaw.study.export.point_contact import PAD_MASS, RADIUS, PointContact, cell, heading, numbers
+from softjaw.study.export.selection import FloatArray, RankedGrasp
 
 VERSION = "1.7"  # the newest that Gazebo Classic reads
 BALL = 3 * math.pi / 16  # torque over radius, friction and normal force of the patch that ODE assumes
 
 
-def patch_radius(contact: Contact) -> float:
+def patch_radius(contact: PointContact) -> float:
     """Radius [m] for which ODE's largest torque is the contact's, with its smaller slide as coefficient."""
     return contact.r / (BALL * contact.mu)
 
 
-def as_sdf(grasp: Grasp) -> str:
+def as_sdf(grasp: RankedGrasp) -> str:
     """A model of both fingers at one grasp, with the frame of the object's own file."""
     found = cell(grasp)
     return "\n".join(
@@ -60,7 +60,7 @@ def _pose(rotation: FloatArray, origin: FloatArray) -> str:
     return numbers(*origin, *np.asarray(Rotation.from_matrix(rotation).as_euler("xyz")))
 
 
-def _finger(f: int, contact: Contact) -> list[str]:
+def _finger(f: int, contact: PointContact) -> list[str]:
     """A link in the contact frame, with a ball that touches at its origin."""
     size = numbers(0.4 * PAD_MASS * RADIUS**2)
     return [

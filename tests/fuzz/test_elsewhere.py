@@ -18,7 +18,7 @@ from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
-from softjaw.study.export.text import csv_text
+from softjaw.study.export.csv_yaml import csv_text
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.result.guarded import trouble

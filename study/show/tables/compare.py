@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
-from softjaw.study.export.text import csv_text, with_unit
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.ranking import falling

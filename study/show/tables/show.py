@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from rich.cells import cell_len
 
-from softjaw.study.export.text import csv_text, with_unit
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
 from softjaw.study.ranking import at_level, judged, passed_over, rank_values, ranked, score_of

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.export.text import csv_text, with_unit
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES
 from softjaw.study.result.lock import holder

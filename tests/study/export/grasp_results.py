@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.case.candidates import axis_poses
-from softjaw.study.export.grasps import Choice, Gripper, grasps
+from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 from tests.study.formula_results import grid_axes, make
 
@@ -76,7 +76,7 @@ def opened(path):
 
 def all_grasps(path, force, **choice):
     """Its grasps at a force, in the order of the stations."""
-    found = grasps(opened(path), Choice(force=force, **choice), Gripper(closing="x"))
+    found = grasps(opened(path), Selection(force=force, **choice), GripperFrame(closing="x"))
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 

@@ -12,10 +12,10 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import APPROACHES, FORMATS
-from softjaw.study.export import grasps as module
-from softjaw.study.export.grasps import Choice, Gripper, grasps, quaternion
+from softjaw.study.export import selection as module
+from softjaw.study.export.csv_yaml import yaml_text
 from softjaw.study.export.planners import CLOSING
-from softjaw.study.export.text import yaml_text
+from softjaw.study.export.selection import GripperFrame, Selection, grasps, quaternion
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from tests.study.export.grasp_results import RADIUS, STATIONS, geometry, opened, write
@@ -115,7 +115,7 @@ def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
 def test_the_gripper_stands_over_its_pads(path, approach, closing):
     """Where the file's pads are, seen from the gripper: finger 1 behind, finger 2 ahead along its closing axis."""
     depth = 0.1
-    for grasp in grasps(opened(path), Choice(force=4.0), Gripper((approach,), closing, depth)):
+    for grasp in grasps(opened(path), Selection(force=4.0), GripperFrame((approach,), closing, depth)):
         R, o, _ = geometry(station_of(grasp.case["fingers"][0]["pose_origin"]))
         one, two = (grasp.rotation.T @ (origin - grasp.origin) for origin in o)
         ahead = np.array([RADIUS, 0, 0] if closing == "x" else [0, RADIUS, 0])

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from softjaw.study.export.contact import cell
 from softjaw.study.export.mjcf import as_mjcf, friction, tangents
 from softjaw.study.export.physx import as_usd
+from softjaw.study.export.point_contact import cell
 from softjaw.study.export.sdf import as_sdf
 from softjaw.study.messages import StudyError
 from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, geometry, slipping, write

@@ -37,7 +37,7 @@ COMMENT = 100  # characters in a line of a comment
 
 
 @dataclass(frozen=True)
-class Choice:
+class Selection:
     """Which grasps are written: the first ``top`` (0: all), ranked ``by`` a map at a ``force`` [N].
 
     ``least`` gives smallest values by the name of a map, in the unit in which ``softjaw show`` prints it; a grasp with
@@ -52,8 +52,8 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Gripper:
-    """What a planner's format wants to know of the gripper: its frame in the pads (see the module), names, distances.
+class GripperFrame:
+    """Where the gripper's frame lies in the pads (see the module), with names and distances that formats want.
 
     ``joints`` are those of both fingers, each at half the opening; ``wider`` [m] is how much the fingers open beyond
     first touch before the grasp; ``depth`` [m] lies between the origin of the frame and the middle of the pads.
@@ -69,7 +69,7 @@ class Gripper:
 
 
 @dataclass(frozen=True, eq=False)
-class Grasp:
+class RankedGrasp:
     """A solved case as planners take it.
 
     ``place`` is the case in words. ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m]
@@ -151,7 +151,7 @@ def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: floa
     return np.column_stack(columns), middle - depth * z
 
 
-def chosen(ds: xr.Dataset, choice: Choice) -> tuple[list[dict[str, Any]], list[str], str]:
+def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], list[str], str]:
     """Cases of the chosen grasps, the best first, the same in words, and the map that they are ranked by.
 
     Raises
@@ -179,7 +179,7 @@ def chosen(ds: xr.Dataset, choice: Choice) -> tuple[list[dict[str, Any]], list[s
     return [case for case, _ in found], [place for _, place in found], score_of(at, choice.by)
 
 
-def grasps(ds: xr.Dataset, choice: Choice, gripper: Gripper) -> list[Grasp]:
+def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[RankedGrasp]:
     """The chosen grasps with the gripper's pose, one for each direction of approach."""
     found, places, by = chosen(ds, choice)
     score = np.nan_to_num([max(float(case["maps"][by]), 0.0) for case in found])
@@ -191,11 +191,11 @@ def grasps(ds: xr.Dataset, choice: Choice, gripper: Gripper) -> list[Grasp]:
         for approach in gripper.approach:
             R, o = gripper_frame(case, approach, gripper.closing, gripper.depth)
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
-            made.append(Grasp(name, place, case, R, o, merit, case["place"]["normal_force"], mass, units))
+            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], mass, units))
     return made
 
 
-def usable(found: Sequence[Grasp]) -> tuple[list[Grasp], str]:
+def usable(found: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     """Grasps that hold the object and do no harm, and a sentence on those left out."""
     kept = [grasp for grasp in found if not grasp.lost]
     left = [grasp for grasp in found if grasp.lost]

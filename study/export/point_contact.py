@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.export.grasps import FloatArray, Grasp
+from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
 
 RADIUS = 0.01  # of the ball that stands for a pad [m]: any will do, because it touches at one point
@@ -27,7 +27,7 @@ PAD_MASS, OBJECT_MASS = 0.02, 0.1  # [kg]: a result file need not know them, and
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class PointContact:
     """One finger: its contact frame (axes x, y, N as columns, N into the object), and its friction over ``F_N`` [N]."""
 
     rotation: FloatArray
@@ -51,12 +51,12 @@ class Cell:
     along their long side.
     """
 
-    contacts: tuple[Contact, Contact]
+    contacts: tuple[PointContact, PointContact]
     rotation: FloatArray
     origin: FloatArray
 
 
-def cell(grasp: Grasp) -> Cell:
+def cell(grasp: RankedGrasp) -> Cell:
     """The scene of a grasp.
 
     Raises
@@ -72,14 +72,14 @@ def cell(grasp: Grasp) -> Cell:
     return Cell((one, two), W.T, -W.T @ middle)
 
 
-def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> Contact:
+def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> PointContact:
     F_N = float(finger["F_N"])
     if not (math.isfinite(F_N) and F_N > 0):
         raise StudyError(USAGE, f"this grasp has a normal force of {F_N:g} N: friction over it is not defined")
     # Between two solved forces the axes lie on straight lines, which leave the rotations: the nearest one is taken.
     U, _, V = np.linalg.svd(W.T @ finger["frame_axes"].T)
     f_x, f_y, tau_z = (float(finger[name]) / F_N for name in ("f_x_max", "f_y_max", "tau_z_max"))
-    return Contact(U @ V, W.T @ (finger["frame_origin"] - middle), f_x, f_y, tau_z, F_N)
+    return PointContact(U @ V, W.T @ (finger["frame_origin"] - middle), f_x, f_y, tau_z, F_N)
 
 
 def numbers(*values: float) -> str:
@@ -91,7 +91,7 @@ def numbers(*values: float) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def heading(grasp: Grasp) -> list[str]:
+def heading(grasp: RankedGrasp) -> list[str]:
     """What the comment at the top of a file says of its grasp."""
     lines = ["Made by softjaw from one grasp of a result file; lengths in m, forces in N.", *grasp.remark.splitlines()]
     return [line.replace("--", "- -") for line in lines]  # two dashes would end a comment of XML
