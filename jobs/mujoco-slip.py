@@ -28,8 +28,7 @@ LOADS = {
     "f_x, tau_z": (1, 0, 1),
     "f_x, f_y, tau_z": (1, 1, 1),
 }
-STEPS = 2000  # of 1 ms, from no load to TOP times the predicted one
-TOP = 1.5
+STEPS, TOP = 2000, 1.5  # of 1 ms, from no load to so many times the predicted one
 MOVES = (1e-4, 1e-4, 1e-2)  # speeds [m/s, m/s, rad/s] from which a finger slips
 FREE = (("x", "mjJNT_SLIDE", (1, 0, 0)), ("y", "mjJNT_SLIDE", (0, 1, 0)), ("turn", "mjJNT_HINGE", (0, 0, 1)))
 
@@ -43,14 +42,14 @@ def fixture(text: str, finger: int) -> mujoco.MjModel:
     return spec.compile()
 
 
-def slip(model: mujoco.MjModel, load: np.ndarray, top: float = TOP, steps: int = STEPS) -> float:
+def slip(model: mujoco.MjModel, load: np.ndarray, steps: int = STEPS) -> float:
     """Multiple of a load ``(f_x, f_y, tau_z)`` [N, N, N m] at which the finger slips; inf where it never does."""
     data = mujoco.MjData(model)
     dofs = [model.joint(name).dofadr[0] for name, *_ in FREE]
     for _ in range(300):  # until the finger presses
         mujoco.mj_step(model, data)
     for i in range(steps):
-        data.qfrc_applied[dofs] = (at := top * (i + 1) / steps) * load
+        data.qfrc_applied[dofs] = (at := TOP * (i + 1) / steps) * load
         mujoco.mj_step(model, data)
         if (np.abs(data.qvel[dofs]) > MOVES).any():
             return at
@@ -64,10 +63,10 @@ def predicted(grasp: RankedGrasp, finger: int, shares: tuple[int, ...]) -> np.nd
     return w * contact.F_N * np.array([contact.mu_x, contact.mu_y, contact.r])
 
 
-def ratios(grasp: RankedGrasp, finger: int = 1) -> list[float]:
+def ratios(grasp: RankedGrasp, finger: int = 1, steps: int = STEPS) -> list[float]:
     """Simulated over predicted load of every one of `LOADS`."""
     model = fixture(as_mjcf(grasp), finger)
-    return [slip(model, predicted(grasp, finger, shares)) for shares in LOADS.values()]
+    return [slip(model, predicted(grasp, finger, shares), steps) for shares in LOADS.values()]
 
 
 def rows(file: str, count: int = 5) -> Iterator[list[str]]:

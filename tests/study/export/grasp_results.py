@@ -74,9 +74,10 @@ def opened(path):
     return open_result(path)
 
 
-def all_grasps(path, force, **choice):
+@lru_cache
+def all_grasps(path, force):
     """Its grasps at a force, in the order of the stations."""
-    found = grasps(opened(path), Selection(force=force, **choice), GripperFrame(closing="x"))
+    found = grasps(opened(path), Selection(force=force), GripperFrame(closing="x"))
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 

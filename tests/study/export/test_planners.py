@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -62,12 +63,16 @@ def path(tmp_path_factory):
     return write(tmp_path_factory.mktemp("planners") / "grasps.hdf", **{"flags/flags": flags})
 
 
-@pytest.fixture
-def said(path, capsys, monkeypatch):
+@pytest.fixture(autouse=True)
+def one_rank_that_reads_once(path, monkeypatch):
+    """Every rank of an mpirun speaks, and no command reads the file again."""
     for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("softjaw.study.cli.exporting.open", lambda _: opened(path))  # read once, not by every command
+    monkeypatch.setattr("softjaw.study.cli.exporting.open", lambda _: opened(path))
 
+
+@pytest.fixture
+def said(path, capsys):
     def say(*words):
         assert main(["export", str(path), *map(str, words)]) == 0
         return capsys.readouterr().out
@@ -110,12 +115,12 @@ def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
     assert set(CLOSING) == set(PLANNERS)
 
 
-@pytest.mark.parametrize("approach", APPROACHES)
 @pytest.mark.parametrize("closing", ["x", "y"])
-def test_the_gripper_stands_over_its_pads(path, approach, closing):
+def test_the_gripper_stands_over_its_pads(path, closing):
     """Where the file's pads are, seen from the gripper: finger 1 behind, finger 2 ahead along its closing axis."""
     depth = 0.1
-    for grasp in grasps(opened(path), Selection(force=4.0), GripperFrame((approach,), closing, depth)):
+    found = grasps(opened(path), Selection(force=4.0), GripperFrame(APPROACHES, closing, depth))
+    for grasp, approach in zip(found, 5 * APPROACHES, strict=True):
         R, o, _ = geometry(station_of(grasp.case["fingers"][0]["pose_origin"]))
         one, two = (grasp.rotation.T @ (origin - grasp.origin) for origin in o)
         ahead = np.array([RADIUS, 0, 0] if closing == "x" else [0, RADIUS, 0])
@@ -125,6 +130,7 @@ def test_the_gripper_stands_over_its_pads(path, approach, closing):
         assert grasp.rotation[:, 2] == pytest.approx(-axis if approach.startswith("minus") else axis)
         assert np.linalg.det(grasp.rotation) == pytest.approx(1)
         assert turned(*grasp.quaternion) == pytest.approx(grasp.rotation, abs=1e-12)
+        assert grasp.name.endswith(approach.replace("-", "_"))
 
 
 @pytest.mark.parametrize("half_turn", [np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1])])
@@ -210,15 +216,14 @@ def test_grasps_are_chosen_by_rank_force_and_least_values(path, said):
     found = json.loads(said("--json", "--force", 2, "--top", 1))["cases"]
     assert [case["normal_force"] for case in found] == [2.0]
     assert found[0]["maps"]["payload"] == pytest.approx(0.2 * (1 + STATIONS[4]))
-    by_y = json.loads(said("--json", "--force", 4, "--by", "payload"))["cases"]
-    assert [case["station"] for case in by_y] == pytest.approx([*held, STATIONS[LOST]])
+    assert stations("--force", 4, "--by", "payload") == pytest.approx([*held, STATIONS[LOST]])
     each = json.loads(said("--format", "graspgen", "--top", 2, "--approach", "x", "--approach", "minus-y"))
     assert each["grasps"]["names"] == ["grasp_0_x", "grasp_0_minus_y", "grasp_1_x", "grasp_1_minus_y"]
 
 
 def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
     for name in SIMULATORS:
-        assert 'grasp_0"' in said("--format", name) or 'Xform "grasp"' in said("--format", name)
+        assert re.search(r'"grasp(_0)?"', said("--format", name))
     out = tmp_path / "grasp.xml"
     said("--format", "mjcf", "--top", 3, "-o", out)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["grasp-1.xml", "grasp-2.xml", "grasp-3.xml"]
