@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import DONE
+from softjaw.study.result.between import at_force
 
 IntArray = NDArray[np.int64]
 LARGEST = "the largest that was solved"
@@ -130,6 +131,35 @@ def rank_values(ds: Any, name: str, k: int, each: bool) -> np.ndarray:
         return values
     force, most = ds["force_low"].values.ravel(), values[np.isfinite(values)].max(initial=0.0)
     return np.where(np.isfinite(force), 1.0 / force, values - most - 1.0)
+
+
+def ranked(ds: Any, k: int, by: str | None = None, each: bool = False) -> IntArray:
+    """The candidates solved at a force level, flat, the best first; see `score_of`, `rank_values` and `ranking`."""
+    done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
+    score = rank_values(ds, score_of(ds, by), k, each)[done]
+    return done[ranking(score, judged(ds)[..., k].ravel()[done])]
+
+
+def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
+    """The dataset at a force [N], the number of its level, and in words why it is that one.
+
+    Between two solved forces values lie on straight lines; without a force it is the one of `shown_level`.
+
+    Raises
+    ------
+    ValueError
+        For a force outside of the solved ones.
+    """
+    forces = ds["normal_force"].values
+    if force is None:
+        k, why = shown_level(ds, judged(ds))
+        return ds, k, f", {why}"
+    near = np.flatnonzero(np.isclose(forces, force))
+    if near.size:
+        return ds, int(near[0]), ""
+    at = at_force(ds, force)
+    low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
+    return at, 0, f", by straight lines from {low:g} to {high:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import math
 import shutil
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
+from softjaw.study.cli import values
 from softjaw.study.messages import MEANING, first_rank
 from softjaw.study.quantities import RANKED_BY
 
@@ -19,6 +19,21 @@ KINDS = {
     "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
+FORMATS = {  # of export: what stands in the file
+    "csv": "every case: maps, pads, contact frames, limit surfaces; SI units",
+    "json": "the same, with units, meanings and the words of the flags",
+    "isaac_grasp": "grasps for Isaac Sim and Isaac ROS (YAML)",
+    "graspgen": "grasps as GraspGen keeps them (JSON), with all that is known",
+    "moveit": "a list of moveit_msgs/Grasp for ROS 2 (YAML)",
+    "mjcf": "a MuJoCo scene of one grasp, with the friction of each finger",
+    "sdf": "the fingers of one grasp for Gazebo Classic with ODE",
+    "physx": "the fingers of one grasp for PhysX and Isaac Sim (USD, .usda)",
+}
+NO_DRAKE = (
+    "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
+    " pressure field, and with it e_n, of its own; expected"
+)
+APPROACHES = ("x", "minus-x", "y", "minus-y")
 SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words, its module
     "prepare": (
@@ -48,8 +63,8 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results"),
     ),
     "use the numbers": (
-        ("export", "every case for planners: maps, frames, limit surfaces",
-         "export results/smoke.hdf --csv -o results/smoke.csv", "cli.results"),
+        ("export", "grasps and their friction for planners and simulators",
+         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.exporting"),
         ("patch", "judge a pressure field from elsewhere: friction, score",
          "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
     ),
@@ -147,7 +162,8 @@ def program() -> Program:
 
 def _add_watch_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    parser.add_argument("--every", type=_seconds, default=2.0, metavar="S", help="seconds between looks (default 2)")
+    every = "seconds between looks (default 2)"
+    parser.add_argument("--every", type=values.seconds, default=2.0, metavar="S", help=every)
     ending = "Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are not computed."
     parser.description = textwrap.fill(f"{parser.description} {ending} Ctrl-C ends the view, not the run.", 78)
 
@@ -174,9 +190,9 @@ def _add_scene_options(made: dict[str, Any]) -> None:
         parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
                             help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
     add = made["plan"].add_argument
-    add("-n", type=_counts, default=(1,), metavar="RANKS", dest="ranks", help="ranks (default 1); several, as in "
+    add("-n", type=values.counts, default=(1,), metavar="RANKS", dest="ranks", help="ranks (default 1); several, as in "
         "16,64,256, replay the times of a finished study on each")  # fmt: skip
-    add("--repeat", type=_whole(1), default=1, metavar="K", help="replay a study of K times as many candidates")
+    add("--repeat", type=values.whole(1), default=1, metavar="K", help="replay a study of K times as many candidates")
     for parser in (made["plan"], made["run"]):
         parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
     made["run"].add_argument("--retry-failed", action="store_true", help="solve failed cases again")
@@ -191,20 +207,51 @@ def _add_result_options(made: dict[str, Any]) -> None:
         form = made[name].add_mutually_exclusive_group(required=name == "export")
         form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
         form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
-    made["show"].add_argument("--force", type=_positive, metavar="N", help="normal force [N], solved or between two "
-                              "solved ones (default: the lowest that holds the object, else the largest)")  # fmt: skip
-    made["show"].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where the "
-                              "scene has a mass or the direction of a weight, else quality)")  # fmt: skip
+        if name == "export":
+            form.add_argument("--format", type=_format, choices=tuple(FORMATS), dest="form", metavar="FORMAT",
+                              help="one of those below")  # fmt: skip
+    for name in ("show", "export"):
+        made[name].add_argument("--force", type=values.positive, metavar="N", help="normal force [N], solved or "
+                                "between two solved ones (default: the lowest that holds the object, else the largest)"
+                                )  # fmt: skip
+        made[name].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where "
+                                "the scene has a mass or the direction of a weight, else quality)")  # fmt: skip
     made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
                                  "(default e_n)")  # fmt: skip
     for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
-        made[name].add_argument("--top", type=_whole(0), default=10, metavar="K", help=f"{listed}, 0: all (default 10)")
+        many = f"{listed}, 0: all (default 10)"
+        made[name].add_argument("--top", type=values.whole(0), default=10, metavar="K", help=many)
     for name in ("compare", "export"):
         made[name].add_argument("--model", choices=("ccm", "pcm", "pcm_projected"), default="ccm",
                                 help="friction model (default ccm)")  # fmt: skip
-    made["export"].add_argument("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    _add_export_options(made["export"])
     _add_choice(made["report"])
     made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
+
+
+def _add_export_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--top", type=values.whole(0), metavar="K", help="how many grasps, the best first, 0: all (default: 1 for a "
+        "simulator, else all; a simulator gets a file for each)")  # fmt: skip
+    add("--min", type=values.bound, metavar="NAME=VALUE", action="append", default=[], dest="least", help="leave out "
+        "grasps with less, in the unit of 'softjaw show': payload=200 is 200 g; repeatable")  # fmt: skip
+    add("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
+    add = parser.add_argument_group("the gripper, for isaac_grasp, graspgen and moveit").add_argument
+    add("--approach", choices=APPROACHES, action="append", dest="approaches", help="from palm to fingertips: along "
+        "the long side (x) or the short side (y) of finger 1's pad, or against it; repeatable (default minus-x)"
+        )  # fmt: skip
+    add("--closing", choices=("x", "y"), help="axis of the gripper's frame from finger 1 to finger 2; z approaches "
+        "(default x for graspgen, else y)")  # fmt: skip
+    add("--depth", type=values.not_negative, default=0.0, metavar="MM", help="from the origin of the gripper's frame "
+        "to the middle of the pads (default 0)")  # fmt: skip
+    add("--wider", type=values.not_negative, default=20.0, metavar="MM", help="how far the gripper opens beyond first "
+        "touch (default 20)")  # fmt: skip
+    add("--joints", type=values.names, default=("finger_joint1", "finger_joint2"), metavar="A,B", help="joints of the "
+        "fingers, each at half the opening (default finger_joint1,finger_joint2)")  # fmt: skip
+    add("--gripper-frame", default="gripper", metavar="NAME", help="name of the gripper's frame (default gripper)")
+    add("--object-frame", default="object", metavar="NAME", help="name of the object's frame (default object)")
+    listed = "\n".join(f"  {name:<12} {text}" for name, text in FORMATS.items())
+    parser.epilog = f"{parser.epilog}\n\nformats:\n{listed}"
 
 
 def _add_cost_options(parser: argparse.ArgumentParser) -> None:
@@ -213,24 +260,25 @@ def _add_cost_options(parser: argparse.ArgumentParser) -> None:
         "written beside it")  # fmt: skip
     add("--candidate", metavar="NAME", action="append", default=[], dest="candidates", help="candidate to measure, by "
         "number or label; repeatable (default: three of them)")  # fmt: skip
-    add("--time-limit", metavar="SECONDS", type=_positive, default=300.0, help="CPU seconds of the whole study; "
+    add("--time-limit", metavar="SECONDS", type=values.positive, default=300.0, help="CPU seconds of the whole study; "
         "finer levels are left out (default 300)")  # fmt: skip
 
 
 def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
-    add("--mu", type=_positive, default=0.8, help="friction coefficient (default 0.8)")
-    add("--long-side", type=_direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the pad's long "
-        "side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)")  # fmt: skip
+    add("--mu", type=values.positive, default=0.8, help="friction coefficient (default 0.8)")
+    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
+        "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
+        )  # fmt: skip
     add("--unit", choices=("m", "cm", "mm"), help="of lengths and areas that carry none in the file")
     add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="of a pressure that carries none in the file")
     add("--pressure-name", metavar="NAME", help="column or data array that holds the pressure (default: pressure)")
     add("--flip-normals", action="store_true", help="turn all normals; they point into the object, as the finger does")
     add("--other", metavar="FILE", help="the other contact of the grasp, in the same coordinates, units and options")
-    add("--distance", type=_positive, metavar="MM", help="between two such contacts that face each other")
-    add("--object-length", type=_positive, metavar="MM", help="divides torques of forces (default: the distance)")
-    add("--contact-length", type=_positive, metavar="MM", help="divides torques about the normals (default: rho)")
+    add("--distance", type=values.positive, metavar="MM", help="between two such contacts that face each other")
+    add("--object-length", type=values.positive, metavar="MM", help="divides torques of forces (default: the distance)")
+    add("--contact-length", type=values.positive, metavar="MM", help="divides torques about the normals (default: rho)")
     add("--surface", choices=SURFACES, default="quartic", help="limit surface that is scored (default: quartic)")
     add("-o", metavar="PICTURE", dest="picture", help="also write sections of the limit surface (.png or .svg)")
     add("--json", action="store_true", help="as JSON, SI units")
@@ -240,15 +288,15 @@ def _add_choice(parser: argparse.ArgumentParser) -> None:
     """Options that choose a candidate."""
     add = parser.add_argument
     add("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
-    add("--station", type=_finite, metavar="MM", help="candidate nearest to this station [mm]")
-    add("--angle", type=_finite, metavar="DEG", help="candidate nearest to this angle [deg]")
+    add("--station", type=values.finite, metavar="MM", help="candidate nearest to this station [mm]")
+    add("--angle", type=values.finite, metavar="DEG", help="candidate nearest to this angle [deg]")
 
 
 def _add_view_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="result file (.hdf)")
     _add_choice(parser)
-    add("--force", type=_finite, metavar="N", help="force level nearest to N [N]")
+    add("--force", type=values.finite, metavar="N", help="force level nearest to N [N]")
     add("--quantity", metavar="NAME", help="map on the object (default: quality)")
     add("--motion", choices=("x", "y", "turn"), default="x",
         help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
@@ -265,44 +313,7 @@ def _add_figure_options(parser: argparse.ArgumentParser) -> None:
         help="where the scenes' results are or will be (default: results)")  # fmt: skip
 
 
-def _whole(least: int) -> Callable[[str], int]:
-    """A type of whole numbers from ``least`` to a million."""
-
-    def count(text: str) -> int:
-        if not least <= (value := int(text)) <= 10**6:
-            raise argparse.ArgumentTypeError(f"found {text}, expected {least} to 1000000")
-        return value
-
-    return count
-
-
-def _counts(text: str) -> tuple[int, ...]:
-    return tuple(map(_whole(1), text.split(",")))
-
-
-def _seconds(text: str) -> float:
-    if not 0.1 <= (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
-    return value
-
-
-def _finite(text: str) -> float:
-    if not math.isfinite(value := float(text)):
-        raise argparse.ArgumentTypeError(f"found {text}, expected a number")
-    return value
-
-
-def _positive(text: str) -> float:
-    if not 0 < (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a number above 0")
-    return value
-
-
-def _direction(text: str) -> list[float]:
-    try:
-        found = [float(part) for part in text.split(",")]
-    except ValueError:
-        found = []
-    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
-        raise argparse.ArgumentTypeError(f"found {text}, expected three numbers such as 1,0,0, not all of them 0")
-    return found
+def _format(text: str) -> str:
+    if text == "drake":
+        raise argparse.ArgumentTypeError(f"{NO_DRAKE} {', '.join(FORMATS)}")
+    return text

@@ -5,11 +5,10 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, write_file
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene.problems import SceneError
-from softjaw.study.show.tables import export as exported
 from softjaw.study.show.tables import watch as watching
 from softjaw.study.show.tables.columns import terminal_width
 from softjaw.study.show.tables.compare import compare as compared
@@ -39,15 +38,6 @@ def compare(options: Namespace) -> str:
     found = compared(one, other, options.quantity, options.model)
     forms = {"json": comparison_json, "csv": comparison_csv}
     return forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
-
-
-def export(options: Namespace) -> str:
-    """Write every case for planners."""
-    text = {"json": exported.as_json, "csv": exported.as_csv}[options.form](open(options.file), options.model)
-    if options.output is None:
-        return text
-    write_file(Path(options.output), f"{text}\n")
-    return f"written: {options.output}"
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:

@@ -31,7 +31,7 @@ from softjaw.study.lookup.interpolation import (
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, turning
 from softjaw.study.quantities import DONE, MODELS
-from softjaw.study.ranking import judged, rank_values, ranking, score_of, shown_level
+from softjaw.study.ranking import judged, ranked, shown_level
 from softjaw.study.result.between import KINDS, contact_kinds
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.units import UNITS
@@ -145,10 +145,9 @@ class GraspMap:
         k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
         if force is not None and not np.isclose(forces[k], force):
             raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
-        score = rank_values(ds, score_of(ds, by), k, each=force is None)
-        done = np.flatnonzero(self.source.status[..., k].ravel() == DONE)
-        order = done[ranking(score[done], flags[..., k].ravel()[done])][:n]
-        low = ds["force_low"].values.ravel() if force is None and "force_low" in ds else np.full(score.shape, np.nan)
+        order = ranked(ds, k, by, each=force is None)[:n]
+        each = force is None and "force_low" in ds
+        low = ds["force_low"].values.ravel() if each else np.full(self.source.status[..., k].size, np.nan)
         found = []
         for i in order:
             station, angle = np.unravel_index(i, self.source.status.shape[:-1])

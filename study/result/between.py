@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import BOTH_ENDS, DONE, MISSING
+
+if TYPE_CHECKING:  # plans rank too, and answer before xarray would be loaded
+    import xarray as xr
 
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
 

@@ -16,7 +16,7 @@ import xarray as xr
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, Flag, flag_words, flags_in
 from softjaw.study.quantities import MODELS
-from softjaw.study.ranking import judged, rank_values, ranking, score_of, shown_level
+from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.units import shown, shown_unit
 
@@ -161,11 +161,9 @@ def unravelled(position: int, shape: tuple[int, ...]) -> Index:
 
 def order(ds: xr.Dataset, k: int) -> list[Index]:
     """Indices of the solved cases at a force level, the best first."""
-    states, each = ds.status.values[..., k], k == ds.attrs["level"]
-    done = np.flatnonzero(states.ravel() == DONE)
-    score = rank_values(ds, ds.attrs["score"], k, each)[done]
-    ranked = done[ranking(score, ds["flags"].values[..., k].ravel()[done])]
-    return [(*unravelled(int(c), states.shape), k) for c in ranked]
+    shape = ds.status.shape[:-1]
+    found = ranked(ds, k, ds.attrs["score"], each=k == ds.attrs["level"])
+    return [(*unravelled(int(c), shape), k) for c in found]
 
 
 def images(ds: xr.Dataset, index: Index) -> list[Index]:

@@ -108,9 +108,9 @@ def _mesh(path):
 
 
 def _result(path):
+    from softjaw.study.export.cases import as_csv
     from softjaw.study.result.read import dataset
     from softjaw.study.result.store import open_result
-    from softjaw.study.show.tables.export import as_csv
     from softjaw.study.show.tables.show import as_json, best
     from softjaw.study.show.tables.status import status_text
 

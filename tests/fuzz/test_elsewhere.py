@@ -18,12 +18,12 @@ from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
+from softjaw.study.export.csv_yaml import csv_text
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.result.guarded import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
-from softjaw.study.show.tables.columns import csv_text
 from tests.fuzz.lies import LIES
 from tests.fuzz.readers import QUICK, SCENE, obj, ply, stl
 from tests.study.formula_results import make

@@ -1,13 +1,11 @@
-"""Text that fits a terminal: tables with heads of two lines, lines that are broken between words, and CSV."""
+"""Text that fits a terminal: tables with heads of two lines, and lines that are broken between words."""
 
 from __future__ import annotations
 
-import csv
 import io
 import shutil
 import textwrap
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table as Grid
@@ -64,33 +62,6 @@ def head(name: str, unit: str) -> str:
     ('e_n\n[mm]', 'rank')
     """
     return f"{name}\n[{unit}]" if unit else name
-
-
-def with_unit(name: str, unit: str) -> str:
-    """Name of a column in one line: ``e_n [m]``."""
-    return f"{name} [{unit}]" if unit else name
-
-
-def csv_text(rows: Iterable[Sequence[Any]]) -> str:
-    """Rows as CSV without a line end after the last; None is an empty cell."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([[cell(v) for v in row] for row in rows])
-    return text.getvalue().rstrip("\n")
-
-
-def cell(value: Any) -> Any:
-    """A value as a cell of CSV: None is empty, and a text that a spreadsheet would compute stands behind an apostrophe.
-
-    >>> cell("=1+1"), cell("-3.5"), cell("at 0 mm"), cell(None)
-    ("'=1+1", '-3.5', 'at 0 mm', '')
-    """
-    if not isinstance(value, str) or value[:1] not in ("=", "+", "-", "@", "\t", "\r"):
-        return "" if value is None else value
-    try:
-        float(value)
-    except ValueError:
-        return f"'{value}"
-    return value
 
 
 def digits(value: float) -> str:

@@ -13,13 +13,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, mesh_error, values_of
 from softjaw.study.scene.text import changes, value_text
-from softjaw.study.show.tables.columns import PAPER, aligned, csv_text, digits, head, with_unit, wrapped
+from softjaw.study.show.tables.columns import PAPER, aligned, digits, head, wrapped
 from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]

@@ -12,16 +12,16 @@ import numpy as np
 import xarray as xr
 from rich.cells import cell_len
 
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE, map_row
-from softjaw.study.ranking import judged, passed_over, rank_values, ranking, score_of, shown_level
-from softjaw.study.result.between import at_force
+from softjaw.study.ranking import at_level, judged, passed_over, rank_values, ranked, score_of
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.result.store import place_text
 from softjaw.study.show.tables.answer import answer
 from softjaw.study.show.tables.certainty import E_N_ERROR, largest_error, sure, verdict
-from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
+from softjaw.study.show.tables.columns import GAP, PAPER, aligned, digits, head, wrapped
 from softjaw.study.show.tables.status import no_grasps
 from softjaw.study.units import shown, shown_unit
 
@@ -69,15 +69,13 @@ def best(
         For a force outside of the solved ones.
     """
     error = _largest_error(ds)
-    ds, k, why = _at(ds, force)
+    ds, k, why = at_level(ds, force)
     axes, flags = axes_of(ds), judged(ds)
     forces, shape = axes[-1].values, ds.status.shape[:-1]
     maps = {(name, unit): found[..., k].ravel() for name, unit, found in _columns(ds)}
     scored = score_of(ds, by)
     score = rank_values(ds, scored, k, each=force is None)
-    done = np.flatnonzero(ds.status.values[..., k].ravel() == DONE)
-    flags = flags[..., k].ravel()
-    order = done[ranking(score[done], flags[done])]
+    flags, order = flags[..., k].ravel(), ranked(ds, k, by, each=force is None)
     labels = np.broadcast_to(ds.label.values, shape).ravel()
     named = [("label", "")] if ds.attrs["poses"] else []
     maps |= {(name, "N"): ds[name].values.ravel() for name in FORCE_RANGE if name in ds}
@@ -90,11 +88,11 @@ def best(
 
     rows = _first((row(rank, i) for rank, i in enumerate(order, start=1)), top, titles if whole_lines else ())
     by = "force to use" if force is None and scored == "payload" and "force_low" in ds else scored
-    what = f"best {len(rows)} of {len(done)} solved candidates by {by}" if rows else "no candidate is solved"
+    what = f"best {len(rows)} of {len(order)} solved candidates by {by}" if rows else "no candidate is solved"
     holding = [int(i) for i in order if not flags[i] & LOST and np.isfinite(score[i])]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
     errors = verdict(sure(ds, scored, k), holding, same, ds[scored].attrs.get("units", ""))
-    errors = " ".join(filter(None, [errors, _passed_over(score[done], flags[done]), _left_out(ds, k)]))
+    errors = " ".join(filter(None, [errors, _passed_over(score[order], flags[order]), _left_out(ds, k)]))
     title = f"{what} at {forces[k]:g} N{why}{'' if rows else _solved_elsewhere(ds)}"
     first = (*(int(i) for i in np.unravel_index(order[0], shape)), k) if rows else None
     told = "" if first is None else answer(ds, first)
@@ -107,20 +105,6 @@ def _largest_error(ds: xr.Dataset) -> str:
     if errors is None and "e_n_interval" in ds:
         return ""
     return largest_error(errors, ds.status.values, lambda index: place_text(axes_of(ds), ds.label.values, index))
-
-
-def _at(ds: xr.Dataset, force: float | None) -> tuple[xr.Dataset, int, str]:
-    """The dataset at a force [N], the number of its level, and in words why it is that one."""
-    forces = ds.normal_force.values
-    if force is None:
-        k, why = shown_level(ds, judged(ds))
-        return ds, k, f", {why}"
-    near = np.flatnonzero(np.isclose(forces, force))
-    if near.size:
-        return ds, int(near[0]), ""
-    at = at_force(ds, force)
-    low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
-    return at, 0, f", by straight lines from {low:g} to {high:g} N"
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:

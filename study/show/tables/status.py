@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.study.export.csv_yaml import csv_text, with_unit
 from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES
 from softjaw.study.result.lock import holder
@@ -18,7 +19,7 @@ from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
 from softjaw.study.show.tables.certainty import E_N_ERROR, largest_error
-from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
+from softjaw.study.show.tables.columns import PAPER, terminal_width, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
 

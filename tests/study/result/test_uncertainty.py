@@ -15,6 +15,7 @@ from softjaw.study.case import candidates, probing
 from softjaw.study.case.candidates import axis_poses
 from softjaw.study.case.probing import _volume
 from softjaw.study.case.variations import by_formula, moved_poses, variations
+from softjaw.study.export.cases import cases
 from softjaw.study.lookup import GraspMap
 from softjaw.study.result import interval
 from softjaw.study.result.interval import derived
@@ -23,7 +24,6 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.scene.problems import SceneError
 from softjaw.study.show.tables.certainty import Sure, sure, verdict
 from softjaw.study.show.tables.compare import compare
-from softjaw.study.show.tables.export import cases
 from softjaw.study.show.tables.show import as_text, best
 from tests.study.formula_results import OBJECT, grid_axes, make
 

@@ -1,20 +1,20 @@
-"""Every case of a result file for planners: maps, contact frames, poses and limit surfaces, one row per case."""
+"""Cases of a result file as CSV and JSON: maps, contact frames, poses and limit surfaces, one row for each."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import flags_in
+from softjaw.study.export.csv_yaml import csv_text, with_unit
+from softjaw.study.flags import OF_FILE, flags_in
 from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, maps_in, values_of
-from softjaw.study.show.tables.columns import csv_text, with_unit
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
@@ -46,8 +46,10 @@ MEANING = {
 }
 
 
-def cases(ds: xr.Dataset, model: str = "ccm") -> Iterator[dict[str, Any]]:
-    """Every case: place, state, message, flags, maps in one friction model, and both fingers.
+def cases(
+    ds: xr.Dataset, model: str = "ccm", which: Iterable[tuple[int, ...]] | None = None
+) -> Iterator[dict[str, Any]]:
+    """Cases by their indices, or every case: place, state, message, flags, maps in one friction model, both fingers.
 
     Arrays are numpy arrays, NaN where a case has no result.
     """
@@ -55,7 +57,7 @@ def cases(ds: xr.Dataset, model: str = "ccm") -> Iterator[dict[str, Any]]:
     names = [name for name in maps_in(ds) if name != "flags"]
     maps = {name: np.where(status == DONE, values_of(ds, name, model), np.nan) for name in names}
     labels, flags, fingers = ds.label.values, ds.flags.values, _fingers(ds, model)
-    for index in np.ndindex(status.shape):
+    for index in np.ndindex(status.shape) if which is None else which:
         yield {
             "place": {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)},
             "label": str(labels[index[-3:-1]]),
@@ -88,20 +90,25 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
     return {name: found[name] for name, _, _ in FINGER}
 
 
-def as_json(ds: xr.Dataset, model: str = "ccm") -> str:
-    """One object: file, units, meanings, and a list of cases; SI units, null where there is nothing."""
+def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:
+    """One object: file, units, meanings, and a list of cases (`listed`, or all); SI units, null where there is nothing.
+
+    ``flags`` are those of the file, ``flag_words`` also those that the safe force range adds to listed cases.
+    """
     units: dict[str, Any] = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
     units |= {name: unit for name, unit, _ in FINGER}
     rows = []
-    for case in cases(ds, model):
-        place, words = case.pop("place"), [flag.word for flag in flags_in(case["flags"])]
-        rows.append(place | {k: _plain(v) for k, v in case.items()} | {"flag_words": words})
+    for case in cases(ds, model) if listed is None else listed:
+        place, words = case["place"], [flag.word for flag in flags_in(case["flags"])]
+        case = {**case, "flags": case["flags"] & OF_FILE}
+        del case["place"]
+        rows.append(place | {k: plain(v) for k, v in case.items()} | {"flag_words": words})
     about = {"file": Path(ds.file).name, "model": model, "units": units, "meaning": MEANING}
     return json.dumps({**about, "cases": rows}, indent=1)
 
 
-def as_csv(ds: xr.Dataset, model: str = "ccm") -> str:
-    """One line for each case, SI units in the header, empty where there is nothing."""
+def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:
+    """One line for each case (`listed`, or all), SI units in the header, empty where there is nothing."""
     maps = {name: unit for name, unit in maps_in(ds).items() if name != "flags"}
     head = [with_unit(axis.name, axis.units) for axis in axes_of(ds)]
     head += ["label", "state", "message", "flags", *(with_unit(*pair) for pair in maps.items())]
@@ -110,28 +117,29 @@ def as_csv(ds: xr.Dataset, model: str = "ccm") -> str:
             each = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
             names = [f"finger{f}.{name}.{part}" for part in parts] or [f"finger{f}.{name}"]
             head += [with_unit(n, u) for n, u in zip(names, each, strict=True)]
-    return csv_text([head, *(_line(case, tuple(maps)) for case in cases(ds, model))])
+    rows = cases(ds, model) if listed is None else listed
+    return csv_text([head, *(_line(case, tuple(maps)) for case in rows)])
 
 
 def _line(case: dict[str, Any], maps: tuple[str, ...]) -> list[Any]:
     """A case as a line of CSV."""
     flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
     numbers = [*(float(case["maps"][name]) for name in maps), *flat]
-    lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"]]
+    lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"] & OF_FILE]
     # repr loses no digit, so what is read back is what was stored.
     return [*lead, *(None if np.isnan(v) else repr(v) for v in numbers)]
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """A value as JSON takes it: nested lists, None for what is not there; an array without any number is None."""
     if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
+        return {key: plain(v) for key, v in value.items()}
     if isinstance(value, list):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     if isinstance(value, str | int):
         return value
     numbers = np.asarray(value, float)
     if not numbers.ndim:
         # JSON has no NaN.
         return float(numbers) if np.isfinite(numbers) else None
-    return [_plain(v) for v in numbers] if np.isfinite(numbers).any() else None
+    return [plain(v) for v in numbers] if np.isfinite(numbers).any() else None

@@ -1,0 +1,57 @@
+"""The command that writes grasps for planners and simulators."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from softjaw.study.export.cases import as_csv, as_json
+from softjaw.study.export.mjcf import as_mjcf
+from softjaw.study.export.physx import as_usd
+from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
+from softjaw.study.export.sdf import as_sdf
+from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
+from softjaw.study.messages import USAGE, StudyError, write_file
+from softjaw.study.result.read import open
+from softjaw.study.units import in_si
+
+TABLES = {"csv": as_csv, "json": as_json}
+PLANNERS = {"isaac_grasp": as_isaac_grasp, "graspgen": as_graspgen, "moveit": as_moveit}
+SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
+
+
+def export(options: Namespace) -> str:
+    """Write grasps for planners and simulators; files that were written, or the text itself."""
+    ds = open(options.file)
+    few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
+    choice = Selection(options.model, options.force, options.by, few, dict(options.least))
+    if options.form in TABLES:
+        asked = options.force or options.by or options.least or options.top is not None
+        return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, choice)[0] if asked else None)])
+    closing = options.closing or CLOSING.get(options.form, "x")
+    gripper = GripperFrame(
+        tuple(options.approaches or ("minus-x",)), closing, in_si("depth_mm", options.depth),
+        in_si("wider_mm", options.wider), options.joints, options.gripper_frame, options.object_frame,
+    )  # fmt: skip
+    found = grasps(ds, choice, gripper)
+    if options.form != "graspgen":  # which has a field for those that do not hold
+        found, left = usable(found)
+        if left:
+            print(f"note: {left}", file=sys.stderr)
+    if not found:
+        raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
+    if options.form in PLANNERS:
+        return _written(options, [PLANNERS[options.form](found, gripper, ds)])
+    return _written(options, [SIMULATORS[options.form](grasp) for grasp in found])
+
+
+def _written(options: Namespace, texts: list[str]) -> str:
+    """The names of the files that now hold these texts, the second and later ones with a number; or the one text."""
+    if options.output is None:
+        if len(texts) > 1:
+            raise StudyError(USAGE, f"--top: {len(texts)} grasps are a file each; name them with -o, or write --top 1")
+        return texts[0]
+    path = Path(options.output)
+    paths = [path if len(texts) == 1 else path.with_stem(f"{path.stem}-{i}") for i in range(1, len(texts) + 1)]
+    return "\n".join(f"written: {write_file(p, text + chr(10))}" for p, text in zip(paths, texts, strict=True))

@@ -1,0 +1,123 @@
+"""MuJoCo: the ellipsoidal limit surface as an elliptic friction cone with ``condim = 4``.
+
+MuJoCo bounds the friction forces of a contact (f_1, f_2 along its tangents, the torque f_3 about its normal) by
+
+    (f_1 / mu_1)^2 + (f_2 / mu_2)^2 + (f_3 / mu_3)^2 <= f_N^2
+
+(MuJoCo documentation, "Computation", section on friction cones, and "XML reference", pair, friction): an ellipsoid with
+semi-axes mu_i f_N. With mu_1 = f_x / F_N, mu_2 = f_y / F_N and mu_3 = tau_z / F_N, a length [m], it is the ellipsoid
+from three motions of `study.export.point_contact`: torque, slides and all loads between them slip where the result file
+says, at its F_N, and scale with the normal force beside it. What the fitted quartic knows beyond it is lost.
+
+Four things belong to it.
+
+* The pad is a ball, which touches at one point. A box would touch at several, and each would add its own torque.
+* ``cone="elliptic"``: the default is a pyramid. ``impratio="100"`` makes friction as stiff as normal contact, and
+  ``noslip_iterations="50"`` stops the creep that MuJoCo's soft friction has below slip; without it a grasp turns slowly
+  under any torque.
+* A ``<pair>``: it alone takes two slides, and nobody's other friction is mixed in.
+* The tangents. MuJoCo does not turn them with the pad: the first is the world's y axis laid into the contact plane, or
+  the z axis where the normal is within 60 degrees of y (``mju_makeFrame`` of its sources). The file therefore stands in
+  the frame of the closed pads, x across and y along their long side. Where the tangents are not the contact's axes, and
+  for a gripper that turns, the smaller slide in both places is on the safe side.
+
+The file is a scene that runs: two fingers on rails that press with F_N, and an object of two plates at the contact
+frames, which floats. Its mass is that of the scene, else 0.1 kg; the fingers' is 0.02 kg.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softjaw.study.export.point_contact import OBJECT_MASS, PAD_MASS, RADIUS, Cell, PointContact, cell, heading, numbers
+from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
+
+ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
+PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
+
+
+def tangents(normal: FloatArray) -> FloatArray:
+    """The two directions ``(2, 3)`` along which MuJoCo measures the friction of a contact with this normal ``(3,)``.
+
+    >>> tangents(np.array([1.0, 0.0, 0.0])).tolist()
+    [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    first = np.array([0.0, 1.0, 0.0] if -0.5 < normal[1] < 0.5 else [0.0, 0.0, 1.0])
+    first = first - (first @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def friction(contact: PointContact) -> tuple[float, float, float]:
+    """Both slides along MuJoCo's tangents [-], and torsion [m]."""
+    first = tangents(contact.rotation[:, 2])[0]
+    along_x, along_y = np.abs(contact.rotation[:, :2].T @ first)
+    if along_y < ALONG:
+        return contact.mu_x, contact.mu_y, contact.r
+    return (contact.mu_y, contact.mu_x, contact.r) if along_x < ALONG else (contact.mu, contact.mu, contact.r)
+
+
+def as_mjcf(grasp: RankedGrasp) -> str:
+    """A MuJoCo model of one grasp."""
+    found = cell(grasp)
+    known = grasp.mass if np.isfinite(grasp.mass) else OBJECT_MASS
+    middle = -found.rotation.T @ found.origin
+    width = float(np.linalg.norm(found.contacts[0].origin - found.contacts[1].origin))
+    body = f'mass="{numbers(known)}" diaginertia="{numbers(*[known * width**2 / 10] * 3)}"'  # of a ball of this width
+    return "\n".join(
+        [
+            f'<mujoco model="{grasp.name}">',
+            *(f"  <!-- {line} -->" for line in heading(grasp)),
+            '  <option timestep="0.001" gravity="0 0 0" cone="elliptic" impratio="100" noslip_iterations="50"/>',
+            "  <worldbody>",
+            "    <!-- the object, in the frame of its own file -->",
+            f'    <body name="object" {_pose(found.rotation, found.origin)}>',
+            '      <freejoint name="object"/>',
+            f'      <inertial pos="{numbers(*middle)}" {body}/>',
+            *(_plate(f, contact, found) for f, contact in enumerate(found.contacts, 1)),
+            "    </body>",
+            *(line for f, contact in enumerate(found.contacts, 1) for line in _finger(f, contact)),
+            "  </worldbody>",
+            "  <contact>",
+            *(
+                f'    <pair name="finger{f}" geom1="pad{f}" geom2="plate{f}" condim="4" '
+                f'friction="{numbers(*friction(contact))} 0 0" solref="0.004 1"/>'
+                for f, contact in enumerate(found.contacts, 1)
+            ),
+            "  </contact>",
+            "  <actuator>  <!-- a force of F_N at control 0, and of F_N plus the control otherwise -->",
+            *(
+                f'    <general name="press{f}" joint="close{f}" gainprm="1" biastype="affine" '
+                f'biasprm="{numbers(contact.F_N)} 0 0"/>'
+                for f, contact in enumerate(found.contacts, 1)
+            ),
+            "  </actuator>",
+            "</mujoco>",
+        ]
+    )
+
+
+def _pose(rotation: FloatArray, origin: FloatArray) -> str:
+    turn = quaternion(rotation)
+    return f'pos="{numbers(*origin)}" quat="{numbers(turn[3], *turn[:3])}"'
+
+
+def _plate(f: int, contact: PointContact, found: Cell) -> str:
+    """The object's side of a contact, in the object's own frame: a plate whose face is the contact plane."""
+    centre = contact.origin + PLATE * contact.rotation[:, 2]
+    placed = _pose(found.rotation.T @ contact.rotation, found.rotation.T @ (centre - found.origin))
+    size = numbers(2 * RADIUS, 2 * RADIUS, PLATE)
+    return f'      <geom name="plate{f}" type="box" size="{size}" {placed} contype="0" conaffinity="0"/>'
+
+
+def _finger(f: int, contact: PointContact) -> list[str]:
+    """A ball on a rail along the contact normal."""
+    geom = f'type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" contype="0" conaffinity="0"'
+    return [
+        f"    <!-- finger {f}, in its contact frame: z is the normal, into the object -->",
+        f'    <body name="finger{f}" {_pose(contact.rotation, contact.origin)}>',
+        f'      <joint name="close{f}" type="slide" axis="0 0 1"/>',
+        f'      <geom name="pad{f}" {geom}/>',
+        "    </body>",
+    ]
+

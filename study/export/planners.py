@@ -1,0 +1,142 @@
+"""Grasps in the files that motion planners read: isaac_grasp, GraspGen and moveit_msgs/Grasp.
+
+All three take the pose of the gripper's frame in the frame of the object's own file; `study.export.selection` says how
+the frame lies in the pads. Lengths are in m.
+
+isaac_grasp (Isaac Sim, "Grasp Editor"; Isaac ROS, "Isaac Grasp File", format version 1.0): ``position``,
+``orientation`` as ``{w, xyz}``, ``confidence`` from 0 to 1, ``cspace_position`` of the joints in the grasp and
+``pregrasp_cspace_position`` before it. Both pages say that the names of the frames are for the reader; they have
+different keys for them, and all are written.
+
+GraspGen (``docs/GRASP_DATASET_FORMAT.md`` and ``docs/GRIPPER_DESCRIPTION.md`` of NVlabs/GraspGen, version 1.0.0):
+``object/file`` and ``object/scale``, ``grasps/transforms`` (4 x 4, of the gripper's base) and
+``grasps/object_in_gripper``, a mask of the grasps that hold. Its gripper closes along x and approaches along z. Readers
+take these keys by name, so what else is known stands beside them.
+
+moveit_msgs/Grasp (``msg/Grasp.msg``, ``msg/GripperTranslation.msg`` of moveit_msgs for ROS 2): a list of messages with
+every field. Quaternions are ``{x, y, z, w}``. An empty ``frame_id`` of the pose stands for the object, whose pose
+MoveIt takes from its first shape; approach and retreat are along the gripper's own z axis.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import xarray as xr
+
+from softjaw.study.export.cases import MEANING, plain
+from softjaw.study.export.csv_yaml import yaml_text
+from softjaw.study.export.selection import GripperFrame, RankedGrasp
+from softjaw.study.ranking import task_keys
+from softjaw.study.units import UNITS
+
+CLOSING = {"isaac_grasp": "y", "graspgen": "x", "moveit": "y"}  # as Franka's hand, and as GraspGen wants it
+WAY, LEAST_WAY = 0.1, 0.05  # of approach and retreat [m]: wanted, and enough
+
+
+def as_isaac_grasp(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+    """An isaac_grasp file; what it has no field for stands in comments."""
+    made: dict[str, Any] = {"#": _about(ds, gripper), "format": "isaac_grasp", "format_version": 1.0}
+    for key, name in (("object_frame", gripper.object_frame), ("gripper_frame", gripper.gripper_frame)):
+        made |= {key: name, f"{key}_link": name}
+    made["grasps"] = {grasp.name: _isaac_grasp(grasp, gripper) for grasp in found}
+    return yaml_text(made)
+
+
+def _isaac_grasp(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
+    x, y, z, w = grasp.quaternion.tolist()
+    return {
+        "#": grasp.remark,
+        "confidence": grasp.merit,
+        "position": grasp.origin.tolist(),
+        "orientation": {"w": w, "xyz": [x, y, z]},
+        "cspace_position": dict.fromkeys(gripper.joints, grasp.half("opening_loaded")),
+        "pregrasp_cspace_position": dict.fromkeys(gripper.joints, grasp.half("opening") + gripper.wider / 2),
+    }
+
+
+def as_graspgen(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+    """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them."""
+    keys = task_keys(ds, "object")
+    made = {
+        "object": {"file": keys.get("mesh", ""), "scale": UNITS[keys.get("unit", "m")].size},
+        "gripper": {"name": gripper.gripper_frame, "approach_axis": "z", "closing_axis": gripper.closing,
+                    "depth": gripper.depth, "about": _about(ds, gripper)},
+        "grasps": {
+            "transforms": [grasp.matrix.tolist() for grasp in found],
+            "object_in_gripper": [not grasp.lost for grasp in found],
+            "qualities": [grasp.merit for grasp in found],
+            "forces": [grasp.force for grasp in found],
+            "widths": [plain(grasp.maps["opening"]) for grasp in found],
+            "names": [grasp.name for grasp in found],
+            "warnings": [grasp.warnings for grasp in found],
+        },
+        "softjaw": {
+            "file": str(ds.attrs["file"]), "units": found[0].units if found else {}, "meaning": MEANING,
+            "cases": [{key: plain(value) for key, value in grasp.case.items()} for grasp in found],
+        },
+    }  # fmt: skip
+    return json.dumps(made, indent=1)
+
+
+def as_moveit(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+    """A list of moveit_msgs/Grasp under ``grasps``; what a message has no field for stands in comments."""
+    return yaml_text({"#": _about(ds, gripper), "grasps": [_moveit(grasp, gripper) for grasp in found]})
+
+
+def _moveit(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
+    pose = {
+        "position": dict(zip("xyz", grasp.origin.tolist(), strict=True)),
+        "orientation": dict(zip("xyzw", grasp.quaternion.tolist(), strict=True)),
+    }
+    open_wide, closed = grasp.half("opening") + gripper.wider / 2, grasp.half("opening_loaded")
+    return {
+        "#": grasp.remark,
+        "id": grasp.name,
+        "pre_grasp_posture": _posture(gripper, open_wide, []),
+        "grasp_posture": _posture(gripper, closed, [grasp.force]),
+        "grasp_pose": {"header": _header(gripper.object_frame), "pose": pose},
+        "grasp_quality": grasp.merit,
+        "pre_grasp_approach": _way(gripper, 1.0),
+        "post_grasp_retreat": _way(gripper, -1.0),
+        "post_place_retreat": _way(gripper, -1.0),
+        "max_contact_force": grasp.force,
+        "allowed_touch_objects": [],
+    }
+
+
+def _header(frame: str) -> dict[str, Any]:
+    return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame}
+
+
+def _posture(gripper: GripperFrame, position: float, effort: list[float]) -> dict[str, Any]:
+    """A trajectory_msgs/JointTrajectory of one point."""
+    count = len(gripper.joints)
+    point = {
+        "positions": [position] * count,
+        "velocities": [],
+        "accelerations": [],
+        "effort": effort * count,
+        "time_from_start": {"sec": 1, "nanosec": 0},
+    }
+    return {"header": _header(""), "joint_names": list(gripper.joints), "points": [point]}
+
+
+def _way(gripper: GripperFrame, z: float) -> dict[str, Any]:
+    """A moveit_msgs/GripperTranslation along the gripper's own z axis."""
+    direction = {"header": _header(gripper.gripper_frame), "vector": {"x": 0.0, "y": 0.0, "z": z}}
+    return {"direction": direction, "desired_distance": WAY, "min_distance": LEAST_WAY}
+
+
+def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
+    """What to know about all grasps of a file."""
+    return "\n".join(
+        [
+            f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
+            f"Gripper: approaches along z, closes along {gripper.closing} from finger 1 to finger 2; its origin is"
+            f" {gripper.depth:g} m behind the middle of the pads.",
+            "Quality and confidence are relative to the best grasp of this file.",
+        ]
+    )

@@ -1,0 +1,214 @@
+"""What simulators are given, against their own formulas; MuJoCo itself slips where the result file says."""
+
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from softjaw.study.export.mjcf import as_mjcf, friction, tangents
+from softjaw.study.export.physx import as_usd
+from softjaw.study.export.point_contact import cell
+from softjaw.study.export.sdf import as_sdf
+from softjaw.study.messages import StudyError
+from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, geometry, slipping, write
+
+ONE = 1e-12
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("simulators") / "grasps.hdf")
+
+
+@pytest.fixture(scope="module")
+def slip():
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
+    return slipping("mujoco")
+
+
+def numbers(text):
+    return [float(word) for word in text.split()]
+
+
+def test_a_cell_has_the_contact_frames_of_the_file(path):
+    """Through the frame of the closed pads and back into that of the object."""
+    for i, grasp in enumerate(all_grasps(path, 4.0)):
+        R, o, frames = geometry(i)
+        found = cell(grasp)
+        for f, contact in enumerate(found.contacts):
+            back = found.rotation.T @ contact.rotation
+            assert back == pytest.approx(R[f] @ frames[f].T, abs=ONE)
+            origin = found.rotation.T @ (contact.origin - found.origin)
+            assert origin == pytest.approx(R[f] @ [0, 0, 0.001] + o[f], abs=ONE)
+            assert np.linalg.det(contact.rotation) == pytest.approx(1.0)
+            assert (contact.mu_x, contact.mu_y) == pytest.approx((MU_X[i], MU_Y[i]))
+            assert contact.r == pytest.approx(E_N[i] * min(MU_X[i], MU_Y[i]))
+            assert contact.F_N == 4.0
+        # x of the cell runs from finger 1 to finger 2, y along the long side of both
+        assert found.contacts[0].origin[0] < 0 < found.contacts[1].origin[0]
+        assert found.rotation @ R[0][:, 0] == pytest.approx([0, 1, 0], abs=ONE)
+
+
+def test_tangents_are_those_of_mujoco_and_other_axes_get_the_smaller_slide(path):
+    assert tangents(np.array([0.0, 1.0, 0.0])) == pytest.approx(np.array([[0, 0, 1.0], [1, 0, 0]]))
+    contact = cell(all_grasps(path, 4.0)[0]).contacts[0]
+    quarter, eighth = (np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) for c, s in ((0, 1), (0.8, 0.6)))
+    assert friction(contact)[:2] == (contact.mu_x, contact.mu_y)
+    for turn, expected in ((quarter, (contact.mu_y, contact.mu_x)), (eighth, (contact.mu, contact.mu))):
+        turned = type(contact)(turn @ contact.rotation, contact.origin, contact.mu_x, contact.mu_y, contact.r, 1.0)
+        assert friction(turned)[:2] == expected
+
+
+def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
+    """T = 3 pi / 16 a c N; mu along fdir1, which is the contact's x axis."""
+    for i, grasp in enumerate(all_grasps(path, 16.0)):
+        root = ElementTree.fromstring(as_sdf(grasp))
+        assert root.get("version") == "1.7"
+        for f, link in enumerate(root.iter("link"), start=1):
+            surface = link.find("collision/surface/friction")
+            a, c = (float(surface.findtext(f"torsional/{name}")) for name in ("patch_radius", "coefficient"))
+            assert surface.findtext("torsional/use_patch_radius") == "true"
+            mu = min(MU_X[i], MU_Y[i])
+            assert 3 * math.pi / 16 * a * c * 16.0 == pytest.approx(E_N[i] * mu * 16.0)
+            assert a == pytest.approx(16 * E_N[i] / (3 * math.pi))
+            assert [float(surface.findtext(f"ode/{n}")) for n in ("mu", "mu2")] == pytest.approx([MU_X[i], MU_Y[i]])
+            assert numbers(surface.findtext("ode/fdir1")) == [1, 0, 0]
+            assert link.get("name") == f"finger{f}"
+            *place, roll, pitch, yaw = numbers(link.findtext("pose"))
+            assert place == pytest.approx(cell(grasp).contacts[f - 1].origin.tolist())
+            assert rpy(roll, pitch, yaw) == pytest.approx(cell(grasp).contacts[f - 1].rotation, abs=1e-9)
+
+
+def rpy(roll, pitch, yaw):
+    """Turns about the fixed axes x, y, z one after the other, as SDFormat has them."""
+
+    def about(k, angle):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        turn = np.eye(3)
+        turn[i, i] = turn[j, j] = math.cos(angle)
+        turn[i, j], turn[j, i] = -math.sin(angle), math.sin(angle)
+        return turn
+
+    return about(2, yaw) @ about(1, pitch) @ about(0, roll)
+
+
+def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
+    """T = mu N max(r_min, sqrt(r d)), whatever the penetration d."""
+    for i, grasp in enumerate(all_grasps(path, 16.0)):
+        text = as_usd(grasp)
+        values = {line.split(" = ")[0].split()[-1]: line.split(" = ")[1] for line in text.splitlines() if " = " in line}
+        mu, r_min, r = (
+            float(values[name])
+            for name in (
+                "physics:staticFriction",
+                "physxCollision:minTorsionalPatchRadius",
+                "physxCollision:torsionalPatchRadius",
+            )
+        )
+        assert mu == float(values["physics:dynamicFriction"]) == min(MU_X[i], MU_Y[i])
+        for depth in (0.0, 1e-3):
+            assert mu * 16.0 * max(r_min, math.sqrt(r * depth)) == pytest.approx(E_N[i] * mu * 16.0)
+        assert values["physxScene:solverType"] == '"TGS"'
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("force", FORCES)
+def test_physx_carries_what_the_file_says_and_both_at_once(path, force):
+    """In the program itself; slide and torque are independent there."""
+    pytest.importorskip("sapien", reason="PhysX is not installed: pip install sapien")
+    module = slipping("physx")
+    for grasp in all_grasps(path, force):
+        found = module.ratios(cell(grasp).contacts[0])
+        for name, shares in module.LOADS.items():
+            assert found[name] == pytest.approx(shares, abs=0.005)
+
+
+def test_usd_reads_the_stage(path):
+    Usd = pytest.importorskip("pxr.Usd", reason="USD is not installed: pip install usd-core")
+    from pxr import Gf, UsdGeom, UsdPhysics
+
+    grasp = all_grasps(path, 4.0)[3]
+    stage = Usd.Stage.CreateInMemory()
+    assert stage.GetRootLayer().ImportFromString(as_usd(grasp))
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    for f, contact in enumerate(cell(grasp).contacts, start=1):
+        pad = stage.GetPrimAtPath(f"/grasp/finger{f}/pad{f}")
+        assert UsdPhysics.CollisionAPI(pad)
+        (target,) = pad.GetRelationship("material:binding:physics").GetTargets()
+        assert UsdPhysics.MaterialAPI(stage.GetPrimAtPath(target)).GetStaticFrictionAttr().Get() == pytest.approx(0.45)
+        world = UsdGeom.Xformable(stage.GetPrimAtPath(f"/grasp/finger{f}")).ComputeLocalToWorldTransform(0)
+        assert list(world.TransformDir(Gf.Vec3d(0, 0, 1))) == pytest.approx(contact.rotation[:, 2].tolist())
+        assert list(world.ExtractTranslation()) == pytest.approx(contact.origin.tolist())
+
+
+def test_a_finger_without_load_has_no_ratio(path):
+    grasp = deepcopy(all_grasps(path, 4.0)[0])
+    grasp.case["fingers"][1]["F_N"] = np.float64(0.0)
+    with pytest.raises(StudyError, match="normal force of 0 N"):
+        as_mjcf(grasp)
+
+
+@pytest.mark.parametrize(("i", "force"), [(1, 1.0), (4, 16.0)])
+def test_mujoco_slips_where_the_file_says(path, slip, i, force):
+    """Two grasps; those of the long test are all."""
+    found = all_grasps(path, force)[i]
+    assert slip.ratios(found, 1 + i % 2, steps=1000) == pytest.approx([1.0] * len(slip.LOADS), rel=0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("force", FORCES)
+def test_mujoco_slips_where_the_file_says_at_every_grasp(path, slip, force):
+    for grasp in all_grasps(path, force):
+        for finger in (1, 2):
+            assert slip.ratios(grasp, finger) == pytest.approx([1.0] * len(slip.LOADS), rel=0.005)
+
+
+def test_mujoco_holds_a_load_below_the_limit_without_creeping(path, slip):
+    """A torque of 95 % for a second; with the solver settings of the file that is what is asked of them."""
+    import mujoco
+
+    grasp = all_grasps(path, 4.0)[2]
+    load = 0.95 * slip.predicted(grasp, 1, (0, 0, 1))
+    turned = {}
+    for name in ("as written", "without noslip"):
+        model = slip.fixture(as_mjcf(grasp), 1)
+        if name == "without noslip":
+            model.opt.noslip_iterations = 0
+        data = mujoco.MjData(model)
+        dofs = [model.joint(dof).dofadr[0] for dof, *_ in slip.FREE]
+        mujoco.mj_step(model, data, 300)
+        before = data.joint("turn").qpos[0]
+        data.qfrc_applied[dofs] = load
+        mujoco.mj_step(model, data, 1000)
+        turned[name] = abs(data.joint("turn").qpos[0] - before)
+    assert turned["as written"] < 1e-4 < turned["without noslip"]
+
+
+def test_mujoco_turns_an_object_between_both_fingers_at_twice_the_torque(path, slip):
+    """The scene as it is written: fingers on rails, an object that floats; a torque about the closing axis, x."""
+    import mujoco
+
+    grasp = all_grasps(path, 4.0)[0]  # its contacts are antipodal
+    model = mujoco.MjModel.from_xml_string(as_mjcf(grasp))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 300)
+    limit, steps = 2 * 4.0 * E_N[0] * min(MU_X[0], MU_Y[0]), 1000
+    for i in range(steps):
+        data.body("object").xfrc_applied[3] = (at := 1.5 * (i + 1) / steps) * limit
+        mujoco.mj_step(model, data)
+        if abs(data.qvel[3:6]).max() > 1e-2:
+            break
+    assert at == pytest.approx(1.0, rel=0.01)
+
+
+def test_between_two_solved_forces_the_friction_lies_between_theirs(path):
+    """Poses and axes are those of both; the ratios, which do not depend on the force here, stay."""
+    for i, grasp in enumerate(all_grasps(path, 9.0)):
+        contact = cell(grasp).contacts[0]
+        assert contact.F_N == pytest.approx(9.0)
+        assert [contact.mu_x, contact.mu_y] == pytest.approx([MU_X[i], MU_Y[i]])
+        assert contact.rotation.T @ contact.rotation == pytest.approx(np.eye(3), abs=ONE)
