@@ -29,7 +29,7 @@ from softjaw.study.scene.objects import SHAPES, SectionTable, Shape, Walled
 from softjaw.study.scene.section import SceneSection, kind_text
 from softjaw.study.units import UNITS, split_unit
 
-JOBS = Path(__file__).parents[1] / "jobs"
+ROOT = Path(__file__).parents[1]
 WIDTH = 96  # columns of a command's help
 NESTED = {  # tables within a section, with an example of where they stand
     "[[candidates.poses]]": GraspPose,
@@ -120,7 +120,7 @@ def _key_row(key: str, schema: Mapping[str, Any], whole: Mapping[str, Any]) -> t
 
 def scenes_page() -> str:
     """Every scene of `jobs/`, by the comment on its first line."""
-    first_lines = {file.name: file.read_text().partition("\n")[0] for file in sorted(JOBS.glob("*.toml"))}
+    first_lines = {file.name: file.read_text().partition("\n")[0] for file in sorted((ROOT / "jobs").glob("*.toml"))}
     rows = [(_code(f"jobs/{name}"), line.lstrip("# ")) for name, line in first_lines.items()]
     text = "Each is a file to run, to read and to start from."
     return f"# Scenes that come with it\n\n{text}\n\n{table(('scene', 'is'), rows)}\n"
@@ -280,6 +280,11 @@ def _sentence(text: str) -> str:
     return text if not text or text.endswith(".") else f"{text}."
 
 
+def _of_root(name: str) -> Callable[[], str]:
+    """A page that lies beside the README, where people look for it; its links to docs stay right."""
+    return lambda: (ROOT / name).read_text().replace("](docs/", "](")
+
+
 # ---- the site --------------------------------------------------------------------------------------------------------
 
 
@@ -290,6 +295,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/flags.md": flags_page,
     "reference/commands.md": commands_page,
     "reference/api.md": api_page,
+    "contributing.md": _of_root("CONTRIBUTING.md"),
+    "changelog.md": _of_root("CHANGELOG.md"),
 }
 
 

@@ -65,7 +65,7 @@ def anchors(text: str) -> set[str]:
     return {"#" + re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", head.lower()).strip()) for head in heads}
 
 
-@pytest.mark.parametrize("file", sorted(DOCS.glob("*.md")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", [*sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("C*.md"))], ids=lambda file: file.stem)
 def test_links_lead_somewhere(file):
     wrong = []
     for target, anchor in LINK.findall(file.read_text()):
