@@ -260,11 +260,11 @@ class Press(LoadPath):
         """Which means beside Newton's method on steps of the force the last state took."""
         steps, notes = self._stepping, []
         if self.pad is not self._wanted:
-            notes.append(f"solved with {self.pad.contact} gaps, {self._wanted.contact} ones had no solution")
+            notes.append(f"solved with {self.pad.contact} gaps, {self._wanted.contact} ones did not converge")
         if steps.closed:
             notes.append("reached by displacement control")
         if steps.off:
-            notes.append(f"nodes in contact alternate, taken at a residual of {steps.off:.1e} of the force")
+            notes.append(f"the active set alternates, accepted at a residual of {steps.off:.1e} of the force")
         return tuple(notes)
 
     def _explained(self, error: ConvergenceError) -> ConvergenceError:
@@ -306,7 +306,7 @@ class Press(LoadPath):
                 errors.append(error)
         # a limit that was seen is the reason; else what stopped the other pad
         limits = [error for error in errors if isinstance(error, NotReachedError)]
-        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps lead further, a finer mesh was not tried"
+        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps converge, a finer mesh was not tried"
         raise (NotReachedError if limits else ConvergenceError)(text) from errors[1]
 
     def _through(self, below: tuple[float, float] | None, force: float, work: Work) -> FloatArray:

@@ -138,7 +138,8 @@ class GraspMap:
         flags, forces = judged(ds), self.source.axes[2].values
         k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
         if force is not None and not np.isclose(forces[k], force):
-            raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
+            solved = ", ".join(f"{f:g}" for f in forces)
+            raise ValueError(f"force is {force:g}: expected one of the solved forces, {solved} N")
         score = rank_values(ds, score_of(ds, by), k, each=force is None)
         done = np.flatnonzero(self.source.status[..., k].ravel() == DONE)
         order = done[ranking(score[done], flags[..., k].ravel()[done])][:n]
@@ -267,7 +268,7 @@ class GraspMap:
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:
     if (si is None) == (other is None) and not (si is other is None and default is not None):
-        raise ValueError(f"{name} is given {'twice' if si is not None else 'nowhere'}: give it once")
+        raise ValueError(f"{name} is {'given twice' if si is not None else 'missing'}: give it once")
     return default if si is other is None else si if other is None else np.asarray(other, float) * UNITS[unit].size
 
 
