@@ -50,7 +50,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
     "use the numbers": (
         ("export", "every case for planners: maps, frames, limit surfaces",
          "export results/smoke.hdf --csv -o results/smoke.csv", "cli.results"),
-        ("patch", "a pressure field from elsewhere: friction, limit surface, score",
+        ("patch", "judge a pressure field from elsewhere: friction, score",
          "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
     ),
     "this program": (

@@ -138,8 +138,7 @@ class GraspMap:
         flags, forces = judged(ds), self.source.axes[2].values
         k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
         if force is not None and not np.isclose(forces[k], force):
-            solved = ", ".join(f"{f:g}" for f in forces)
-            raise ValueError(f"force is {force:g}: expected one of the solved forces, {solved} N")
+            raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
         score = rank_values(ds, score_of(ds, by), k, each=force is None)
         done = np.flatnonzero(self.source.status[..., k].ravel() == DONE)
         order = done[ranking(score[done], flags[..., k].ravel()[done])][:n]
