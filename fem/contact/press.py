@@ -306,7 +306,7 @@ class Press(LoadPath):
                 errors.append(error)
         # a limit that was seen is the reason; else what stopped the other pad
         limits = [error for error in errors if isinstance(error, NotReachedError)]
-        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps converge, a finer mesh was not tried"
+        text = f"{(limits or errors[1:])[0]}; neither nodal nor weighted gaps lead further, a finer mesh was not tried"
         raise (NotReachedError if limits else ConvergenceError)(text) from errors[1]
 
     def _through(self, below: tuple[float, float] | None, force: float, work: Work) -> FloatArray:
