@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -83,6 +84,11 @@ def test_links_lead_somewhere(file):
 def test_every_page_is_in_the_navigation():
     listed = set(re.findall(r"^ +- (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.M))
     assert listed == {file.name for file in DOCS.glob("*.md")} | set(PAGES)
+
+
+def test_the_tutorial_shows_the_scene_that_it_runs():
+    (shown,) = re.findall(r"^```toml\n(.*?)^```$", (DOCS / "tutorial.md").read_text(), re.M | re.S)
+    assert tomllib.loads(shown) == tomllib.loads((ROOT / "jobs" / "flask-mesh.toml").read_text())
 
 
 @pytest.mark.long
