@@ -1,6 +1,6 @@
 """Reference pages of the site, made from the tables of the program each time the site is built; none is stored.
 
-`mkdocs.yml` names this file as a hook. `pages` is all that it needs of this project, and `on_files` all of mkdocs.
+`mkdocs.yml` names this file as a hook: mkdocs calls `on_config` and `on_files`.
 """
 
 from __future__ import annotations
@@ -298,6 +298,14 @@ PAGES: dict[str, Callable[[], str]] = {
     "contributing.md": _of_root("CONTRIBUTING.md"),
     "changelog.md": _of_root("CHANGELOG.md"),
 }
+
+
+def on_config(config: Any) -> Any:
+    """Hook of mkdocs: a page that the navigation does not name is a how-to."""
+    parts = next(entry for entry in config.nav if "How-to" in entry)["How-to"]
+    named = re.findall(r"[\w/-]+\.md", json.dumps(config.nav))
+    parts += sorted({file.name for file in Path(config.docs_dir).glob("*.md")} - set(named))
+    return config
 
 
 def on_files(files: Any, config: Any) -> Any:

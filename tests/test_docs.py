@@ -81,9 +81,10 @@ def test_links_lead_somewhere(file):
     assert not wrong
 
 
-def test_every_page_is_in_the_navigation():
-    listed = set(re.findall(r"^ +- (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.M))
-    assert listed == {file.name for file in DOCS.glob("*.md")} | set(PAGES)
+def test_the_navigation_names_every_generated_page_and_none_that_is_not_there():
+    listed = re.findall(r"^ +- (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.M)
+    assert len(listed) == len(set(listed)) > 30
+    assert set(PAGES) < set(listed) <= {file.name for file in DOCS.glob("*.md")} | set(PAGES)
 
 
 def test_the_tutorial_shows_the_scene_that_it_runs():
