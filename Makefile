@@ -36,7 +36,7 @@ NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures effects test test-blas test-long bench hard-cases objects lint doctor
+.PHONY: help setup map figures effects test test-blas test-long test-slurm bench hard-cases objects docs lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
@@ -45,9 +45,11 @@ help:
 	@echo 'make test       the tests, first without MPI, then on $(RANKS) ranks, then as test-blas'
 	@echo 'make test-blas  the numerical tests with each kernel of OpenBLAS that this CPU can run (OPENBLAS_CORETYPE)'
 	@echo 'make test-long  the checks that take minutes'
+	@echo 'make test-slurm the shipped batch script under a Slurm of one node, killed by its time limit; needs root'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
 	@echo 'make objects    scans, hollow bodies, mugs and random scenes, into docs/objects.md; SEED=7 for others'
+	@echo 'make docs       docs/ as a site, with reference pages from the program, into build/site'
 	@echo 'make lint       ruff and mypy'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
 	@echo 'make setup      only what each of the above does first: packages and .venv'
@@ -88,6 +90,15 @@ test-blas: setup
 test-long: setup
 	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10
 	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
+
+test-slurm: setup
+	./tests/slurm/cluster.sh results/slurm/cluster $(BIN)/python -m tests.slurm.time_limit $(abspath $(SCENE))
+
+# mkdocs lies outside of .venv: it brings colorama, which numba then uses to write to the output of every run.
+docs: setup
+	@[ -d build/mkdocs/material ] || $(BIN)/python -m pip install -qq --disable-pip-version-check --target build/mkdocs 'mkdocs-material>=9.6'
+	@PYTHONPATH=build/mkdocs NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
+	@echo 'open build/site/index.html, or with search: python3 -m http.server --directory build/site'
 
 hard-cases: setup
 	$(BIN)/python -m pytest -q -n 2 tests/hard_cases -m "" --table docs/hard-cases.md

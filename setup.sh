@@ -79,7 +79,7 @@ other_ways() {
         "they cannot be installed from here (that takes apt-get, and root or sudo). Either ask an administrator for" \
         "    apt-get install --no-install-recommends ${packages[*]} libosmesa6 libopenblas0-serial" \
         "or, without any rights, make and activate an environment with conda-forge's builds (PETSc with MUMPS, HDF5 with MPI):" \
-        "    conda create -n softjaw -c conda-forge 'python>=3.11' petsc4py mpi4py 'h5py=*=mpi_openmpi*' openmpi" \
+        "    conda env create -f environment.yml" \
         "    conda activate softjaw && make PYTHON=python3 setup"
 }
 

@@ -53,7 +53,8 @@ def take_buffers(*others: Callable[[], object]) -> None:
         try:
             mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
         except OSError as error:
-            text = f"a library of linear algebra takes {ROOM / 1e6:.0f} MB of addresses at once, and they are not there"
+            room = f"{ROOM / 1e6:.0f} MB of address space at once"
+            text = f"the linear algebra library needs {room}, which is not available"
             raise MemoryError(text) from error
         operation()
 
@@ -272,7 +273,7 @@ class NonlinearSolver:
             # factors that failed half way must not be taken for those of the next solve
             snes.getKSP().getPC().reset()
             raise ConvergenceError(
-                f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something moves without force"
+                f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something is not supported"
             ) from error
         finally:
             snes.setTolerances(max_it=limit)

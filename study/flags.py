@@ -31,19 +31,19 @@ class Flag(IntFlag):
 
     NO_TORQUE = 1 << 0, "no torque", "a contact carries no torque about its normal"
     NO_FORCE = 1 << 1, "no force", "a contact carries no force along one of its axes"
-    CYCLE = 1 << 2, "cycle", "the contact normal alternated between faces, their mean was taken"
+    CYCLE = 1 << 2, "cycle", "the contact normal alternated between faces, their mean was used"
     HOLE = 1 << 3, "hole", "no face on the line through the centre of pressure along the contact normal"
     NO_CORNERS = 1 << 4, "no corners", "the faces of a patch have no corners, the nearest one gave the contact frame"
     ORIENTATION = 1 << 5, "mixed", (
         "normals of a patch point to opposite sides, its normal force and frame cannot be trusted"
     )  # fmt: skip
     OVERHANG = 1 << 6, "overhang", f"some loaded faces of a patch are turned {DEGREES_90}"
-    WINDING = 1 << 7, "winding", "some faces are wound against their normals, which were taken"
+    WINDING = 1 << 7, "winding", "some faces are wound against their normals, the normals were used"
     NOT_ANTIPODAL = 1 << 8, "not antipodal", "contacts more than 5 deg from antipodal"
     NODAL = 1 << 9, "nodal", "mortar contact did not converge, node-to-surface contact used"
     SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
-    COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
+    COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, use more elements before trusting it", (
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
         " only one along its length or its width does, trilinear elements are too stiff for foam with a Poisson's"
         " ratio above 0.45, or two meshes put the error of e_n above accuracy.e_n (0.01 where the scene names none)"
@@ -60,7 +60,7 @@ class Flag(IntFlag):
     JUMPED = 1 << 18, "jumped", (
         "the path of equilibria ends, folds or forks on the way to this force, the state depends on the load path"
     )  # fmt: skip
-    NOT_BORNE = 1 << 19, "no hold", "friction does not bear what the squeeze itself asks of it, so nothing is held", (
+    NOT_BORNE = 1 << 19, "no hold", "friction cannot balance the squeeze itself, so nothing is held", (
         "the normal forces do not face each other: their couple, or their push to one side, comes before any load"
     )  # fmt: skip
     DENTED = 1 << 22, "dented", "the wall is dented deep", (

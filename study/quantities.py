@@ -243,7 +243,7 @@ ROWS = (
         for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
         for suffix, model, note in (
             ("", "pcm", "both scaled by S, the paper's normalisation"),
-            ("_pcm_projected", "pcm_projected", "both scaled by the physical normal force F_N; not positive, for a"
+            ("_pcm_projected", "pcm_projected", "both scaled by the physical normal force F_N; never positive: a"
              " planar model with that force claims too little"),
         )
     ),
@@ -326,11 +326,11 @@ ROWS = (
              f"P(w) = 1 in w = (x, y, t) = (f_x, f_y, tau_z / rho) / (mu S), of {', '.join(MONOMIALS)} in this order;"
              " NaN where an ellipsoid was fitted.", "limit_surface"),
     Quantity("certificate", FM, "", "how the fit is known to be convex",
-             "0 the fit failed, the ellipsoid from three motions stands in; 1 an ellipsoid; 2 the quartic came out "
+             "0 the fit failed, ellipsoid from three motions used; 1 an ellipsoid; 2 the quartic came out "
              "convex; 3 a semidefinite programme kept the quartic convex.", "limit_surface"),
     Quantity("fit_flag", FM, "", "flag of the fit",
              "Sum of: 1 the wrenches lie in a plane or on a line, so the surface is flat; 2 fewer independent "
-             "wrenches than coefficients; 4 its reach was limited, for the wrenches alone would give an endless body;"
+             "wrenches than coefficients; 4 its size was limited, because the wrenches alone give an unbounded body;"
              " 8 rho does not suit the contact.", "limit_surface"),
     Quantity("fit_error", (*FM, "component"), "-, -, rad", "fit error of the fitted surface",
              "Means over 377 motions that it was not fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of "
@@ -386,9 +386,9 @@ ROWS = (
     Quantity("normal", (*F, "face", "component"), "", "face normal",
              "Unit normal of the deformed face, in the pad's frame.", "patch", needs=("patches",)),
     # how the case stands
-    Quantity("code", (), "", "state of the case", "Whether it has values.", "status", meanings=STATES),
-    Quantity("attempts", (), "", "times this case was begun", "Without coming to an end, or with.", "status"),
-    Quantity("message", (), "", "why a case has no result, or what to know about one", "Empty where all is said.",
+    Quantity("code", (), "", "state of the case", "Whether the case has values.", "status", meanings=STATES),
+    Quantity("attempts", (), "", "times this case was begun", "Finished or not.", "status"),
+    Quantity("message", (), "", "why a case has no result, or what to know about one", "Empty if there is none.",
              "status"),
 )  # fmt: skip
 TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
@@ -416,7 +416,7 @@ def definitions(listed: Iterable[Quantity]) -> str:
         "Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a",
         "Curved Contact Area Friction Model); 'pcm', the paper's planar contact model, lays all faces into one plane",
         "and keeps the pressure sum S; 'pcm_projected' is the planar model with the physical normal force F_N.",
-        "NaN: not there; status/code and status/message say why. All values are SI.",
+        "NaN: no value; status/code and status/message say why. All values are SI.",
         "",
     ]
     for q in listed:

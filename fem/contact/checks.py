@@ -88,7 +88,7 @@ def check(
             checks.force_balance <= max(BALANCE, slack),
             f"force balance is off by {checks.force_balance:.1e} of the force",
         ),
-        (checks.adhesion <= max(ADHESION, slack), f"the contact pulls: lowest pressure {pressure.min():.3g} Pa"),
+        (checks.adhesion <= max(ADHESION, slack), f"tension in the contact: lowest pressure {pressure.min():.3g} Pa"),
         (checks.penetration <= max(PENETRATION, slack), f"the pad penetrates the object by {-gap.min():.3g} m"),
         (checks.complementarity <= max(COMPLEMENTARITY, slack), "pressure and gap are both positive at a node"),
         (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
@@ -160,6 +160,6 @@ def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
     if high[0] > low[0] and high[1] < (1.0 - MOST_FALL) * low[1]:
         raise CheckError(
             f"the closing displacement falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "
-            f"{high[0]:.4g} N: one of the two states is not what a growing force leads to; the contact is too small "
+            f"{high[0]:.4g} N: one of the two states is off the load path; the contact is too small "
             "for the mesh, refine the pad"
         )

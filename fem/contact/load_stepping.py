@@ -415,7 +415,7 @@ class Following(Stepping):
         here = None if self.problem.complementarity else self._place(x, force, None)
         if strays or folds or (here is not None and not here.stable):
             work.halvings += 1
-            raise ConvergenceError(f"the state at {force:.4g} N is not the one that the coarser mesh has come to")
+            raise ConvergenceError(f"the state at {force:.4g} N differs from the state on the coarser mesh")
         self._last = here
         return x
 

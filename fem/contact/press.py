@@ -254,11 +254,11 @@ class Press(LoadPath):
         """Which means beside Newton's method on steps of the force the last state took."""
         steps, notes = self._stepping, []
         if self.pad is not self._wanted:
-            notes.append(f"solved with {self.pad.contact} gaps, {self._wanted.contact} ones had no solution")
+            notes.append(f"solved with {self.pad.contact} gaps, {self._wanted.contact} ones did not converge")
         if steps.closed:
             notes.append("reached by displacement control")
         if steps.off:
-            notes.append(f"nodes in contact alternate, taken at a residual of {steps.off:.1e} of the force")
+            notes.append(f"the active set alternates, accepted at a residual of {steps.off:.1e} of the force")
         return tuple(notes)
 
     def _explained(self, error: ConvergenceError) -> ConvergenceError:

@@ -56,11 +56,11 @@ class CentreLine:
     def remark(self, z: float, half: float) -> str:
         """What is doubtful where a pad reaches ``half`` [m] to both sides of a height, if anything."""
         if not self.z[0] <= z <= self.z[-1]:
-            return "the centre line of the object's sections ends before the station and goes on straight"
+            return "the centre line of the object's sections ends before the station and is extended straight"
         if self.radius(z - half, z + half) < half:
             return "the centre line of the object's sections bends in a radius below half the pad's length"
         if self.loops[np.abs(self.z - z).argmin()] > 1:
-            return "the object's section has several parts, of which the pads stand about the largest"
+            return "the object's section has several parts, the pads stand about the largest"
         return ""
 
     def radius(self, low: float, high: float) -> float:

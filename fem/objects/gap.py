@@ -178,11 +178,11 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     if np.isinf(first) and grazed:
         raise NoContactError(
             f"the pad only grazes the object on its way along the approach ({_vector(approach)}) from "
-            f"({_vector(pose.origin)}) m: whether it touches hangs on rounding; move the station or the pose"
+            f"({_vector(pose.origin)}) m: whether it touches depends on rounding; move the station or the pose"
         )
     if first > reach:
         raise NoContactError(
-            f"the pad passes the object: within {reach * 1e3:.4g} mm along the approach ({_vector(approach)}) from "
+            f"the pad misses the object: within {reach * 1e3:.4g} mm along the approach ({_vector(approach)}) from "
             f"({_vector(pose.origin)}) m no point of its face comes closer than {closest * 1e3:.3g} mm; check station, "
             "angle and the object's size and unit"
         )

@@ -263,7 +263,7 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     # in the file's order, so that a sound mesh keeps its triangles as they are
     first = np.sort(np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1])
     if len(first) < len(triangles):
-        notes.append(f"dropped {len(triangles) - len(first)} doubled triangles")
+        notes.append(f"dropped {len(triangles) - len(first)} duplicate triangles")
     used, inverse = np.unique(triangles[first], return_inverse=True)
     return points[used], inverse.reshape(-1, 3).astype(np.int64), notes
 
@@ -322,7 +322,7 @@ def _refuse_flat(points: FloatArray, triangles: IntArray, piece: IntArray, volum
     flat = (np.abs(volume) <= FLAT * area * size) & (size >= DEBRIS * size.max())
     if flat.any():
         raise MeshError(
-            f"a piece of the mesh, {size[flat][0]:.4g} m large, encloses no volume: its two sides lie on each other; "
+            f"a piece of the mesh, {size[flat][0]:.4g} m large, encloses no volume: its two sides coincide; "
             "give the object as a solid"
         )
 
@@ -346,7 +346,7 @@ def _outer_pieces(
     if count == 1:
         return points, triangles, lids, []
     if count > MOST_PIECES:
-        raise MeshError(f"the mesh falls into {count} separate pieces; keep the object's outer surface only")
+        raise MeshError(f"the mesh consists of {count} separate pieces; keep the object's outer surface only")
     crosses = np.zeros((count, count), dtype=bool)
     crosses[crossing[:, 0], crossing[:, 1]] = crosses[crossing[:, 1], crossing[:, 0]] = True
     pieces = [triangles[owner == k] for k in range(count)]
@@ -359,7 +359,7 @@ def _outer_pieces(
     inner = np.array([any(inside(k, m) for m in np.flatnonzero(~speck) if m != k) for k in range(count)])
     keep = ~speck & ~inner
     if not keep.any():
-        raise MeshError("the mesh's pieces lie inside each other both ways; keep the object's outer surface only")
+        raise MeshError("pieces of the mesh lie inside each other; keep the object's outer surface only")
     lids = lids[keep[owner]]
     used, inverse = np.unique(triangles[keep[owner]], return_inverse=True)
     notes = [

@@ -68,7 +68,7 @@ def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
     # a reader may leave out what it cannot read without a word
     if len(mesh.faces) < faces:
         raise MeshError(
-            f"{path}: is cut short or damaged: it declares {faces} faces, {len(mesh.faces)} triangles could be read; "
+            f"{path}: is truncated or damaged: it declares {faces} faces, {len(mesh.faces)} triangles could be read; "
             "export it again"
         )
     # polygons are cut into fans, which fold over where a polygon is not convex
@@ -87,7 +87,7 @@ def checked_bytes(path: Path) -> bytes:
     try:
         size = path.stat().st_size
         if not path.is_file():  # a device or a pipe may have no end
-            raise MeshError(f"{path}: is no regular file; name the file of a mesh")
+            raise MeshError(f"{path}: is not a regular file; name a mesh file")
         if size > LARGEST_FILE:
             raise MeshError(f"{path}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB; decimate the mesh")
         data = path.read_bytes()
@@ -109,7 +109,7 @@ def _whole_binary_stl(path: Path, data: bytes) -> bytes:
     need = STL_HEAD + STL_FACET * max(count, 0)
     if count < 0 or len(data) < need:
         raise MeshError(
-            f"{path}: is cut short or no STL file: {len(data)} bytes, expected at least {need}; copy or export it again"
+            f"{path}: truncated, or not an STL file: {len(data)} bytes, expected at least {need}; export it again"
         )
     return data[:need]
 

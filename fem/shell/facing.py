@@ -134,7 +134,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         places[again[good]] = fresh[good]
     lost = np.flatnonzero(np.isnan(found.gap))
     if len(lost):
-        raise ArithmeticError(f"a point of the pad at {points[lost[0]].tolist()} m finds no place on the deformed wall")
+        raise ArithmeticError(f"a point of the pad at {points[lost[0]].tolist()} m has no closest point on the wall")
     return found
 
 

@@ -52,7 +52,7 @@ class LinearShell:
         # `not <` counts NaN as loose, too
         if not ratio < LOOSE:
             raise ConvergenceError(
-                "the shell can move without force: fix more of it, or give it weak springs (see fem.shell.thin_walled)"
+                "the shell can move freely: fix more of it, or give it weak springs (see fem.shell.thin_walled)"
             )
 
     def solve(self, load: FloatArray) -> FloatArray:

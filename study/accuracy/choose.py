@@ -255,7 +255,7 @@ def _best(tried: Sequence[Choice], made: Sequence[Combination], target: float, m
     within = next((c for c in made if c.error <= target and dict(c.level.values) not in known), None)
     if within is not None and not measured:
         return _predicted(within, target, "predicted from one parameter at a time", True)
-    note = "no measured setting meets the target, this is the best that was reached"
+    note = "no measured setting meets the target, this is the best one"
     note += "; raise --time-limit of 'softjaw cost'"
     finite = [choice for choice in tried if math.isfinite(choice.measured)]
     if not finite:

@@ -28,7 +28,7 @@ BASELINES = ("Winkler, planar", "*", 10), ("finite elements, planar friction", "
 EVALUATION = {"limit surface": ("<", "#801650"), "motions sampled": (">", "#8a6d00"), "score": ("h", "#b3261e")}
 ABOUT = {
     "load steps": "Nothing here depends on the path, so this trades time for robustness only.",
-    "contact model": "What planar and cheaper models make of the same grasps: a Winkler foundation with a planar"
+    "contact model": "The same grasps by planar and cheaper models: a Winkler foundation with a planar"
     " contact, the PCM scaled by S, and the CCM. The object is rigid for the Winkler foundation.",
     "motions sampled": "Slip motions that the scene's limit surface is fitted to; the quality is quality_fitted.",
     "limit surface": "Form of the limit surface; the quality is quality_fitted, the reference is the exact quality of"
@@ -58,7 +58,7 @@ def cost_page(study: CostStudy, tables: Sequence[ParameterErrors]) -> tuple[str,
     sections = [
         ("answer", "", [box(sentences(study, tables), "verdict")]),
         ("diagram", "Error against time", [image(svg, DIAGRAM, "error against CPU seconds per case")]),
-        ("front", "Settings that nothing beats", _front(study, best)),
+        ("front", "Pareto-optimal settings", _front(study, best)),
         ("parameters", "Parameter by parameter",
          [text(PARAMETERS), *(block for errors in tables for block in _parameter(errors))]),
         ("skipped", "Not measured", [bullets(skipped) if skipped else text("Nothing was left out.")]),

@@ -310,7 +310,7 @@ def _column(file: GuardedFile, path: str, texts: bool) -> Any:
     if texts:
         return file.texts(path)
     found = file.plain(path)
-    # A file of unknown origin: what is no list of numbers must not reach the arithmetic.
+    # A file of unknown origin: what is not a list of numbers must not reach the arithmetic.
     if found.ndim != 1 or found.dtype.kind != "f":
-        raise ValueError(f"{path} is no list of numbers")
+        raise ValueError(f"{path} is not a list of numbers")
     return file.values(found)

@@ -207,7 +207,7 @@ def quick_choice(
     """
     target, own, levels = float(scene.accuracy.e_n or 0.0), plain(scene), refinement_series(scene)
     if len(levels) < FEWEST:
-        note = "the scene gives the mesh itself, so nothing is left to choose and its error is not known"
+        note = "the scene gives the mesh itself, so nothing is chosen and the error is not known"
         return unchanged(target, note)
 
     def solved(level: Level) -> list[Measured]:
@@ -235,9 +235,9 @@ def _choice(study: CostStudy, own: Scene, errors: MeshErrors, on_probes: int, ta
     note = f"largest error at {errors.cases[int(np.nanargmax(error))]}; {errors.note}"
     note += f"; choosing took as long as {study.spent / seconds:.0f} of the run's {cases} cases"
     if errors.chosen is None:
-        note = f"no mesh that was tried keeps the target, this is the best that was reached; {note}"
+        note = f"no mesh that was tried meets the target, this is the best one; {note}"
     elif not errors.known:
-        note = f"kept but where even the finest mesh is flagged, so that the error is not known; {note}"
+        note = f"met, except where even the finest mesh is flagged and the error is not known; {note}"
     parts = error[:on_probes], error[on_probes:]
     measured, rest = (float(np.nanmax(e)) if np.isfinite(e).any() else math.nan for e in parts)
     return Choice(dict(level.values), target, float(np.nanmax(error)), measured, seconds, note, rest,

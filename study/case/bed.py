@@ -169,7 +169,7 @@ class JawsOnSurface:
         self.local, self.triangles = np.ascontiguousarray(local), surface[1]
         low, high = height_fields(self.local, self.triangles, x, y)
         if not np.isfinite(low).any():
-            raise NoContactError("the pad passes the object")
+            raise NoContactError("the pad misses the object")
         # finger 2 looks against the approach, with its short side reversed
         self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
 

@@ -197,11 +197,10 @@ def mesh_errors(
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes.
     """
     # of one value for each friction model the curved one's, which comes first; fits would double the time
-    fine_mesh: dict[str, ArrayLike] = {key: np.ravel(value)[:1] for key, value in values.items()} | _judged(fine)
+    fine_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in values.items()} | _judged(fine)
     seen = [_judged(view) | _held(view, settings) for view in views]
-    coarse_mesh: dict[str, ArrayLike] = (
-        {key: np.ravel(value)[:1] for key, value in other.items()} | _held(coarse, settings) | _judged(coarse)
-    )
+    coarse_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in other.items()}
+    coarse_mesh |= _held(coarse, settings) | _judged(coarse)
     fine_mesh, coarse_mesh = fine_mesh | _of_faces(fine), coarse_mesh | _of_faces(coarse)
     return {
         q.of_error.key: estimate(

@@ -200,7 +200,7 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
                 tried += 2
                 passing = [k + 1 for k, pose in enumerate(place.poses) if _passes(obj, pose, size)]
                 if passing:
-                    missed[number] = f"finger {passing[0]} passes" if len(passing) == 1 else "both fingers pass"
+                    missed[number] = f"finger {passing[0]} misses" if len(passing) == 1 else "both fingers miss"
     if missed:
         lines = [
             f"candidates.poses[{i}]: found '{places[i].label}', where {who} the object; expected a line of"
@@ -208,7 +208,7 @@ def check_poses(scene: Scene, points: list[Scene]) -> None:
             " approach"
             for i, who in list(missed.items())[:MOST_NAMED]
         ]
-        more = [f"and {len(missed) - MOST_NAMED} more poses pass the object"] if len(missed) > MOST_NAMED else []
+        more = [f"and {len(missed) - MOST_NAMED} more poses miss the object"] if len(missed) > MOST_NAMED else []
         raise StudyError(USAGE, "\n".join(lines + more))
 
 

@@ -267,7 +267,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
-        states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads pass the object"]
+        states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
         raise StudyError(
             USAGE,
             f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"

@@ -14,9 +14,9 @@ from softjaw.study.messages import MEANING, first_rank
 from softjaw.study.quantities import RANKED_BY
 
 KINDS = {
-    "bottle": "a bottle of revolution, heights x angles x forces; rigid, or thin-walled by taking a # away",
+    "bottle": "a bottle of revolution, heights x angles x forces; rigid; uncomment wall_mm for a thin wall",
     "cup": "a thin-walled cup: dents, and the range of forces that hold it without spilling",
-    "cylinder": "cylinders of several curvatures: what the curved model sees and the planar one does not",
+    "cylinder": "cylinders of several curvatures: what curvature costs, curved against planar contact model",
     "mesh": "your own triangle mesh; needs --mesh FILE and --unit",
 }
 FORMATS = {  # of export: what stands in the file
@@ -70,7 +70,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
     ),
     "this program": (
         ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick"),
-        ("doctor", "does this machine have what softjaw needs", "doctor", "doctor"),
+        ("doctor", "check that this machine has what softjaw needs", "doctor", "doctor"),
     ),
 }  # fmt: skip
 
@@ -162,8 +162,9 @@ def program() -> Program:
 
 def _add_watch_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    every = "seconds between looks (default 2)"
-    parser.add_argument("--every", type=values.seconds, default=2.0, metavar="S", help=every)
+    parser.add_argument(
+        "--every", type=values.seconds, default=2.0, metavar="S", help="seconds between updates (default 2)"
+    )
     ending = "Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are not computed."
     parser.description = textwrap.fill(f"{parser.description} {ending} Ctrl-C ends the view, not the run.", 78)
 
@@ -177,8 +178,8 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
     add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
     add("--axis", choices=("x", "y", "z"), help="axis of the mesh along which grasps are spread (default: the longest)")
-    add("--force", action="store_true", help="replace files that are there")
-    add("--list", action="version", version=kinds, help="list the kinds and leave")
+    add("--force", action="store_true", help="replace existing files")
+    add("--list", action="version", version=kinds, help="list the kinds and exit")
     more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"
     parser.epilog = f"{parser.epilog}\n  {more}\n\n{kinds}"
 
@@ -268,15 +269,14 @@ def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
     add("--mu", type=values.positive, default=0.8, help="friction coefficient (default 0.8)")
-    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
-        "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
-        )  # fmt: skip
-    add("--unit", choices=("m", "cm", "mm"), help="of lengths and areas that carry none in the file")
-    add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="of a pressure that carries none in the file")
+    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the pad's long "
+        "side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)")  # fmt: skip
+    add("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none")
+    add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, where the file gives none")
     add("--pressure-name", metavar="NAME", help="column or data array that holds the pressure (default: pressure)")
     add("--flip-normals", action="store_true", help="turn all normals; they point into the object, as the finger does")
     add("--other", metavar="FILE", help="the other contact of the grasp, in the same coordinates, units and options")
-    add("--distance", type=values.positive, metavar="MM", help="between two such contacts that face each other")
+    add("--distance", type=values.positive, metavar="MM", help="distance of two such contacts that face each other")
     add("--object-length", type=values.positive, metavar="MM", help="divides torques of forces (default: the distance)")
     add("--contact-length", type=values.positive, metavar="MM", help="divides torques about the normals (default: rho)")
     add("--surface", choices=SURFACES, default="quartic", help="limit surface that is scored (default: quartic)")
@@ -310,7 +310,7 @@ def _add_figure_options(parser: argparse.ArgumentParser) -> None:
     add("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
     add("-o", metavar="PNG", dest="output", help="picture, or folder for several (default: results/figures)")
     add("--results", metavar="FOLDER", default="results",
-        help="where the scenes' results are or will be (default: results)")  # fmt: skip
+        help="folder of the scenes' results (default: results)")  # fmt: skip
 
 
 def _format(text: str) -> str:

@@ -272,7 +272,7 @@ class GraspMap:
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:
     if (si is None) == (other is None) and not (si is other is None and default is not None):
-        raise ValueError(f"{name} is given {'twice' if si is not None else 'nowhere'}: give it once")
+        raise ValueError(f"{name} is {'given twice' if si is not None else 'missing'}: give it once")
     return default if si is other is None else si if other is None else np.asarray(other, float) * UNITS[unit].size
 
 

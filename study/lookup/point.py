@@ -248,7 +248,7 @@ class GraspPoint:
         if nodes.exact:
             return f"{found}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
         low, high = (shown_text(v, nodes.units, 5) for v in (axis.values.min(), axis.values.max()))
-        return f"{found}, solved is {low}" + (f" to {high}" if low != high else " only")
+        return f"{found}, solved: {low}" + (f" to {high}" if low != high else " only")
 
     def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
         """Indices of the cases around a point along the file's axes, with their nodes."""

@@ -267,7 +267,7 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
         notes.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
     for model, fits in evaluated.fits.items():
         if failed := [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]:
-            notes.append(f"{model}: fit failed of {', '.join(failed)}; three-motion ellipsoid used")
+            notes.append(f"{model}: fit failed for {', '.join(failed)}; three-motion ellipsoid used")
     if evaluated.rank < SPACE:
         space = {1: "one line", 2: "a plane"}.get(evaluated.rank, "a point")
         notes.append(f"the loads that friction can carry fill {space} only (rank {evaluated.rank}): the limit surface "

@@ -179,7 +179,7 @@ def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise StudyError(OTHER_FILE, f"{path}: no text file; export the patch as CSV, VTU or VTP") from error
+        raise StudyError(OTHER_FILE, f"{path}: not a text file; export the patch as CSV, VTU or VTP") from error
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         found, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
@@ -192,7 +192,7 @@ def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
             rows += csv.reader([line], delimiter=mark, strict=True)
         except csv.Error as error:
             remedy = "write numbers with a decimal point, without quotation marks"
-            raise refused(path, number, "", f"a line that is no table ({error})", "cells", remedy) from error
+            raise refused(path, number, "", f"a line that is not a table row ({error})", "cells", remedy) from error
     return [k for k, _ in lines], rows
 
 

@@ -234,19 +234,19 @@ class Result:
     def _checked(self, path: str) -> Any:
         expected = self._known.get(f"{ROOT}/{path}")
         if expected is None:
-            raise KeyError(f"{path} is no dataset of this file; it has {', '.join(sorted(self._known))}")
+            raise KeyError(f"{path} is not a dataset of this file; it has {', '.join(sorted(self._known))}")
         return self.file.checked(expected.path, expected.shape, expected.dtype)
 
     def _axis(self, name: str) -> StoredAxis:
         path = f"{ROOT}/axes/{name}"
         found, attributes = self.file.plain(path), self.file.attributes(path)
         if found.ndim != 1 or found.dtype != np.dtype("<f8"):
-            raise ValueError(f"axis '{name}' is no list of numbers")
+            raise ValueError(f"axis '{name}' is not a list of numbers")
         units = str(attributes.get("units", ""))
         values = self.file.values(found)
         # Put this way round so that NaN is refused as well.
         if not (np.abs(values) < BEYOND).all():
-            raise ValueError(f"axis '{name}' has values that are no numbers")
+            raise ValueError(f"axis '{name}' has values that are not numbers")
         label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
         options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
         if options and len(options) != len(values):
@@ -256,7 +256,7 @@ class Result:
     def _text(self, name: str) -> Any:
         found = self.file.plain(f"{ROOT}/{name}")
         if found.shape != () or found.dtype.kind != "S":
-            raise self._damaged(f"{ROOT}/{name} is no text")
+            raise self._damaged(f"{ROOT}/{name} is not a text")
         return found
 
     def _string(self, name: str) -> str:

@@ -208,7 +208,7 @@ def _sentence(error: BaseException, limit: float) -> str:
     if isinstance(error, StopIteration):
         return "the load path ended before this force; this is a bug"
     if is_out_of_memory(error):
-        return NO_MEMORY.format(text=str(error) or "no more could be had")
+        return NO_MEMORY.format(text=str(error) or "no more was available")
     text = f"{type(error).__name__}: {error}"
     # A builtin error is most likely a bug, and only its place tells which.
     if type(error).__module__ == "builtins" and error.__traceback__:

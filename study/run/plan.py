@@ -239,7 +239,7 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     seconds = measured_seconds(plan.layout, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
-        return f"{_estimated_time(plan, scene, ranks)}; known better when a few load paths are in {path}"
+        return f"{_estimated_time(plan, scene, ranks)}; more accurate once a few load paths are in {path}"
     whole = duration(makespan(plan.in_parts(expected), ranks))
     return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
 

@@ -151,7 +151,7 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
         "  left out   starting the ranks, and cores that share caches and memory",
     ]
     good = [r.ranks for r in replays if r.efficiency >= GOOD]
-    advice = f"at least {GOOD:.0%} efficient up to {max(good)} ranks" if good else f"nowhere {GOOD:.0%} efficient"
+    advice = f"at least {GOOD:.0%} efficient up to {max(good)} ranks" if good else f"never {GOOD:.0%} efficient"
     return "\n".join([*head, *_table(replays), advice])
 
 

@@ -187,7 +187,7 @@ class Candidates(SceneSection):
                 )
         for key in ("angles_deg", "roll_deg") if self.poses or self.sampler else ():
             if getattr(self, key) != Candidates.model_fields[key].default:
-                yield Finding((key,), f"{key} without stations", "it with stations only", "remove it")
+                yield Finding((key,), f"{key} without stations", "stations beside it", "remove it")
         for i, pose in enumerate(self.poses):
             yield from (f.below("poses", i) for f in pose.findings())
 
@@ -196,7 +196,7 @@ class Candidates(SceneSection):
         low, high = shape.spans_mm.get("z", (-math.inf, math.inf))
         outside = [s for s in self.station_values_mm if not low <= s <= high]
         if outside:
-            found = f"{len(outside)} station{'s' * (len(outside) > 1)} beside the object: {_listed(outside)} mm"
+            found = f"{len(outside)} station{'s' * (len(outside) > 1)} off the object: {_listed(outside)} mm"
             expected = f"stations from {low:g} to {high:g} mm, where the object is"
             remedy = "stations are coordinates along the object's axis, in mm"
             yield Finding((self._station_key,), found, expected, remedy)
@@ -211,9 +211,9 @@ class Candidates(SceneSection):
             if any(pose.findings()) or (distance := pose.clearance_mm(shape.spans_mm, gripper)) <= 0:
                 continue
             label = f" of '{pose.label}'" if pose.label else ""
-            found = f"a pad{label} that passes the object at a distance of {distance:.3g} mm"
+            found = f"a pad{label} that misses the object by {distance:.3g} mm"
             remedy = "point_mm is in mm, in the frame in which the object's shape is given"
-            yield Finding(("poses", i, "point_mm"), found, "a pad that meets it", remedy)
+            yield Finding(("poses", i, "point_mm"), found, "a pad that touches it", remedy)
 
     def unknown_names(self, key: str, wanted: Any) -> Iterator[Finding]:
         """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""

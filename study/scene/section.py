@@ -135,14 +135,15 @@ def _choices(schema: Mapping[str, Any]) -> list[str]:
 def _expectation(schema: Mapping[str, Any], key: str) -> str:
     """What a key takes, read off its JSON schema: kind, range, unit and description."""
     unit = split_unit(key)[1]
-    text = _kind(schema) + (f" [{UNITS[unit].text}]" if unit else "")
+    text = kind_text(schema) + (f" [{UNITS[unit].text}]" if unit else "")
     return f"{text} ({schema['description']})" if "description" in schema else text
 
 
-def _kind(schema: Mapping[str, Any]) -> str:
+def kind_text(schema: Mapping[str, Any]) -> str:
+    """What values a key takes, read off its JSON schema: kind and range, or all choices."""
     kind, options = schema.get("type"), _options(schema)
     if options:
-        return " or ".join(map(_kind, options))
+        return " or ".join(map(kind_text, options))
     if values := [json.dumps(v) for v in _choices(schema)]:
         return values[0] if len(values) == 1 else f"one of {', '.join(values)}"
     if kind in ("number", "integer"):
@@ -152,7 +153,7 @@ def _kind(schema: Mapping[str, Any]) -> str:
         low, high = schema.get("minItems", 0), schema.get("maxItems")
         count = f"{low}" if low == high else f"{low} or more" if high is None else f"{low} to {high}"
         item = (schema.get("prefixItems") or [schema.get("items", {})])[0]
-        each = f", each {_kind(item)}" if item.get("type") in ("number", "integer", "array") else ""
+        each = f", each {kind_text(item)}" if item.get("type") in ("number", "integer", "array") else ""
         return f"a list of {count}{each}"
     return {"string": "text", "boolean": "true or false"}.get(str(kind), "a table")
 
@@ -166,7 +167,7 @@ def _remedy(key: str, value: Any, schema: Mapping[str, Any]) -> str:
         return slip
     if example is not None:
         return f"write for example `{key} = {shown(example)}`"
-    return f"write {_kind(schema)}" + (", without quotes and without the unit" if isinstance(value, str) else "")
+    return f"write {kind_text(schema)}" + (", without quotes and without the unit" if isinstance(value, str) else "")
 
 
 def _other_unit(value: float, unit: str, schema: Mapping[str, Any]) -> str:

@@ -137,7 +137,7 @@ class Gripper(SceneSection):
         for key in ("alpha", "shear_moduli_kpa"):
             if getattr(self, key):
                 found, remedy = f"{key} with material {shown(self.material)}", 'remove it, or choose "hyperfoam"'
-                yield Finding((key,), found, "it with hyperfoam only", remedy)
+                yield Finding((key,), found, 'material = "hyperfoam"', remedy)
 
     def _hyperfoam_findings(self) -> Iterator[Finding]:
         if len(self.alpha) != len(self.shear_moduli_kpa):
@@ -226,7 +226,7 @@ class LimitSurfaceKeys(SceneSection):
     def findings(self) -> Iterator[Finding]:
         """Only some models have several objectives."""
         if self.objective == "zhou" and self.model not in CONVEX_FITS:
-            found, expected = f'"zhou" with model {shown(self.model)}', f"it with model {' or '.join(CONVEX_FITS)}"
+            found, expected = f'"zhou" with model {shown(self.model)}', f"model {' or '.join(CONVEX_FITS)}"
             yield Finding(("objective",), found, expected, 'write `objective = "least_squares"`')
 
 

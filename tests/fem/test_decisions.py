@@ -305,7 +305,7 @@ def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
     assert travel_past(ball, [0.0, -0.1, half - 1e-5], seed, 5.0) == pytest.approx(0.1 - np.sqrt(2e-5 * half), abs=1e-5)
     with pytest.raises(NoContactError, match="grazes"):
         travel_past(box, [0.0, -0.1, half], seed)
-    with pytest.raises(NoContactError, match="passes"):
+    with pytest.raises(NoContactError, match="misses"):
         travel_past(box, [0.0, -0.1, half + 1e-8], seed)
     assert 0.1 - half < travel_past(box, [0.0, -0.1, half - 1e-8], seed) < 0.1 - 0.8 * half
 

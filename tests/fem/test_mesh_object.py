@@ -197,7 +197,7 @@ def test_first_touch_on_the_flask(flask):
     d = first_touch(flask, pose, grid, 0.4)
     x = pose.to_object(grid) + d * pose.rotation[:, 2]
     assert np.abs(flask.distance(x).min()) < 1e-10
-    with pytest.raises(NoContactError, match="passes the object"):
+    with pytest.raises(NoContactError, match="misses the object"):
         first_touch(flask, Pose(TILT, np.array([0.2, 0, 0.25])), grid, 0.4)
 
 
@@ -398,7 +398,7 @@ end_header
 
 @pytest.mark.parametrize(("name", "content", "message"), [
     ("cut.stl", FLASK.read_bytes()[:20_000], "20000 bytes, expected at least 179284"),
-    ("junk.stl", b"hello", "cut short or no STL file"),
+    ("junk.stl", b"hello", "truncated, or not an STL file"),
     ("huge.stl", bytes(80) + b"\xff" * 4, "expected at least 214748364834"),
     ("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "is damaged|is empty"),
     ("empty.stl", b"", "the file is empty"),

@@ -340,11 +340,11 @@ def test_first_touch_catches_a_grazing_edge_and_says_when_the_pad_passes():
     graze = pose([0.2, 0, 0.03 + 0.025 - 1e-7], -X_AXIS)  # the pad's lower edge dips 0.1 um below the pole
     expected = 0.2 - np.sqrt(0.03**2 - (0.03 - 1e-7) ** 2)
     assert first_touch(shape, graze, face(), 0.5) == pytest.approx(expected, abs=1e-9)
-    with pytest.raises(NoContactError, match=r"passes the object: within 500 mm .* closer than 0.1 mm; check station"):
+    with pytest.raises(NoContactError, match=r"misses the object: within 500 mm .* closer than 0.1 mm; check station"):
         first_touch(shape, pose([0.2, 0, 0.0551], -X_AXIS), face(), 0.5)
-    with pytest.raises(NoContactError, match="passes the object"):
+    with pytest.raises(NoContactError, match="misses the object"):
         first_touch(shape, pose([0.2, 0, 0], X_AXIS), face(), 0.5)
     with pytest.raises(NoContactError, match="starts 30 mm inside the object"):
         first_touch(shape, pose([0, 0, 0], -X_AXIS), face(), 0.5)
-    with pytest.raises(NoContactError, match="passes the object"):
+    with pytest.raises(NoContactError, match="misses the object"):
         first_touch(shape, pose([0.2, 0, 0], -X_AXIS), face(), 0.169)

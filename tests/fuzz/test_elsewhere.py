@@ -94,7 +94,7 @@ def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
     """It would be waited for without end."""
     for name in ("a.stl", "a.csv", "a.hdf"):
         os.mkfifo(tmp_path / name)
-    with pytest.raises(MeshError, match="no regular file"):
+    with pytest.raises(MeshError, match="not a regular file"):
         read_triangles(tmp_path / "a.stl")
     assert "regular file" in told("patch", tmp_path / "a.csv")[1]
     assert "not a regular file" in told("status", tmp_path / "a.hdf")[1]
@@ -149,7 +149,7 @@ TABLE = QUICK["table"].content
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (b"\n1,0", b'\n"1,0', "a line that is no table"),
+        (b"\n1,0", b'\n"1,0', "a line that is not a table row"),
         (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
         (b",7\n", b",1e300\n", "at most 1e+12 Pa"),
         (b"1.25", b"1e300", "at most 10000 m^2"),

@@ -24,7 +24,7 @@ REASONS = (
     Reason("pad compressed too far", r"^the pad is compressed too far", "physics"),
     Reason("limit point", r"limit point|largest force that", "physics"),
     Reason("the pad jumps", r"the pad jumps|lies beyond the one"),
-    Reason("pad passes the object", r"passes the object|no pad meets|leaves the object", "physics"),
+    Reason("pad misses the object", r"misses the object|no pad meets|leaves the object", "physics"),
     Reason("pad grazes the object", r"grazes the object", "physics"),
     Reason("no grasp found", r"found no grasp between"),
     Reason("no first contact", r"found no first contact"),

@@ -70,7 +70,7 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
     existing = [str(path) for path in (scene, batch) if path.exists()]
     if existing and not options.force:
         raise StudyError(
-            CANNOT_WRITE, f"{' and '.join(existing)}: existing file; choose another name with -o, or add --force"
+            CANNOT_WRITE, f"{' and '.join(existing)}: exists already; choose another name with -o, or add --force"
         )
     words = {"NAME": base.name, "SOFTJAW": _program()}
     mesh = _about_mesh(options, scene, measure) if options.kind == "mesh" else {}

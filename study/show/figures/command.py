@@ -37,7 +37,7 @@ def _solved(scene: str, path: Path, run: Callable[[Path, Path], int]) -> int:
     """Run a scene into its file, which takes a second where nothing is missing; the exit code."""
     source = JOBS / f"{scene}.toml"
     if not source.is_file():
-        text = f"{source}: there is no such scene; install softjaw from its source folder, which has jobs/"
+        text = f"{source}: no such scene; install softjaw from its source folder, which has jobs/"
         raise StudyError(USAGE, text)
     if (code := run(source, path)) == OTHER_FILE:
         raise StudyError(OTHER_FILE, f"{path}: move it away, or choose another folder with --results")

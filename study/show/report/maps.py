@@ -226,8 +226,9 @@ def safe_forces(ds: xr.Dataset, index: Index) -> Block | None:
     made.update_yaxes(range=[0, 1.12 * forces(ds)[-1]]).update_yaxes(title_text="normal force [N]", col=1)
     caption = (
         "Bars: from the minimum holding force (safety factor 1, CCM; zero without a mass) to the maximum force before"
-        " the indentation passes what is allowed or the stress the yield strength, by straight lines between solved"
-        " forces. No bar: no force is safe; triangles mark what holding takes (up) and what the wall bears (down)."
+        " the indentation exceeds what is allowed or the stress the yield strength, by straight lines between solved"
+        " forces. No bar: no force is safe; triangles mark the force that holds (up) and the one that the wall bears"
+        " (down)."
     )
     return plot(made, caption, f"Safe force ranges: {int(np.sum(low <= high))} of {high.size} grasps have one.", 300)
 

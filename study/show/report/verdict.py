@@ -87,7 +87,7 @@ def verdict(ds: xr.Dataset, mu: float | None) -> list[str]:
     done, failed, missing = (int(np.sum(ds.status.values == state)) for state in (DONE, FAILED, MISSING))
     total, best = ds.status.size, ds.attrs["best"]
     none = "".join(f", {text}" for text in no_grasps(ds.status.values))
-    cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are missing{none}."
+    cases = f"{done} of {total} cases are solved, {failed} failed, {missing} are not computed{none}."
     if done == total:
         cases = f"All {total} cases are solved." if total > 1 else "It is the only case of this study."
     if best is None:
@@ -277,7 +277,7 @@ def warnings(ds: xr.Dataset) -> list[str]:
     """What speaks against trusting the best grasp."""
     best, status, found = ds.attrs["best"], ds.status.values, []
     if missing := int(np.sum(status == MISSING)):
-        found.append(f"This study is unfinished: {missing} cases are missing, so a better grasp may be found.")
+        found.append(f"This study is unfinished: {missing} cases are not computed, so a better grasp may be found.")
     if best is None:
         return found
     above = (status[..., best[-1] + 1 :] == DONE, ds["flags"].values[..., best[-1] + 1 :] & LOST == 0)

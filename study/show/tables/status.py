@@ -166,7 +166,7 @@ def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
     lines = []
     for i, s in enumerate(result.sessions, start=1):
         now = running and i == len(result.sessions)
-        reason = s["reason"] if s["stop"] else "running" if now else "ended without a word (killed?)"
+        reason = s["reason"] if s["stop"] else "running" if now else "no end was recorded (killed?)"
         ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
         wall = _between(s["start"], s["stop"])
         lines.append(wrapped(f"session {i}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))

@@ -63,5 +63,5 @@ def _target(options: Namespace, name: str) -> Path:
     if path.resolve() == Path(options.file).resolve():
         raise StudyError(USAGE, f"--{name}: {path} is the result file itself; choose another name")
     if not path.parent.is_dir():
-        raise StudyError(CANNOT_WRITE, f"{path}: there is no folder {path.parent}; make it first")
+        raise StudyError(CANNOT_WRITE, f"{path}: no folder {path.parent}; create it first")
     return path

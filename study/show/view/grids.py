@@ -50,7 +50,7 @@ def _write_object(view: View, index: Index, path: Path) -> None:
     if view.displacement(index) is not None:
         name = f"displacement, candidate {view.candidate(index)}, {forces(view.ds)[index[-1]]:g} N"
         on_points[name] = view.moved(index) - x
-    about = f"{view.ds.attrs['title']}; cell data: maps (CCM) in SI units, status 0 missing, 1 done, 2 failed"
+    about = f"{view.ds.attrs['title']}; cell data: maps (CCM) in SI units, status 0 not computed, 1 complete, 2 failed"
     write_grid(path, x, corners, on_cells, on_points, about=about)
 
 

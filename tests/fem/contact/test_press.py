@@ -195,7 +195,7 @@ def is_inverted(press, x):
 @pytest.mark.parametrize(
     ("tamper", "words"),
     [
-        (pulls, "the contact pulls: lowest pressure -"),
+        (pulls, "tension in the contact: lowest pressure -"),
         (penetrates, "the pad penetrates the object by"),
         (lifts, "pressure and gap are both positive"),
         (is_unbalanced, "force balance is off by 1.0e-07"),

@@ -109,7 +109,7 @@ def test_units_of_people_and_missing_coordinates(straight):
     assert straight.at(station_mm=15, angle_deg=40, force=3).e_n == straight.at(0.015, np.radians(40), 3).e_n
     with pytest.raises(ValueError, match="station is given twice"):
         straight.at(0.01, 0.1, 3, station_mm=10)
-    with pytest.raises(ValueError, match="angle is given nowhere"):
+    with pytest.raises(ValueError, match="angle is missing"):
         straight.at(0.01, force=3)
     with pytest.raises(ValueError, match="force is missing"):
         straight.at(0.01, 0.1)
@@ -124,8 +124,8 @@ def test_units_of_people_and_missing_coordinates(straight):
 @pytest.mark.parametrize(
     ("place", "word"),
     [
-        ((0.05, 0.0, 2.0), "station 50 mm, solved is 0 mm to 40 mm"),
-        ((0.01, 0.0, 9.0), "force 9 N, solved is 1 N to 8 N"),
+        ((0.05, 0.0, 2.0), "station 50 mm, solved: 0 mm to 40 mm"),
+        ((0.01, 0.0, 9.0), "force 9 N, solved: 1 N to 8 N"),
         ((-1e-6, 0.0, 2.0), "station -0.001 mm"),
         ((np.nan, 0.0, 2.0), "station nan"),
         ((0.01, 0.0, 0.5), "force 0.5 N"),
@@ -231,11 +231,11 @@ def test_angles_repeat_with_the_objects_symmetry(tmp_path):
 def test_a_gap_that_was_not_solved_is_not_bridged(tmp_path):
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
-    assert "angle 90 deg, solved is 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
+    assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
     assert part.at(0.01, 0.15 + np.pi, 2).ok
     one = GraspMap(make(tmp_path / "b.hdf", axes=grid_axes(angles=[0.3])))
     assert one.at(0.01, force=2).e_n == one.at(0.01, 0.3, 2).e_n
-    assert one.at(0.01, 0.4, 2).reason.endswith("solved is 17.189 deg only")
+    assert one.at(0.01, 0.4, 2).reason.endswith("solved: 17.189 deg only")
 
 
 def test_round_objects_may_be_asked_at_any_angle(tmp_path):

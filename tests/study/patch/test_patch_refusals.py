@@ -93,7 +93,7 @@ def test_a_missing_file_cannot_be_read(tmp_path, refused, name):
     assert "cannot be read (No such file or directory)" in said
 
 
-@pytest.mark.parametrize(("name", "what"), [("a.csv", "no text file"), ("a.vtu", "no VTU"), ("a.vtp", "no VTP")])
+@pytest.mark.parametrize(("name", "what"), [("a.csv", "not a text file"), ("a.vtu", "no VTU"), ("a.vtp", "no VTP")])
 def test_a_damaged_file_cannot_be_read(tmp_path, capfd, name, what):
     file = tmp_path / name
     file.write_bytes(b"\x00\xff\xfe" * 100)

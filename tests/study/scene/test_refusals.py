@@ -74,7 +74,7 @@ def test_a_pad_that_just_meets_the_box_round_the_object_is_not_refused(angle):
     """A pad 22 mm wide reaches a face at 20 mm from 31 mm off the middle, and not from beyond that."""
     approach = "[1, 0, 0]"
     assert parse_scene(BOX + pose([angle, 30.9, 0], "", approach) + LOAD)
-    with pytest.raises(SceneError, match=r"distance of 0\.1 mm"):
+    with pytest.raises(SceneError, match=r"misses the object by 0\.1 mm"):
         parse_scene(BOX + pose([angle, 31.1, 0], "", approach) + LOAD)
 
 
@@ -90,7 +90,7 @@ def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
     code, output, errors = once(run)
     assert (code, output) == (2, "")
     assert errors.count("error: ") == 1
-    assert errors.startswith("error: candidates.poses[1]: found 'far', where both fingers pass the object")
+    assert errors.startswith("error: candidates.poses[1]: found 'far', where both fingers miss the object")
     assert not list(shared_path.glob("out.hdf*"))
 
 

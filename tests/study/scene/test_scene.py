@@ -131,7 +131,7 @@ WRONG_VALUES = [
     ("radius_mm = 30", "radius_mm = 1e9", 3, "object.radius_mm", "2e+09 mm", "1 mm to 2 m"),
     ('"sphere"', '"spher"', 2, "object.shape", '"spher"', '"revolution", "sections"', 'did you mean "sphere"?'),
     ('shape = "sphere"', "", 1, "object.shape", "nothing", '"sphere"'),
-    ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station beside the object: 30.5", "from -30 to 30 mm"),
+    ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "1 station off the object: 30.5", "from -30 to 30 mm"),
     ("[0]", "[0, 0]", 6, "candidates.stations_mm", "0 more than once"),
     ("[0]", "[]", 6, "candidates.stations_mm", "[]", "1 to 10000", "`stations_mm = [25, 50, 75]`"),
     ("[0]", "'top'", 6, "candidates.stations_mm", '"top"', "1 to 10000", "`stations_mm = [25, 50, 75]`"),
@@ -186,7 +186,7 @@ def test_a_key_without_its_unit_is_unknown_and_the_right_one_missing():
         ("  [150, 12],", "  [150, -1],", 6, "radius -1 mm"),
         ("  [100, 20],", "  [100, 20, 1],", 5, "[100, 20, 1]"),
         ("  [100, 20],\n", "", 3, "[[0, 30], [50, 30], [150, 12]]"),
-        ("stations_mm = [0]", "stations_mm = [-5]", 10, "1 station beside the object: -5"),
+        ("stations_mm = [0]", "stations_mm = [-5]", 10, "1 station off the object: -5"),
     ],
 )
 def test_an_outline_that_makes_no_body_is_named_by_its_point(old, new, line, found):
@@ -326,7 +326,7 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named():
     assert "3000 mm along z (value 2 of 2)" in p.found
     assert parse_scene(text.replace("3000", "60")).cases == 8  # 2 x 2 points of the sweep, 2 angles
     p = problem(BALL, "sweep.object.radius_mm=[10, 20]", "candidates.stations_mm=[15]", "object.radius_mm=20")
-    assert p.found == "10 (value 1 of 2), with which candidates.stations_mm has 1 station beside the object: 15 mm"
+    assert p.found == "10 (value 1 of 2), with which candidates.stations_mm has 1 station off the object: 15 mm"
 
 
 def test_too_many_cases_are_refused():

@@ -158,7 +158,7 @@ def test_what_is_proposed_for_a_body_is_not_warned_of(name, tmp_path, capsys):
 def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     (tmp_path / there).write_text("mine")
     assert started("bottle") == CANNOT_WRITE
-    assert f"{there}: existing file" in capsys.readouterr().err
+    assert f"{there}: exists already" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == [there]
     assert (tmp_path / there).read_text() == "mine"
     assert started("bottle", "--force") == 0

@@ -19,7 +19,7 @@ def test_it_says_what_it_is_the_best_grasps_the_failures_and_how_to_read_them(tm
         "<b>thing</b>: 3 stations (-20 to 20 mm) x 2 angles (0 to 90 deg) x 2 normal forces (1 to 5 N)\n"
     )
     assert "Best grasp at 5 N per finger: station 0 mm, angle 0 deg, quality 2," in text
-    assert "10 of 12 cases are solved, 1 failed, 1 are missing." in text
+    assert "10 of 12 cases are solved, 1 failed, 1 are not computed." in text
     assert "failed 1 x no </script> convergence [station 20 mm, angle 90 deg, 5 N]" in text
     assert "0 missing, 1 done, 2 failed" in text.partition("How to read the file")[2]
     assert str(tmp_path) not in text  # the same bits wherever it is solved
@@ -33,5 +33,5 @@ def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
         file["study/status/code"][...] = 2
     with open_result(sealed(path)) as result:
         text = plain_report(dataset(result), None)
-    assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are missing." in text
+    assert "No grasp is solved. 0 of 12 cases are solved, 12 failed, 0 are not computed." in text
     assert "failed 11 x no reason was given" in text

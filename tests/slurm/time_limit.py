@@ -1,0 +1,100 @@
+"""Does a study that Slurm's time limit kills end with the same numbers as one that nothing interrupts?
+
+    tests/slurm/cluster.sh LOGS python -m tests.slurm.time_limit [SCENE]
+
+The shipped batch script is submitted three times, each time in a folder of its own: with time enough; with a limit that
+the script hears of a minute before (it stops in order and goes back into the queue); and with a limit that Slurm
+enforces without a word, after which the same command is given once more.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from tests.study.launching import ROOT, contents, differing
+
+SCRIPT = ROOT / "jobs" / "slurm" / "one-node.sbatch"
+RANKS = 2
+HOUR = 3600.0
+ENDED = ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL", "OUT_OF_MEMORY")
+
+
+def slurm(*words: str) -> str:
+    """What a command of Slurm prints."""
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
+
+
+def job_field(job: str, name: str) -> str:
+    """A field of a job, such as ``JobState``."""
+    words = dict(word.partition("=")[::2] for word in slurm("scontrol", "show", "job", job).split())
+    return words[name]
+
+
+def submitted(folder: Path, scene: Path, *options: str) -> str:
+    """Submit the script for a copy of the scene in a folder; the job's number."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(scene, folder)
+    words = ("sbatch", "--parsable", f"--ntasks={RANKS}", f"--chdir={folder}", *options, str(SCRIPT), scene.name)
+    return slurm(*words)
+
+
+def ended(job: str) -> str:
+    """Wait for the end of a job, through as many starts as it takes; its last state."""
+    deadline = time.monotonic() + HOUR
+    while (state := job_field(job, "JobState")) not in ENDED:
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"job {job} is {state} after an hour")
+        time.sleep(2)
+        if state == "PENDING" and job_field(job, "Reason") == "BeginTime":
+            # Slurm lets a job wait two minutes before it starts again. Some of that is needed: within a second of the
+            # end of the last start its new credential is refused, and the job fails.
+            time.sleep(5)
+            slurm("scontrol", "update", f"JobId={job}", "StartTime=now")
+    return state
+
+
+def report(name: str, job: str) -> None:
+    """Print how a job ended."""
+    state, starts, code = job_field(job, "JobState"), int(job_field(job, "Restarts")) + 1, job_field(job, "ExitCode")
+    print(f"{name:<10} job {job}: {state}, {starts} start(s), exit code {code}", flush=True)
+
+
+def main(words: list[str]) -> int:
+    """Run the three jobs and compare their files."""
+    scene = Path(words[0] if words else ROOT / "jobs" / "bottle-rigid.toml").resolve()
+    top = ROOT / "results" / "slurm"
+    os.environ["SOFTJAW"] = str(ROOT / ".venv" / "bin" / "softjaw")
+    file = Path("results") / f"{scene.stem}.hdf"
+
+    for name in ("whole", "stopped", "killed"):
+        shutil.rmtree(top / name, ignore_errors=True)
+    whole = submitted(top / "whole", scene, "--time=60")
+    states = [ended(whole)]
+    report("whole", whole)
+    stopped = submitted(top / "stopped", scene, "--time=2", "--signal=B:USR1@40")
+    states.append(ended(stopped))
+    report("stopped", stopped)
+    killed = submitted(top / "killed", scene, "--time=1", "--signal=B:CONT@1")
+    states.append(ended(killed))
+    report("killed", killed)
+    again = submitted(top / "killed", scene, "--time=60")
+    states.append(ended(again))
+    report("again", again)
+
+    expected = contents(top / "whole" / file)
+    unlike = {name: differing(top / name / file, expected) for name in ("stopped", "killed")}
+    for name, found in unlike.items():
+        equal = f"{len(expected) - len(found)} of {len(expected)} datasets"
+        print(f"{name}: {equal} equal those of the whole run, byte for byte")
+        print("".join(f"  differs: {dataset}\n" for dataset in found), end="")
+    as_meant = states == ["COMPLETED", "COMPLETED", "TIMEOUT", "COMPLETED"] and int(job_field(stopped, "Restarts")) > 0
+    return int(any(unlike.values()) or not as_meant)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
