@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.build import forces_apart, middle_of, own_frame
+from softjaw.study.case.build import forces_apart, middle_of, own_frame, pad_shape
 from softjaw.study.quantities import MISSING
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -318,4 +318,5 @@ def path_cost(scene: Scene) -> float:
 
 def meshes_cost(scene: Scene) -> float:
     """Elements of all meshes of a case over those of the fine one."""
-    return 1 + (scene.accuracy.meshes - 1) / 8
+    shares = [math.prod(pad_shape(scene.gripper, coarser).elements) for coarser in (False, True)]
+    return sum(shares[: scene.accuracy.meshes]) / shares[0]

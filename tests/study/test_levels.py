@@ -73,7 +73,8 @@ def test_the_fine_mesh_has_the_state_that_it_has_along_a_load_path(overrides):
         assert max(both["work/load_steps"]) == 1
         errors = ["e_n", "closing", "indentation", "wall_stress", "wall_strain"][: 5 if overrides else 2]
         assert all(0.0 < both[f"maps/{name}_error"] < 1.5 for name in errors)
-        assert both["maps/flags"] == alone.values["maps/flags"]
+        # one mesh cannot tell that it is coarse by the error of e_n
+        assert both["maps/flags"] & ~Flag.COARSE == alone.values["maps/flags"] & ~Flag.COARSE
         for name in names:
             assert both[name] == pytest.approx(alone.values[name], rel=1e-8, abs=1e-9), name
 
