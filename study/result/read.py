@@ -156,7 +156,9 @@ def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
     What is known of a candidate only has the same value at every force.
     """
     found = ds[name].sel(model=model, drop=True) if "model" in ds[name].dims else ds[name]
-    return found.broadcast_like(ds.status).transpose(*ds.status.dims).values
+    if found.dims != ds.status.dims:  # rarely, and xarray takes its time
+        found = found.broadcast_like(ds.status).transpose(*ds.status.dims)
+    return found.values
 
 
 def mesh_error(ds: xr.Dataset, name: str) -> np.ndarray | None:

@@ -13,16 +13,18 @@ import softjaw
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.export.cases import FINGER, MEANING, as_csv, as_json, cases
 from softjaw.study.lookup import GraspMap
-from tests.study.formula_results import FORCES, STATIONS, grid_axes, make, window, without_result
+from tests.study.formula_results import ANGLES, FORCES, STATIONS, grid_axes, make, window, without_result
+
+SMALL = grid_axes(STATIONS[:3], ANGLES[:2], FORCES[:3])
 
 
 def test_every_case_is_exported_with_its_state(tmp_path):
-    ds = softjaw.open(make(tmp_path / "a.hdf", axes=grid_axes(STATIONS[:4]), **without_result(2, "slid")))
+    ds = softjaw.open(make(tmp_path / "a.hdf", axes=SMALL, **without_result(2, "slid")))
     data, rows = json.loads(as_json(ds, "pcm")), list(csv.DictReader(io.StringIO(as_csv(ds, "pcm"))))
     e_n = ds.e_n.sel(model="pcm").values.ravel()
-    assert len(data["cases"]) == len(rows) == 4 * 6 * 4
+    assert len(data["cases"]) == len(rows) == 3 * 2 * 3
     assert data["meaning"] == MEANING
-    row = int(np.ravel_multi_index((2, 1, 1), (4, 6, 4)))
+    row = int(np.ravel_multi_index((2, 1, 1), (3, 2, 3)))
     assert (data["cases"][row]["state"], data["cases"][row]["message"]) == ("failed", "slid")
     assert data["cases"][row]["maps"]["e_n"] is None
     assert data["cases"][row]["fingers"][0]["pose_origin"] is None
@@ -37,7 +39,7 @@ def test_every_case_is_exported_with_its_state(tmp_path):
 
 def test_frames_are_those_of_the_object(tmp_path):
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    path = make(tmp_path / "a.hdf", fingers__pose_rotation=turn, flags__flags=4096.0 + 256)
+    path = make(tmp_path / "a.hdf", axes=SMALL, fingers__pose_rotation=turn, flags__flags=4096.0 + 256)
     case = next(cases(softjaw.open(path)))
     data = json.loads(as_json(softjaw.open(path)))["cases"][0]
     one = case["fingers"][0]
@@ -48,9 +50,8 @@ def test_frames_are_those_of_the_object(tmp_path):
 
 def test_an_exported_surface_is_the_one_that_is_looked_up(tmp_path):
     """``unit`` and ``coefficients`` as the export explains them, against ``GraspPoint.limit_surface``."""
-    axes = grid_axes()
-    bound = np.full((5, 6), 4.0)
-    path = make(tmp_path / "a.hdf", axes=axes, derived=window(axes), derived__force_high=bound)
+    bound = np.full((3, 2), 4.0)
+    path = make(tmp_path / "a.hdf", axes=SMALL, derived=window(SMALL), derived__force_high=bound)
     case = next(c for c in cases(softjaw.open(path)) if c["place"]["normal_force"] == FORCES[2])
     one = case["fingers"][0]
     surface = GraspMap(path).at(0, 0, FORCES[2]).limit_surface(1)
