@@ -27,7 +27,7 @@ from softjaw.study.case.model import check_petsc
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.flags import Flag, flags_in
 from softjaw.study.messages import SOME_FAILED, StudyError
-from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE
+from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checked_model
 from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
@@ -79,13 +79,13 @@ class Case:
             For a name that the case does not have.
         """
         found = np.asarray(self._read(f"maps/{name}"))
-        return float(found[MODELS.index(_checked(model))] if found.ndim else found)
+        return float(found[MODELS.index(checked_model(model))] if found.ndim else found)
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
         key = name if "/" in name else f"fingers/{name}"
         found = np.asarray(self._read(key))
-        return found[:, MODELS.index(_checked(model))] if "model" in BY_KEY[key].dims else found
+        return found[:, MODELS.index(checked_model(model))] if "model" in BY_KEY[key].dims else found
 
     @property
     def errors(self) -> dict[str, float]:
@@ -162,7 +162,7 @@ class Case:
         if finger not in (1, 2):
             raise ValueError(f"finger is {finger!r}: expected 1 or 2")
         contact = self.result.contacts[finger - 1]
-        S = contact.limits[_checked(model)].S
+        S = contact.limits[checked_model(model)].S
         if not fitted:
             return Ellipsoid(contact.ellipsoids[model].semi_axes * S)
         names = ("limit_surface/coefficients", "limit_surface/matrix")
@@ -186,12 +186,6 @@ class Case:
             known = sorted(name.partition("/")[2] for name in self.result.values if name.startswith(f"{group}/"))
             raise KeyError(f"{key} is not a value of this case; {group}/ has {', '.join(known)}")
         return self.result.values[key]
-
-
-def _checked(model: str) -> str:
-    if model not in MODELS:
-        raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
-    return model
 
 
 # --- from the question to the case ------------------------------------------------------------------------------------
@@ -322,7 +316,7 @@ def _at_force(scene: Scene, force: float) -> tuple[Scene, int]:
 
 
 def grasp_pose(pose: Any) -> Mapping[str, Any]:
-    """A pose as a scene's ``[[candidates.poses]]`` has it, from one, or from a matrix ``(4, 4)``.
+    """A pose as a scene's ``[[candidates.poses]]`` has it: from one, a matrix ``(4, 4)``, or both pads' poses.
 
     Raises
     ------
@@ -333,6 +327,9 @@ def grasp_pose(pose: Any) -> Mapping[str, Any]:
     """
     if isinstance(pose, Mapping):
         return pose
+    if isinstance(pose, tuple) and [np.shape(part) for part in pose] == [(2, 3, 3), (2, 3)]:
+        # as `GraspPoint.pose` gives them: finger 1's is enough, for the other one comes from the opposite side
+        pose = np.vstack([np.column_stack([pose[0][0], pose[1][0]]), [0.0, 0.0, 0.0, 1.0]])
     matrix = np.asarray(pose, dtype=float) if not isinstance(pose, str) else np.zeros(0)
     if matrix.shape != (4, 4):
         text = "a mapping with point_mm, approach and long_side, or a matrix (4, 4) with the translation in m"

@@ -399,6 +399,13 @@ FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that h
 BY_KEY = {q.key: q for q in TABLE}
 
 
+def checked_model(model: str) -> str:
+    """One of `MODELS`; `ValueError` for what is none."""
+    if model not in MODELS:
+        raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
+    return model
+
+
 def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:
     """All quantities of a file whose scene asks for these of `NEEDS` and `HELD`."""
     return tuple(q for q in TABLE if set(q.needs) <= set(has))

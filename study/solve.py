@@ -28,7 +28,7 @@ def press(
     force: float | None = None,
     *,
     candidate: int | None = None,
-    pose: Mapping[str, Any] | ArrayLike | None = None,
+    pose: Mapping[str, Any] | ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
 ) -> Case:
     """Solve one case in memory: press both fingers at one place with one force, and judge the grasp.
 
@@ -46,10 +46,10 @@ def press(
         Normal force per finger [N].
     candidate : int, optional
         Number of an explicit or sampled pose of the scene, from 0, instead of station and angle.
-    pose : mapping or (4, 4) array, optional
+    pose : mapping, (4, 4) array or tuple, optional
         A pose instead of them, in the frame of the object's own file: ``point_mm``, ``approach`` and ``long_side`` as
         in a scene's ``[[candidates.poses]]``; or a matrix whose columns are the pads' long side, their short side,
-        finger 1's approach, and a point on the line along which the fingers close [m].
+        finger 1's approach, and a point on the line along which the fingers close [m]; or what `GraspPoint.pose` gives.
 
     Returns
     -------

@@ -87,8 +87,8 @@ def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
     what = sj
     for part in name.split("."):
         what = getattr(what, part)
-    module = sys.modules[what.__module__]
-    [example] = doctest.DocTestFinder(recurse=False).find(what, name, module=False, globs=vars(module).copy())
+    names = {public: getattr(sj, public) for public in sj.__all__}
+    [example] = doctest.DocTestFinder(recurse=False).find(what, name, module=False, globs=names)
     assert example.examples
     assert doctest.DocTestRunner().run(example).failed == 0
 

@@ -269,8 +269,9 @@ def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
     add("--mu", type=values.positive, default=0.8, help="friction coefficient (default 0.8)")
-    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the pad's long "
-        "side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)")  # fmt: skip
+    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
+        "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
+        )  # fmt: skip
     add("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none")
     add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, where the file gives none")
     add("--pressure-name", metavar="NAME", help="column or data array that holds the pressure (default: pressure)")

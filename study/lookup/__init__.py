@@ -30,7 +30,7 @@ from softjaw.study.lookup.interpolation import (
 )
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.lookup.source import Source, turning
-from softjaw.study.quantities import DONE, MODELS
+from softjaw.study.quantities import DONE, checked_model
 from softjaw.study.ranking import judged, ranked, shown_level
 from softjaw.study.result.between import KINDS, contact_kinds
 from softjaw.study.result.read import open as open_dataset
@@ -201,9 +201,7 @@ class GraspMap:
         """
         key = name, model
         if key not in self._tables:
-            if model not in MODELS:
-                raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
-            grid = self._read(name, model)
+            grid = self._read(name, checked_model(model))
             grid = np.where(_like(self.done, grid, 0), grid, np.nan)
             self._tables[key] = grid.reshape(-1, *grid.shape[3:])
         return self._tables[key]

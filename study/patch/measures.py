@@ -26,7 +26,7 @@ from softjaw.study.patch.answer import FITTED_ON
 from softjaw.study.patch.contacts import check_facing, contact_of, exact_surface, grasp_lengths, opposite
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.patch.patch_reader import read_patch as read_file
-from softjaw.study.quantities import MODELS
+from softjaw.study.quantities import checked_model
 
 ELLIPSOIDS = ("three_motions", "axis_aligned", "full")
 
@@ -161,7 +161,7 @@ def friction_wrench(
     >>> friction_wrench(patch, [0, 0, 1], mu=0.8).round(9)[0, 5]
     0.016
     """
-    return wrench_in_frame(contact_of(patch, mu, x_axis).local, twist, mu, _checked(model))
+    return wrench_in_frame(contact_of(patch, mu, x_axis).local, twist, mu, checked_model(model))
 
 
 def fit_ellipsoid(
@@ -305,7 +305,7 @@ def grasp_quality(
     for name, length in (("object_length", object_length), ("contact_length", contact_length)):
         _length(name, 1.0 if length is None else length)
     _, arms, torques = grasp_lengths(contacts, object_length, contact_length)
-    bodies = [_body(c, surface, _checked(model)) for c in contacts[: 1 if two is None else 2]]
+    bodies = [_body(c, surface, checked_model(model)) for c in contacts[: 1 if two is None else 2]]
     middle = (contacts[0].origin + contacts[1].origin) / 2
     return grasp_score(soft(contacts, [bodies[0], bodies[-1]]), arms, torques, middle)
 
@@ -320,7 +320,7 @@ def _body(contact: Contact, kind: str, model: str) -> LimitSurface:
 
 
 def _fitted(contact: Contact, kind: str, model: str, samples: int) -> FittedSurface:
-    fit = _fit(contact, kind, _checked(model), samples)
+    fit = _fit(contact, kind, checked_model(model), samples)
     surface = fit.body(contact.mu).scaled(np.full(3, contact.limits[model].S))
     return FittedSurface(surface, fit.fit_error, fit.overclaim)
 
@@ -332,12 +332,6 @@ def _fit(contact: Contact, kind: str, model: str, samples: int) -> SurfaceFit:
     if fit.certificate == STANDS_IN:
         raise FitError(f"fit failed of {kind} to the wrenches of {samples} motions; take kind='three_motions'")
     return fit
-
-
-def _checked(model: str) -> str:
-    if model not in MODELS:
-        raise ValueError(f"model is {model!r}: expected one of {', '.join(MODELS)}")
-    return model
 
 
 def _length(name: str, value: float | None) -> float:

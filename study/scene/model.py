@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
+from softjaw.study.scene.loader import Loader, SectionOrLoader
 from softjaw.study.scene.objects import SHAPES, Mesh, Object
 from softjaw.study.scene.problems import Finding, SceneError, closest, shown
 from softjaw.study.scene.section import SceneSection, model_findings
@@ -22,7 +23,6 @@ from softjaw.study.scene.sections import (
     Friction,
     Gripper,
     LimitSurfaceKeys,
-    Load,
     Output,
     Run,
     ScoreKeys,
@@ -54,56 +54,14 @@ def _optional(model: type[SceneSection]) -> Any:
     return Field(default_factory=model)
 
 
-class _Loaded(type(SceneSection)):  # type: ignore[misc]
-    """Gives the class `Scene` a function that its instances have a section for: ``Scene.load``."""
-
-    def load(cls, file: str | Path, overrides: Sequence[str] = ()) -> Scene:
-        """The scene of a file.
-
-        Parameters
-        ----------
-        file : path
-            Scene as TOML; a mesh that it names is looked for from the file's folder.
-        overrides : sequence of str
-            ``section.key=value`` as behind ``--set``.
-
-        Raises
-        ------
-        SceneError
-            With every problem found, each a sentence with file, line and key. It is a `ValueError`.
-
-        Examples
-        --------
-        >>> Scene.load("jobs/smoke.toml", ["gripper.pad_width_mm=20"]).gripper.pad_width
-        0.02
-        """
-        from softjaw.study.scene.load import load_scene  # which makes scenes, so it stands above this module
-
-        return load_scene(file, overrides)
-
-
-if TYPE_CHECKING:
-
-    class _SectionOrLoader(Protocol):
-        """What ``load`` is of a scene, and of the class `Scene`."""
-
-        @overload
-        def __get__(self, scene: None, owner: type[Scene], /) -> Callable[..., Scene]: ...
-        @overload
-        def __get__(self, scene: Scene, owner: type[Scene], /) -> Load: ...
-
-else:
-    _SectionOrLoader = Load
-
-
-class Scene(SceneSection, metaclass=_Loaded):
+class Scene(SceneSection, metaclass=Loader):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
     object: Object
     gripper: Gripper = _optional(Gripper)
     friction: Friction = _optional(Friction)
     candidates: Candidates
-    load: _SectionOrLoader = Field(...)  # or the function of the class would be its default
+    load: SectionOrLoader = Field(...)  # or the function of the class would be its default
     limit_surface: LimitSurfaceKeys = _optional(LimitSurfaceKeys)
     score: ScoreKeys = _optional(ScoreKeys)
     task: TaskKeys = _optional(TaskKeys)

@@ -120,7 +120,8 @@ def test_what_the_scene_lacks_is_added_to_it(tmp_path):
     across = sj.press(SMOKE, pose={"point_mm": [0, 0, 0], "approach": [-1, 0, 0], "long_side": [0, 0, 1]}, force=1)
     assert across.e_n == pytest.approx(sj.press(SMOKE, 0.0, 0.0, 1).e_n, rel=1e-9)
     matrix = np.array([[0, 0, -1, 0], [0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1.0]])
-    assert sj.press(SMOKE, pose=matrix, force=1).e_n == pytest.approx(across.e_n, rel=1e-9)
+    for pose in (matrix, across.pose):
+        assert sj.press(SMOKE, pose=pose, force=1).e_n == pytest.approx(across.e_n, rel=1e-9)
 
 
 POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
