@@ -25,7 +25,7 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
-from softjaw.study.case.contact import ALIKE, Contact, angles, pose_flags
+from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.case.task import Task, payload_alone, payload_values, task_of
 from softjaw.study.flags import raised
@@ -36,7 +36,6 @@ from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
 NEAR = 1e-2  # relative gap between the bounds of epsilon
-TARGET = 0.01  # relative error of e_n that is good enough where the scene names none
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 PLANAR = (
     ("pcm", ""),
@@ -214,11 +213,6 @@ def estimate(fine: ArrayLike, coarse: ArrayLike, kind: str) -> float:
     if kind == "relative":
         error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
     return float(error.max())
-
-
-def misses(error: float, target: float | None) -> bool:
-    """Whether a relative error of e_n is above the target of a scene, or `TARGET`; an unknown one is not."""
-    return bool(error > (target or TARGET) * (1.0 + ALIKE))
 
 
 def _judged(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:

@@ -18,11 +18,10 @@ from softjaw.study.ranking import judged, passed_over, rank_values, ranking, sco
 from softjaw.study.result.between import at_force
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
-from softjaw.study.result.store import place_text
 from softjaw.study.show.tables.answer import answer
-from softjaw.study.show.tables.certainty import E_N_ERROR, largest_error, sure, verdict
+from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
-from softjaw.study.show.tables.status import no_grasps
+from softjaw.study.show.tables.status import E_N_ERROR, largest_error, no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -106,7 +105,7 @@ def _largest_error(ds: xr.Dataset) -> str:
     errors = values_of(ds, E_N_ERROR.name) if E_N_ERROR.name in ds else None
     if errors is None and "e_n_interval" in ds:
         return ""
-    return largest_error(errors, ds.status.values, lambda index: place_text(axes_of(ds), ds.label.values, index))
+    return largest_error(errors, ds, axes_of(ds), ds.label.values)
 
 
 def _at(ds: xr.Dataset, force: float | None) -> tuple[xr.Dataset, int, str]:

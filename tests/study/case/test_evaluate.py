@@ -14,10 +14,10 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.evaluate import FACING, EvaluationSettings, estimate, evaluate, mesh_errors, misses, quality
+from softjaw.study.case.evaluate import FACING, EvaluationSettings, estimate, evaluate, mesh_errors, quality
 from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import MODELS, TABLE
+from softjaw.study.quantities import MODELS, TABLE, misses
 from softjaw.study.scene.objects import SphereShape
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
