@@ -25,7 +25,7 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
-from softjaw.study.case.contact import ALIKE, Contact, angles, pose_flags
+from softjaw.study.case.contact import Contact, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.case.task import Task, payload_alone, payload_values, task_of
 from softjaw.study.flags import raised
@@ -39,7 +39,6 @@ FACING = math.radians(0.5)  # misalignment up to which the closed form is off by
 # 96 % of the errors of e_n, and are 5 times too large in the median.
 OF_MESHES, OF_VIEWS = 0.7, 0.2
 NEAR = 1e-2  # relative gap between the bounds of epsilon
-TARGET = 0.05  # relative error of e_n that is good enough where the scene names none
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 PLANAR = (
     ("pcm", ""),
@@ -239,11 +238,6 @@ def _held(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str
 def _of_faces(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
     """Quantities that are no sums over a contact, so that only its own faces tell them; of each finger."""
     return {"maps/contact_area": [c.area for c in contacts], "maps/p_max": [c.largest_pressure for c in contacts]}
-
-
-def misses(error: float, target: float | None) -> bool:
-    """Whether a relative error of e_n is above the target of a scene, or `TARGET`; an unknown one is not."""
-    return bool(error > (target or TARGET) * (1.0 + ALIKE))
 
 
 def _judged(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:

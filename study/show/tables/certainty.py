@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,13 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
-from softjaw.study.quantities import DONE, map_row
 from softjaw.study.result.read import mesh_error
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
-E_N_ERROR = map_row("e_n").of_error
-NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 MOVES = {"mu": "mu", "modulus": "the shear modulus", "wall": "the wall's thickness"}  # all grasps at once
 
 
@@ -75,31 +72,6 @@ def sure(ds: Any, name: str, k: int) -> Sure | None:
         return Sure(values, np.sqrt(own), common, unsigned)
     error = mesh_error(ds, name)
     return None if error is None else Sure(values, error[..., k].ravel(), common)
-
-
-def largest_error(errors: FloatArray | None, status: NDArray[np.integer], where: Callable[[Any], str]) -> str:
-    """The largest error of e_n by the mesh and its case, and how many solved cases have none; empty without cases.
-
-    Parameters
-    ----------
-    errors : array over the cases
-        Relative errors; None where a file has none.
-    status : array over the cases
-    where : callable
-        A case in words, by its index.
-    """
-    done = status == DONE
-    if not done.any():
-        return ""
-    if errors is None:
-        return NO_ERRORS
-    known = done & np.isfinite(errors)
-    if not known.any():
-        return f"errors of the mesh: none of {int(done.sum())} solved cases has one"
-    worst = np.unravel_index(int(np.argmax(np.where(known, errors, -1.0))), status.shape)
-    lacking = int(np.count_nonzero(done & ~known))
-    rest = f"; {lacking} of {int(done.sum())} cases {'has' if lacking == 1 else 'have'} none" if lacking else ""
-    return f"largest error of e_n by the mesh: {100 * errors[worst]:.2g} % ({where(worst)}){rest}"
 
 
 def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:

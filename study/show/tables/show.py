@@ -18,11 +18,10 @@ from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE, m
 from softjaw.study.ranking import at_level, judged, passed_over, rank_values, ranked, score_of
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, values_of
-from softjaw.study.result.store import place_text
 from softjaw.study.show.tables.answer import answer
-from softjaw.study.show.tables.certainty import E_N_ERROR, largest_error, sure, verdict
+from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, digits, head, wrapped
-from softjaw.study.show.tables.status import no_grasps
+from softjaw.study.show.tables.status import E_N_ERROR, largest_error, no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -104,7 +103,7 @@ def _largest_error(ds: xr.Dataset) -> str:
     errors = values_of(ds, E_N_ERROR.name) if E_N_ERROR.name in ds else None
     if errors is None and "e_n_interval" in ds:
         return ""
-    return largest_error(errors, ds.status.values, lambda index: place_text(axes_of(ds), ds.label.values, index))
+    return largest_error(errors, ds, axes_of(ds), ds.label.values)
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:
