@@ -373,7 +373,7 @@ class Following(Stepping):
             goal = min(1.0, done + cut * allowed)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
-                x = self.solve(here.x, Control(force=target), work, self.most)
+                x = self.solve(self._ahead(here, target), Control(force=target), work, self.most)
             except ConvergenceError:
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
@@ -448,6 +448,14 @@ class Following(Stepping):
         entries, held = self.problem.symmetric_tangent(x)
         # every node in contact has one as a multiplier; any more is a direction of instability
         return self.solver.negative_eigenvalues(entries) == held
+
+    def _ahead(self, here: _Place, force: float) -> FloatArray:
+        """Start for the state at a force [N], on the tangent of the path as far as it is a state of sound elements."""
+        if here.tangent is None or not self.problem.keep(here.x, True):
+            return here.x
+        # pads get stiffer as the contact spreads: by the root of the force the path is straighter than by the force
+        step = -2.0 * here.force * (np.sqrt(force / here.force) - 1.0) * here.tangent
+        return here.x - self.problem.shorten(here.x, step) * step
 
     def _allowed(self, here: _Place, step: float) -> float:
         """Part of a step [N] that may be made at once; all of it where nothing is foretold."""

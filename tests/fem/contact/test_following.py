@@ -89,6 +89,21 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
     np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
 
 
+@pytest.mark.parametrize("gap", [ROUND, BALL], ids=["cylinder", "sphere"])
+def test_a_start_on_the_tangent_is_nearer(gap):
+    """From 5 to 10 N: less than half as far off as the state at 5 N."""
+    press = press_of(BLATZ_KO, gap)
+    low, high = press.load_path([5.0, 10.0])
+    steps, x = press._stepping, press._stepping.solve(low.unknowns * (1 + 1e-9), Control(force=5.0), Work())
+    here = steps._place(x, 5.0, steps._tangent(x))
+    start = steps._ahead(here, 10.0)
+
+    def off(y):
+        return np.abs(y - high.unknowns)[: press.pad.closing_dof + 1].max()
+
+    assert off(start) < 0.5 * off(x)
+
+
 def test_looking_for_stability_leaves_the_solver_as_it_was():
     once, again = press_of(), press_of()
     ladder = again.load_path([5.0, 20.0])
@@ -122,6 +137,12 @@ class Curve:
     def path_tangent(self, x, answer):
         slope = np.polyval([3.0, -9.0, 6.0], x[0] / MM)
         return np.array([MM / slope]) if slope > 0 else None
+
+    def keep(self, x, first):
+        return True
+
+    def shorten(self, x, step):
+        return 1.0
 
     def largest_strain(self, x):
         return self.strain(x[0] / MM)
