@@ -72,7 +72,12 @@ def test_scripts_that_solve(name, tmp_path):
         assert "the jerk holds" in output
 
 
-PAGE = "\n".join(re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs" / "python.md").read_text(), re.M | re.S))
+def blocks(page):
+    """The Python blocks of a page as one script."""
+    return "\n".join(re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S))
+
+
+PAGE = blocks("docs/python.md")
 
 
 @pytest.mark.long
@@ -87,3 +92,10 @@ def test_the_page_on_python_runs_as_it_stands(here, capsys):
     text = (ROOT / "docs" / "python.md").read_text()
     assert all(f"`{name}`" in text for name in sj.__all__)
     assert f"gives {len(sj.__all__)} names" in text
+
+
+@pytest.mark.long
+def test_the_block_of_the_readme_runs(here, capsys):
+    (here / "jobs").symlink_to(ROOT / "jobs")
+    exec(compile(blocks("README.md"), "README.md", "exec"), {})
+    assert float(capsys.readouterr().out.split()[0]) > 0

@@ -339,13 +339,13 @@ def test_it_needs_neither_mpi_nor_petsc(tmp_path):
     assert loaded == "[]"
 
 
-def test_the_readme_says_how(tmp_path, monkeypatch):
+def test_the_page_says_how(tmp_path, monkeypatch):
     (tmp_path / "results").mkdir()
     make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "README.md").read_text(encoding="utf-8").partition("from softjaw.study.lookup")[2]
+    text = (ROOT / "docs" / "look-up.md").read_text(encoding="utf-8").partition("```python")[2]
     names: dict = {"stations": np.zeros(3), "angles": np.linspace(0, 1, 3), "forces": 1.5}
-    exec("from softjaw.study.lookup" + text.partition("```")[0], names)
+    exec(text.partition("```")[0], names)
     assert names["e_n"] == pytest.approx(names["grasps"].at(0, [0, 0.5, 1], 1.5).e_n)
 
 
