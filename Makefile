@@ -92,7 +92,7 @@ test-long: setup
 	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
 
 test-slurm: setup
-	./tests/slurm/cluster.sh results/slurm/cluster $(BIN)/python -m tests.slurm.time_limit $(abspath $(SCENE))
+	./tests/slurm/cluster.sh results/slurm/cluster $(BIN)/python -m tests.slurm.time_limit
 
 # mkdocs lies outside of .venv: it brings colorama, which numba then uses to write to the output of every run.
 docs: setup

@@ -1,10 +1,10 @@
 """Does a study that Slurm's time limit kills end with the same numbers as one that nothing interrupts?
 
-    tests/slurm/cluster.sh LOGS python -m tests.slurm.time_limit [SCENE]
+    tests/slurm/cluster.sh LOGS python -m tests.slurm.time_limit
 
-The shipped batch script is submitted three times, each time in a folder of its own: with time enough; with a limit that
-the script hears of a minute before (it stops in order and goes back into the queue); and with a limit that Slurm
-enforces without a word, after which the same command is given once more.
+The shipped batch script is submitted in three folders: with time enough; with a limit that the script hears of before,
+so that it stops in order and goes back into the queue; and with a limit that Slurm enforces without a word,
+after which the same command is given once more.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 from tests.study.launching import ROOT, contents, differing
 
 SCRIPT = ROOT / "jobs" / "slurm" / "one-node.sbatch"
+SCENE = ROOT / "tests" / "slurm" / "bottle.toml"
 RANKS = 2
 HOUR = 3600.0
 ENDED = ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL", "OUT_OF_MEMORY")
@@ -35,11 +36,11 @@ def job_field(job: str, name: str) -> str:
     return words[name]
 
 
-def submitted(folder: Path, scene: Path, *options: str) -> str:
+def submitted(folder: Path, *options: str) -> str:
     """Submit the script for a copy of the scene in a folder; the job's number."""
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(scene, folder)
-    words = ("sbatch", "--parsable", f"--ntasks={RANKS}", f"--chdir={folder}", *options, str(SCRIPT), scene.name)
+    shutil.copy(SCENE, folder)
+    words = ("sbatch", "--parsable", f"--ntasks={RANKS}", f"--chdir={folder}", *options, str(SCRIPT), SCENE.name)
     return slurm(*words)
 
 
@@ -64,25 +65,25 @@ def report(name: str, job: str) -> None:
     print(f"{name:<10} job {job}: {state}, {starts} start(s), exit code {code}", flush=True)
 
 
-def main(words: list[str]) -> int:
-    """Run the three jobs and compare their files."""
-    scene = Path(words[0] if words else ROOT / "jobs" / "bottle-rigid.toml").resolve()
+def main() -> int:
+    """Run the jobs and compare their files."""
     top = ROOT / "results" / "slurm"
     os.environ["SOFTJAW"] = str(ROOT / ".venv" / "bin" / "softjaw")
-    file = Path("results") / f"{scene.stem}.hdf"
+    os.environ["MOST_RESTARTS"] = "100"  # on a busy machine a start may end before it has solved much
+    file = Path("results") / f"{SCENE.stem}.hdf"
 
     for name in ("whole", "stopped", "killed"):
         shutil.rmtree(top / name, ignore_errors=True)
-    whole = submitted(top / "whole", scene, "--time=60")
+    whole = submitted(top / "whole", "--time=60")
     states = [ended(whole)]
     report("whole", whole)
-    stopped = submitted(top / "stopped", scene, "--time=2", "--signal=B:USR1@40")
+    stopped = submitted(top / "stopped", "--time=3", "--signal=B:USR1@100")
     states.append(ended(stopped))
     report("stopped", stopped)
-    killed = submitted(top / "killed", scene, "--time=1", "--signal=B:CONT@1")
+    killed = submitted(top / "killed", "--time=1", "--signal=B:CONT@1")
     states.append(ended(killed))
     report("killed", killed)
-    again = submitted(top / "killed", scene, "--time=60")
+    again = submitted(top / "killed", "--time=60")
     states.append(ended(again))
     report("again", again)
 
@@ -97,4 +98,4 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
