@@ -45,8 +45,8 @@ class Flag(IntFlag):
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, take more elements before trusting it", (
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
-        " only one along its length or its width does, or trilinear elements are too stiff for foam with a Poisson's"
-        " ratio above 0.45"
+        " only one along its length or its width does, trilinear elements are too stiff for foam with a Poisson's"
+        " ratio above 0.45, or two meshes put the error of e_n above accuracy.e_n, where the scene names it"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
         "the force fell while the fingers closed, or grew less than half as fast as before on average"

@@ -21,7 +21,8 @@ from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, Solver, followed, solver, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
-from softjaw.study.flags import flag_sentences
+from softjaw.study.flags import Flag, flag_sentences
+from softjaw.study.quantities import misses
 from softjaw.study.scene import Scene
 
 
@@ -63,6 +64,9 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     if len(coarse) == len(fine):
         other = _state_values(coarse) | solving.wall_values(outcome, 1)
         values |= mesh_errors(fine, coarse, values, other, settings)
+        # only where the scene asks for a target: without one the sums at the end say how many cases miss the usual one
+        if scene.accuracy.e_n is not None:
+            values["maps/flags"] |= Flag.COARSE * bool(misses(values["maps/e_n_error"], scene.accuracy.e_n))
     values |= _work(fine, outcome, time.perf_counter() - start)
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from softjaw.study.flags import flag_definitions
 
@@ -20,6 +21,8 @@ STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips",
 MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
 NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
+E_N_TARGET = 0.01  # relative error of e_n that is good enough where a scene names none
+ON_TARGET = 1e-6  # of the target: an error that is no further above it meets it
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
@@ -397,6 +400,11 @@ FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that Par
 RANKED_BY = ("payload", "quality", "e_n", "epsilon")  # what grasps can be ranked by
 FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
+
+
+def misses(error: Any, target: float | None) -> Any:
+    """Where relative errors of e_n are above the target of a scene, or `E_N_TARGET`; unknown ones are not."""
+    return error > (target or E_N_TARGET) * (1.0 + ON_TARGET)
 
 
 def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:

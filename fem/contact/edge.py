@@ -131,7 +131,8 @@ def _stretches(
     first, last = on & ~beside[:, :-2], on & ~beside[:, 2:]
     low, high = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1
     starts = np.flatnonzero(first[on])
-    count = np.diff(np.append(starts, np.count_nonzero(on)))
+    ends = np.flatnonzero(last[on])
+    count = ends - starts + 1
     # from the rim that a stretch begins at, if only one does
     reverse = np.repeat(high & ~low, count)
     s = np.where(reverse, (from_rim[:, -1:] - from_rim[:, :-1])[on], from_rim[:, :-1][on])
@@ -142,8 +143,9 @@ def _stretches(
     # two faces share a node, so the closest nodes are two of the smallest faces apart
     spacing, full = 2.0 * np.minimum.reduceat(side[on], starts), np.add.reduceat(side[on], starts)
     length = np.where(low | high, _from_rim(mean, square, spacing), _between_edges(variance, fourth, spacing))
-    # the first idle node to either side is not in contact
-    length = np.where(low & high, full, np.minimum(length, full + spacing))
+    # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last face are
+    inner = np.where(low, s[np.maximum(ends - 1, starts)], s[np.minimum(starts + 1, ends)]) * (low | high)
+    length = np.where(low & high, full, np.clip(length, inner, full + spacing))
     return _Stretches(length, np.add.reduceat(load[on] * width[on], starts) / force, 2.0 - low - high)
 
 

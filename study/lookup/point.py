@@ -10,7 +10,7 @@ import numpy as np
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.lookup.pads import pad_poses
-from softjaw.study.quantities import BOTH_ENDS, FAILED, FORCE_RANGE, MAIN, MISSING
+from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
 
@@ -77,6 +77,14 @@ class GraspPoint:
         found = self.map.errors(name, model, self.corners)
         valid = (self.states == INSIDE) & np.isfinite(self.map.interpolated(name, model, self.corners))
         return self._shaped(np.where(valid, found, np.nan))
+
+    def mesh_error(self, name: str) -> Any:
+        """Estimated error of `value` (CCM) by the mesh, in the quantity's unit; NaN where the file has none."""
+        q = BY_KEY.get(f"maps/{name}")
+        if q is None or not q.error or not self.map.source.has(q.of_error.name):
+            return self._shaped(np.full(len(self.states), np.nan))
+        found = self.value(q.of_error.name)
+        return np.abs(found * self.value(name)) if q.of_error.relative_to else found
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
@@ -187,8 +195,10 @@ class GraspPoint:
         if self.reason:
             return f"{lines[0]}: {self.reason}"
         for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
-            units, error = self.map.quantities[name][0], self.error(name)
-            lines.append(f"  {name:<14} {shown_text(self.value(name), units, 5)}  +- {shown_text(error, units, 2)}")
+            units, error, mesh = self.map.quantities[name][0], self.error(name), self.mesh_error(name)
+            by_mesh = f", by the mesh +- {shown_text(mesh, units, 2)}" if np.isfinite(mesh) else ""
+            value = shown_text(self.value(name), units, 5)
+            lines.append(f"  {name:<14} {value}  +- {shown_text(error, units, 2)}{by_mesh}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 

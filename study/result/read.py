@@ -153,6 +153,15 @@ def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
     return found.broadcast_like(ds.status).transpose(*ds.status.dims).values
 
 
+def mesh_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
+    """Error of a map (CCM) over the cases from two meshes, in its unit; None where the file has none."""
+    q = BY_KEY.get(f"maps/{name}")
+    if q is None or not q.error or q.of_error.name not in ds:
+        return None
+    found = values_of(ds, q.of_error.name)
+    return np.abs(found * values_of(ds, name)) if q.of_error.relative_to else found
+
+
 def maps_in(ds: xr.Dataset) -> dict[str, str]:
     """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
     names = [q.name for q in TABLE if q.group == "maps" and q.name in ds]

@@ -8,7 +8,8 @@ import numpy as np
 
 from softjaw.study.page import Block, plot
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import Index, at, number, place
+from softjaw.study.show.grasps import Index, at, number, place, quantity
+from softjaw.study.show.report.verdict import value
 from softjaw.study.show.stored_surface import (
     NAMES,
     PLANES,
@@ -44,8 +45,8 @@ def patch(view: View, index: Index) -> Block | None:
                 made.add_trace(trace, row=row, col=column)
     eye = {"eye": {"x": 0, "y": 0, "z": 2.1}, "up": {"x": 0, "y": 1, "z": 0}, "projection": {"type": "orthographic"}}
     made.update_scenes(plots.scene(camera=eye)).update_layout(margin={"l": 0, "r": 80, "t": 58, "b": 0})
-    area = number(at(view.ds, "contact_area", index) * 1e6)
-    summary = f"largest pressure {number(1e-3 * top)} kPa, contact area {area} mm²"
+    words = {name: value(view.ds, name, index) + f" {quantity(view.ds, name)[1]}" for name in ("p_max", "contact_area")}
+    summary = f"largest pressure {words['p_max']}, contact area {words['contact_area']}"
     caption = (
         f"{place(view.ds, index, force=True)}: {summary}. The pad's deformed face in its own frame: x along the pad,"
         " y across it; faces without contact are pale. Blue: the friction that faces carry, each in its own plane,"

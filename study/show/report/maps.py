@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, NO_GRASP, PARTS, STATES
+from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, NO_GRASP, PARTS, STATES, TABLE
 from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -32,7 +32,7 @@ from softjaw.study.show.report.tables import note
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
         "closing", "curvature_loss", "fit_error", "indentation", "wall_stress", "support_force",
-        *(f"{name}_error" for name in (*FIRST, "tau_z_max")))  # fmt: skip
+        *(q.of_error.name for q in TABLE if q.error and q.rank))  # fmt: skip
 LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 PART_COLOURS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
@@ -155,7 +155,7 @@ def _names(ds: xr.Dataset) -> list[str]:
 def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, Any]:
     """Entry of the menu that shows a quantity in all panels."""
     title, factor = label_of(ds, name), quantity(ds, name)[2]
-    if name.endswith("_error"):
+    if name.endswith("_error") and factor == 1:
         title, factor = f"{title} [%]", 100.0
     found = {m: field(ds, name, m) for m, _ in cuts}
     z = [np.full((1, 1), np.nan) if found[m] is None else factor * plane(found[m], x, y, here) for m, here in cuts]

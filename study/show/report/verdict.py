@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import BORNE, LOST
-from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
+from softjaw.study.quantities import BY_KEY, DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
 from softjaw.study.ranking import largest, passed_over
 from softjaw.study.show.grasps import (
     Index,
@@ -198,9 +198,12 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
 
 def uncertainty(ds: xr.Dataset, name: str, index: Index) -> str:
     """How far off a value may be, where the file knows: the one place for it in verdict, tables and maps."""
-    error = at(ds, f"{name}_error", index)
+    q, size = BY_KEY.get(f"maps/{name}"), abs(at(ds, name, index))
+    error = at(ds, q.of_error.name, index) if q and q.error else np.nan
     if f"{name}_interval" in ds:
-        error = at(ds, f"{name}_interval", index) / abs(at(ds, name, index))
+        error = at(ds, f"{name}_interval", index) / size
+    elif q and q.error == "absolute":
+        error /= size
     if not np.isfinite(error):
         return ""
     share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
+from softjaw.study.result.read import mesh_error
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
@@ -69,9 +70,8 @@ def sure(ds: Any, name: str, k: int) -> Sure | None:
                 own = own + change**2
         unsigned = tuple(of for of in MOVES if f"{name}_interval_{of}" in shares)
         return Sure(values, np.sqrt(own), common, unsigned)
-    if f"{name}_error" in ds:
-        return Sure(values, np.abs(ds[f"{name}_error"].values[..., k].ravel() * values), common)
-    return None
+    error = mesh_error(ds, name)
+    return None if error is None else Sure(values, error[..., k].ravel(), common)
 
 
 def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:

@@ -17,7 +17,7 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.read import axes_of, values_of
+from softjaw.study.result.read import axes_of, mesh_error, values_of
 from softjaw.study.scene.text import changes, value_text
 from softjaw.study.show.tables.columns import PAPER, aligned, csv_text, digits, head, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
@@ -172,10 +172,7 @@ def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
         return None
     if f"{name}_interval" in ds:
         return values_of(ds, f"{name}_interval")
-    if f"{name}_error" not in ds:
-        return None
-    share = values_of(ds, f"{name}_error")
-    return np.abs(share * values_of(ds, name) if map_row(f"{name}_error").relative_to else share)
+    return mesh_error(ds, name)
 
 
 def comparison_text(found: Comparison, top: int = 10, width: int = PAPER) -> str:

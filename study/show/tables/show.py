@@ -13,7 +13,7 @@ import xarray as xr
 from rich.cells import cell_len
 
 from softjaw.study.flags import LOST, OF_FILE, flag_words, flags_in
-from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, TABLE, map_row
 from softjaw.study.ranking import judged, passed_over, rank_values, ranking, score_of, shown_level
 from softjaw.study.result.between import at_force
 from softjaw.study.result.layout import DONE
@@ -21,7 +21,7 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.answer import answer
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, csv_text, digits, head, with_unit, wrapped
-from softjaw.study.show.tables.status import no_grasps
+from softjaw.study.show.tables.status import E_N_ERROR, largest_error, no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -31,7 +31,6 @@ ERROR, ERROR_MEANS = "+-", "error estimate of the column before it, from two mes
 INTERVAL_MEANS = (
     "half-width of the uncertainty interval (95 %) of the column before it; [uncertainty] in the scene lists its parts"
 )
-NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 MISALIGNMENT = "misalignment"  # its flag is told with the angle
 FLAGS_WIDTH, LABEL_WIDTH = 15, 20
 RESERVED = {"map": 7, "flags": 13}  # characters of a column
@@ -43,7 +42,7 @@ class Table:
 
     An error stands behind the quantity it belongs to, relative unless the column has a unit; an interval is in the unit
     of the quantity. ``verdict`` says whether the best grasp is better than the others beyond the errors, ``answer``
-    what to do with it.
+    what to do with it, ``largest_error`` how far off e_n may be by the mesh, of all cases at all forces.
     """
 
     title: str
@@ -52,6 +51,7 @@ class Table:
     force: float
     verdict: str = ""
     answer: str = ""
+    largest_error: str = ""
 
 
 def best(
@@ -67,6 +67,7 @@ def best(
     ValueError
         For a force outside of the solved ones.
     """
+    error = _largest_error(ds)
     ds, k, why = _at(ds, force)
     axes, flags = axes_of(ds), judged(ds)
     forces, shape = axes[-1].values, ds.status.shape[:-1]
@@ -96,7 +97,15 @@ def best(
     title = f"{what} at {forces[k]:g} N{why}{'' if rows else _solved_elsewhere(ds)}"
     first = (*(int(i) for i in np.unravel_index(order[0], shape)), k) if rows else None
     told = "" if first is None else answer(ds, first)
-    return Table(title, titles, tuple(rows), float(forces[k]), errors, told)
+    return Table(title, titles, tuple(rows), float(forces[k]), errors, told, error)
+
+
+def _largest_error(ds: xr.Dataset) -> str:
+    """Of e_n by the mesh; nothing where the file has uncertainty intervals instead."""
+    errors = values_of(ds, E_N_ERROR.name) if E_N_ERROR.name in ds else None
+    if errors is None and "e_n_interval" in ds:
+        return ""
+    return largest_error(errors, ds, axes_of(ds), ds.label.values)
 
 
 def _at(ds: xr.Dataset, force: float | None) -> tuple[xr.Dataset, int, str]:
@@ -140,7 +149,7 @@ def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
     """Name, unit and values of the main maps, each with what is known of its error behind it."""
     for q in (q for q in TABLE if q.group == "maps" and q.rank and q.name in ds):
         yield q.name, q.unit, values_of(ds, q.name)
-        for error in (f"{q.name}_interval", f"{q.name}_error"):
+        for error in (f"{q.name}_interval", q.of_error.name):
             if error in ds:
                 yield error, ds[error].units, values_of(ds, error)
                 break
@@ -167,6 +176,7 @@ def as_json(table: Table) -> str:
     names = [name for name, _ in table.columns]
     rows = [dict(zip(names, map(_plain, row), strict=True)) for row in table.rows]
     record = {"answer": table.answer, "title": table.title, "verdict": table.verdict, "force": table.force}
+    record |= {"largest_error": table.largest_error}
     record |= {"units": dict(table.columns), "grasps": rows}
     return json.dumps(record, indent=2)
 
@@ -227,9 +237,9 @@ def least(names: Sequence[str]) -> list[str]:
     >>> least(["quality", "quality_error", "fit_error", "e_n", "e_n_error", "e_n_pcm", "f_x_max", "f_x_max_error"])
     ['fit_error', 'f_x_max_error', 'f_x_max', 'e_n_pcm', 'quality_error']
     """
-    main = [column for name in reversed(MAIN[3:]) for column in (f"{name}_error", name) if column in names]
+    main = [column for name in reversed(MAIN[3:]) for column in (map_row(name).of_error.name, name) if column in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
-    last = [name for name in ("quality_error", f"{MAIN[2]}_error", MAIN[2]) if name in names]
+    last = [name for name in (*(map_row(MAIN[i]).of_error.name for i in (0, 2)), MAIN[2]) if name in names]
     return [*(n for n in (MISALIGNMENT,) if n in names), *main, *planar, *last]
 
 
@@ -241,7 +251,8 @@ def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:
     lines += [f"{RANGE}: {RANGE_MEANS}"] * (RANGE in names)
     kinds = {_kind(name) for name in names}
     meanings = {"interval": INTERVAL_MEANS, "error": f"{ERROR_MEANS}{', in %' * ('interval' in kinds)}"}
-    lines += [f"{ERROR}: {text}" for kind, text in meanings.items() if kind in kinds] or [NO_ERRORS]
+    lines += [f"{ERROR}: {text}" for kind, text in meanings.items() if kind in kinds]
+    lines += [table.largest_error] * bool(table.largest_error)
     if hidden:
         lines.append(f"columns hidden to fit {width} characters: {', '.join(hidden)} (use --csv or --json for all)")
     return [wrapped(text, width, more="  ") for text in lines]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.flags import flag_sentences, flags_in
-from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES
+from softjaw.study.quantities import DONE, E_N_TARGET, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
@@ -20,6 +21,8 @@ from softjaw.study.run.refine import about
 from softjaw.study.show.tables.columns import PAPER, csv_text, terminal_width, with_unit, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
+E_N_ERROR = map_row("e_n").of_error
+NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
 
 
 def status(options: Namespace) -> str:
@@ -34,8 +37,49 @@ def status_text(result: Any, width: int = PAPER) -> str:
     runner = holder(result.path)
     open_cases = np.any(result.status == MISSING)
     state = f"running now: {runner}" if runner else "run the same command again to resume" if open_cases else ""
-    lines = [counts(result), *([wrapped(state, width)] if state else []), *reasons(result, width)]
+    error = largest_mesh_error(result)
+    known = [wrapped(error, width, "  ", "  ")] * bool(error)
+    lines = [counts(result), *known, *([wrapped(state, width)] if state else []), *reasons(result, width)]
     return "\n".join([*lines, *sessions(result, bool(runner), width)])
+
+
+def largest_mesh_error(result: Any) -> str:
+    """The largest error of e_n by the mesh so far; nothing where the scene asks for uncertainty intervals instead."""
+    has = E_N_ERROR in result.layout.quantities
+    if not has and any(d.name == "e_n_interval" for d in result.layout.derived):
+        return ""
+    errors = result.read(f"{E_N_ERROR.name}/{E_N_ERROR.name}") if has else None
+    return largest_error(errors, result, result.axes, result.labels)
+
+
+def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any) -> str:
+    """The largest error of e_n by the mesh, how many are above the target, and how many solved cases have none.
+
+    Parameters
+    ----------
+    errors : array over the cases
+        Relative errors; None where a file has none.
+    cases : Result or xarray.Dataset
+        Has ``status`` and ``scene``.
+    axes, labels
+        As `result.store.place_text` takes them.
+    """
+    status = np.asarray(cases.status)
+    solved = int(np.count_nonzero(status == DONE))
+    if not solved or errors is None:
+        return NO_ERRORS if solved else ""
+    known = np.where(status == DONE, errors, np.nan)
+    count = int(np.count_nonzero(np.isfinite(known)))
+    if not count:
+        return f"errors of the mesh: none of {solved} solved cases has one"
+    worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
+    target = tomllib.loads(cases.scene).get("accuracy", {}).get("e_n") or E_N_TARGET
+    parts = [f"largest error of e_n by the mesh: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    if above := int(np.count_nonzero(misses(known, target))):
+        parts.append(f"{above} of {count} cases above {100 * target:g} %")
+    if count < solved:
+        parts.append(f"{solved - count} of {solved} cases have none")
+    return "; ".join(parts)
 
 
 def status_json(result: Any) -> str:
@@ -43,7 +87,7 @@ def status_json(result: Any) -> str:
     total = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     found = {"file": str(result.path), "title": result.title, "running": holder(result.path) or None}
     found |= {"cases": int(result.status.size), **total, "units": {axis.name: axis.units for axis in result.axes}}
-    found |= _added(result)
+    found |= {"largest_error": largest_mesh_error(result)} | _added(result)
     found |= {"no_grasp": [case for state in NO_GRASP for case in _cases(result, state)]}
     found |= {"failures": _cases(result, FAILED), "notes": _cases(result, DONE), "sessions": list(result.sessions)}
     return json.dumps(found, indent=2)

@@ -14,10 +14,10 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, mesh_errors, quality
+from softjaw.study.case.evaluate import FACING, EvaluationSettings, estimate, evaluate, mesh_errors, quality
 from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import MODELS
+from softjaw.study.quantities import MODELS, TABLE, misses
 from softjaw.study.scene.objects import SphereShape
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
@@ -77,6 +77,28 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
     assert error == pytest.approx(abs(less / held - 1), rel=1e-9)
+
+
+def test_every_quantity_with_an_error_gets_one_from_two_meshes():
+    """Of a finger each, the largest counts; what has no value to be a share of has no error."""
+    fine, coarse = pair(), pair(strips=17)
+    task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2, mass=0.1))
+    values, other = evaluate(fine, task)[0], {"maps/closing": 1.1e-3, "maps/opening_loaded": 0.049}
+    values |= {"maps/closing": 1e-3, "maps/opening_loaded": 0.050}
+    errors = mesh_errors(fine, coarse, values, other, task)
+    assert set(errors) == {q.of_error.key for q in TABLE if q.error}
+    assert np.isfinite([*errors.values()]).all()
+    assert errors["maps/closing_error"] == pytest.approx(0.1, rel=1e-9)
+    assert errors["maps/opening_loaded_error"] == pytest.approx(1e-3, rel=1e-9)
+    assert errors["maps/p_max_error"] == pytest.approx(
+        abs(coarse[0].patch.pressure.max() / fine[0].patch.pressure.max() - 1), rel=1e-9
+    )
+    assert errors["maps/safety_factor_error"] == pytest.approx(errors["maps/payload_error"], rel=1e-9)
+    assert estimate([1.0, 2.0], [1.1, 2.1], "relative") == pytest.approx(0.1, rel=1e-9)
+    assert np.isnan(estimate([0.0], [1.0], "relative"))
+    assert estimate([0.0], [-1.0], "absolute") == 1.0
+    found = [misses(e, t) for e, t in ((0.01, None), (0.02, None), (0.02, 0.02), (0.021, 0.02), (np.nan, 0.02))]
+    assert found == [False, True, False, True, False]
 
 
 def test_a_weight_between_the_pads_is_held_by_their_friction():

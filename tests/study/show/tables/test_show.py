@@ -40,7 +40,7 @@ def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
             "angle": (np.arange(shape[1]) * np.pi / 2, "rad"), "normal_force": (FORCES, "N")}  # fmt: skip
     coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
     coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
-    return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": ()})
+    return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": (), "scene": ""})
 
 
 def as_text(table, width=80):
@@ -223,6 +223,21 @@ def test_errors_stand_behind_what_they_belong_to_and_are_percent():
     assert text.splitlines()[3].split().count("4") >= 4
     assert "errors of the mesh: not known" in as_text(best(study([[4.0]])))
     assert "not known" not in text
+
+
+def test_the_largest_error_of_e_n_is_told_with_its_place_and_how_many_have_none():
+    known = study([[0.5, 0.5], [0.5, 0.5]], needs=WIDE)
+    errors = np.array([[[0.01, 0.002], [np.nan, np.nan]], [[0.018, np.nan], [0.5, 0.001]]])
+    over, states = known.status.dims, np.full((2, 2, 2), DONE)
+    states[1, 1, 0] = FAILED
+    known["e_n_error"], known["status"] = (over, errors, {"units": ""}), (over, states)
+    told = best(known).largest_error
+    assert "1.8 % (station 1000 mm, angle 0 deg, normal_force 1 N)" in told
+    assert "3 of 7 cases" in told
+    assert "1 of 4 cases above 1 %" in told
+    assert best(known, force=5.0).largest_error == told == json.loads(as_json(best(known)))["largest_error"]
+    known["e_n_error"] = (over, np.full((2, 2, 2), np.nan), {"units": ""})
+    assert "none of 7" in best(known).largest_error
 
 
 def test_a_pose_is_shown_by_number_and_label_alone():
