@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from softjaw.fem.contact.load_stepping import STRAY, LoadPath, Settings, Stepping, Work, falls
 from softjaw.fem.contact.press import Pressed, pressed
@@ -21,11 +20,11 @@ from softjaw.fem.errors import CheckError, ConvergenceError, SpentError
 from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.petsc import NonlinearSolver, Seconds
-from softjaw.fem.shell import interpolation as of_wall
+from softjaw.fem.shell import wall_interpolation
 from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
-SIDES = 0.3  # of the largest distance from the plane between the fingers on a ring: nodes nearer to it are left out
 LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, while a wall snaps in [m]
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
@@ -35,62 +34,6 @@ FOLDED = 0.75  # opening below which a wall without a further state counts as co
 INDENTED = 0.95  # and after nodal gaps have found none either
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
-
-
-class Opening:
-    """How far the two halves of a wall still are apart along the approach, as a part of their undeformed distance.
-
-    The grasp frame's x axis is the approach, so a node is compared with the one that it looks at along x: its own image
-    where x = 0 is a plane of symmetry, else the nearest across from it. An indentation turns back at its deepest place,
-    where it is level; so the node that lies nearest there is good enough.
-
-    Parameters
-    ----------
-    mesh : BodyMesh
-
-    Attributes
-    ----------
-    last : (float, float)
-        Opening and force [N] of the last state that was watched.
-    """
-
-    def __init__(self, mesh: BodyMesh) -> None:
-        # inner faces meet before the middle surfaces do
-        self._inner = mesh.X - mesh.D
-        x = self._inner[mesh.number, 0]
-        bound = np.maximum(SIDES * np.abs(x).max(axis=0), 1e-6)
-        self._near = np.unique(mesh.number[x > bound])
-        back = np.unique(mesh.number[x < -bound])
-        self._across = None if mesh.symmetry[0] else back
-        if self._across is not None:
-            self._across = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]]
-        self._whole = self._apart(np.zeros(mesh.X.size * 2))
-        self.last = 1.0, 0.0
-
-    def __call__(self, q: FloatArray) -> float:
-        """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
-        return float((self._apart(q) / self._whole).min())
-
-    def _apart(self, q: FloatArray) -> FloatArray:
-        parts = q.reshape(-1, 6)
-        x = self._inner[:, 0] + parts[:, 0] - parts[:, 3]
-        return x[self._near] - (-x[self._near] if self._across is None else x[self._across])
-
-    def watch(self, q: FloatArray, force: float) -> None:
-        """Note the state at a force [N] of the fingers.
-
-        Raises
-        ------
-        CheckError
-            If the walls have met at a lower force.
-        """
-        opening = self(q)
-        if opening > 0.0:
-            self.last = opening, force
-            return
-        before, at = self.last
-        meets = at + (force - at) * before / (before - opening)
-        raise CheckError(f"the wall collapsed: its opposite sides meet at {meets:.3g} N")
 
 
 @dataclass(frozen=True)
@@ -109,7 +52,7 @@ class WallState:
     snapped : bool
         Whether the wall has snapped in before: the force fell while the fingers closed, or it hardly grew.
     opening : float
-        Of the wall's inner faces towards each other, see ``fem.shell.grip``: 1 undeformed, 0 where they would meet.
+        Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
     """
 
     mesh: BodyMesh
@@ -136,7 +79,7 @@ class Gripped:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _OnPath:
     """State on the load path: unknowns, force [N], and what is known of the path so far.
 
     ``compliance`` is that of the last step [m/N], ``snapped`` as in `WallState`, ``fell`` whether the force has fallen.
@@ -239,7 +182,7 @@ class Grip(LoadPath):
             self._start_again()
         self.solver.left = MOST_ITERATIONS
 
-    def _from(self, start: Gripped, work: Work) -> _Place:
+    def _from(self, start: Gripped, work: Work) -> _OnPath:
         """State at the force of a coarser mesh's, by one Newton solve."""
         x0, force, thickness = self._interpolated(start), start.force, self._stepping.thickness
         x = self._stepping.solve(x0, Control(force=force), work, self._stepping.most)
@@ -250,14 +193,14 @@ class Grip(LoadPath):
             work.halvings += 1
             raise ConvergenceError(f"the state at {force:.4g} N is not the one that the coarser mesh has come to")
         self._watch(x, force)
-        here = _Place(x, force, compliance, start.wall.snapped or self._gives_way(x, force), False)
+        here = _OnPath(x, force, compliance, start.wall.snapped or self._gives_way(x, force), False)
         self._gripped(here, work, Seconds())
         return here
 
     def _interpolated(self, start: Gripped) -> FloatArray:
         """Unknowns of a coarser mesh's state."""
         x, model = np.zeros(self.problem.size), self.problem.model
-        x[: model.size] = of_wall.interpolated(start.wall.mesh, start.wall.q, model.shell.mesh)[model.free]
+        x[: model.size] = wall_interpolation.interpolated(start.wall.mesh, start.wall.q, model.shell.mesh)[model.free]
         for k, f in enumerate(self.problem.fingers):
             # where the coarser mesh has one finger, the other one is its image in x = 0
             image = np.array([-1.0 if k >= len(start.fingers) else 1.0, 1.0, 1.0])
@@ -267,7 +210,7 @@ class Grip(LoadPath):
             x[f.own] = interpolated(own.pad, own.unknowns, f.pad, turn)
         return x
 
-    def _next(self, here: _Place | None, force: float, work: Work) -> _Place:
+    def _next(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact; where it has none, with nodal gaps."""
         try:
             return self._level(here, force, work)
@@ -300,7 +243,7 @@ class Grip(LoadPath):
                 )
             raise CheckError(f"{text} ({error})") from error
 
-    def _level(self, here: _Place | None, force: float, work: Work) -> _Place:
+    def _level(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact."""
         self.solver.left = MOST_ITERATIONS
         try:
@@ -309,13 +252,13 @@ class Grip(LoadPath):
             spent = f"given up after {MOST_ITERATIONS} Newton iterations"
             raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
 
-    def _climb(self, here: _Place | None, force: float, work: Work) -> _Place:
+    def _climb(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
         if here is None:
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
             # foam gets stiffer, so this is more than what comes
-            here = _Place(x, reached, self.problem.closing(x) / reached, False, False)
+            here = _OnPath(x, reached, self.problem.closing(x) / reached, False, False)
         x, reached = here.x, here.force
         ahead, fell = self._step_to(x, reached, force, here.compliance, work)
         slope, gives_way = np.inf, self._gives_way(ahead, force)
@@ -323,7 +266,7 @@ class Grip(LoadPath):
         if force > reached:
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
             gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
-        return _Place(ahead, force, slope, here.snapped or fell or gives_way, here.fell or fell)
+        return _OnPath(ahead, force, slope, here.snapped or fell or gives_way, here.fell or fell)
 
     def _step_to(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
@@ -360,7 +303,7 @@ class Grip(LoadPath):
         load[[f.closing_dof for f in fingers]] = [f.pad.share for f in fingers]
         return self.problem.closing(self.solver.answer(load))
 
-    def _gripped(self, here: _Place, work: Work, seconds: Seconds) -> Gripped:
+    def _gripped(self, here: _OnPath, work: Work, seconds: Seconds) -> Gripped:
         """State of all parts, checked."""
         x, force, problem, residual = here.x, here.force, self.problem, np.abs(self.problem.residual(here.x))
         fingers = []

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.shell.grip import _Place
+from softjaw.fem.shell.grip import _OnPath
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial
 from tests.fem.grips import _gap, e_n, grip, pose, thin
@@ -136,6 +136,6 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
         if expected:
             F = held.problem.normal_force(x)
             assert F == pytest.approx(expected[0], rel=0.035)
-            finger = held._gripped(_Place(x, F, 0.0, False, False), work, held.solver.seconds).fingers[0]
+            finger = held._gripped(_OnPath(x, F, 0.0, False, False), work, held.solver.seconds).fingers[0]
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)
     assert work.halvings == 0

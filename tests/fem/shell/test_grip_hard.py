@@ -9,7 +9,7 @@ from softjaw.fem.contact.extract import extract, half_turned
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.grip import Opening
+from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh

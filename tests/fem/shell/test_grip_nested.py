@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softjaw.fem.shell.interpolation import interpolated
 from softjaw.fem.shell.thin_walled import WallMesh
+from softjaw.fem.shell.wall_interpolation import interpolated
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from tests.fem.grips import grip, thin
 
