@@ -149,7 +149,7 @@ def _groups() -> list[str]:
 
 
 def _quantity_row(q: Quantity) -> tuple[str, ...]:
-    needs = f" Only with: {q.needs}." if q.needs else ""
+    needs = f" Only with: {', '.join(q.needs)}." if q.needs else ""
     if q.meanings:
         needs += " " + "; ".join(f"{code} {text}" for code, text in enumerate(q.meanings)) + "."
     return _code(q.name), f"{_sentence(q.label)} {_sentence(q.definition)}{needs}", q.unit, ", ".join(q.dims)

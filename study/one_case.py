@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 SAME = {"rel_tol": 1e-9, "abs_tol": 1e-12}  # stations [m], angles [deg] and forces [N] that are the scene's own
-ERROR, OF_MESH = "_error", ("two meshes", "two scores")  # how the names of error estimates end, and what they need
 
 
 class CaseError(StudyError):
@@ -95,9 +94,9 @@ class Case:
         """
         found = {}
         for q in TABLE:
-            if q.group == "maps" and q.needs in OF_MESH and q.name.endswith(ERROR) and q.key in self.result.values:
-                of = q.relative_to or q.name.removesuffix(ERROR)
-                found[of] = self.value(q.name) * (abs(self.value(of)) if q.relative_to else 1.0)
+            if q.error and q.of_error.key in self.result.values:
+                scale = abs(self.value(q.name)) if q.error == "relative" else 1.0
+                found[q.name] = self.value(q.of_error.name) * scale
         return found
 
     @property

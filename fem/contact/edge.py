@@ -143,9 +143,9 @@ def _stretches(
     # two faces share a node, so the closest nodes are two of the smallest faces apart
     spacing, full = 2.0 * np.minimum.reduceat(side[on], starts), np.add.reduceat(side[on], starts)
     length = np.where(low | high, _from_rim(mean, square, spacing), _between_edges(variance, fourth, spacing))
-    # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last face are
+    # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
     inner = np.where(low, s[np.maximum(ends - 1, starts)], s[np.minimum(starts + 1, ends)]) * (low | high)
-    length = np.where(low & high, full, np.clip(length, inner, full + spacing))
+    length = np.where(low & high, full, np.clip(length, inner - 0.5 * spacing, full + spacing))
     return _Stretches(length, np.add.reduceat(load[on] * width[on], starts) / force, 2.0 - low - high)
 
 
