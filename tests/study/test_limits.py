@@ -34,6 +34,18 @@ def wait():
         time.sleep(0.01)
 
 
+def test_a_signal_of_a_batch_system_after_the_end_does_not_fail_the_run():
+    before = signal.getsignal(signal.SIGUSR1)
+    signal.signal(signal.SIGUSR1, signal.SIG_DFL)
+    try:
+        with Stopper(lambda: None):
+            pass
+        os.kill(os.getpid(), signal.SIGUSR1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+
 def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
     with Stopper(lambda: None, 0.1) as stopper:
         with pytest.raises(TimeLimitError), stopper.case():
