@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.pad.halving import halved
+
 FloatArray = NDArray[np.float64]
 PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
 
@@ -52,10 +54,8 @@ class PadShape:
         return self.per_side * self.elements[0], self.per_side * self.elements[1]
 
     def halved(self) -> PadShape:
-        """The same pad with half as many elements in every direction, rounded up; to even numbers along even sides."""
-        # symmetry of the pad needs even numbers, and a mesh line in the middle is where the fine mesh has one
-        length, width = (2 * -(-n // 4) if n % 2 == 0 else -(-n // 2) for n in self.elements[:2])
-        return PadShape(self.size, (length, width, -(-self.elements[2] // 2)), self.grading, self.element)
+        """The same pad with half as many elements in every direction; see `halved`."""
+        return PadShape(self.size, halved(self.elements), self.grading, self.element)
 
     def lines(self, axis: int, half: bool) -> FloatArray:
         """Mesh lines along an axis [m]; ``half`` keeps the positive side."""

@@ -70,7 +70,7 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
     lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + ON_LINE
     # the mesh of a tube begins off the axis
-    if mesh.s[0] > 0.0:
+    if mesh.s[0] > ON_LINE:
         lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - ON_LINE
     held[np.unique(mesh.number[:, lines])] = True
 

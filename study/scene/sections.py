@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from softjaw.fem.pad.halving import halved
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.problems import Finding, shown
 from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
@@ -162,15 +163,14 @@ class Gripper(SceneSection):
         """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
         if effects.sheet == "rigid":
             return
-        counts = [self.elements[:2], [-(-n // 2) for n in self.elements[:2]]][: accuracy.meshes]
+        counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
         size = self.pad_length_mm, self.pad_width_mm
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
         if any(held < (1 - ROUNDING) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
             meshes = " and ".join(f"{list(n)}" for n in counts)
             found = f"{list(self.sheet_support_mm)} mm with {meshes} elements along length and width"
             expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
-            remedy = "use even numbers of elements" if len(counts) == 1 else "use multiples of 4 elements"
-            yield Finding(("sheet_support_mm",), found, expected, remedy)
+            yield Finding(("sheet_support_mm",), found, expected, "use even numbers of elements")
 
 
 class Friction(SceneSection):

@@ -36,6 +36,8 @@ stations_mm = [-10, 0, 20]
 angles_deg = [0, 90]
 [load]
 normal_force_n = [1, 2, 4]
+[accuracy]
+meshes = 1
 """
 )
 ALL = ("uncertainty.mesh=true", "uncertainty.mu=0.05", "uncertainty.shear_modulus_percent=10", "uncertainty.pose_mm=1")
