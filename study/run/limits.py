@@ -71,7 +71,8 @@ class Stopper:
         for number, handler in self._before.items():
             # A batch system may send it when all is solved, and by default it would make the finished run a failed one.
             late = number == signal.SIGUSR1 and handler == signal.SIG_DFL
-            signal.signal(number, signal.SIG_IGN if late else handler)
+            # not SIG_IGN, which programs started from here would inherit
+            signal.signal(number, (lambda number, frame: None) if late else handler)
 
     @property
     def overdue(self) -> float:

@@ -26,6 +26,8 @@ stations_mm = [{station}]
 angles_deg = [{angle}]
 [load]
 normal_force_n = {forces}
+[accuracy]
+meshes = 1
 """
 
 

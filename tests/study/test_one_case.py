@@ -143,7 +143,7 @@ POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
         (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(3, 3\).*\(4, 4\)"),
         (SMOKE, {"pose": "x"}, TypeError, r"\(4, 4\)"),
         (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "approach"),
-        (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\].*passes the object"),
+        (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\].*misses the object"),
         (SMOKE, {"pose": {"point_mm": [0, 0, 0]}}, ValueError, r"approach: found nothing"),
         (BOXES, {"station": 0.0, "angle": 0.0}, ValueError, "candidate=0"),
         (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),

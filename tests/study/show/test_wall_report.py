@@ -145,8 +145,8 @@ def test_show_has_indentations_stress_and_the_window_of_forces(can):
         strong = best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
     names, units = text.splitlines()[1:3]
-    assert names.split()[-4:] == ["stress", "misalignment", "force", "range"]
-    assert units.split()[-4:] == ["[kPa]", "[deg]", "[N]", "flags"]
+    assert names.split()[-4:] == ["stress", "+-", "force", "range"]
+    assert units.split()[-4:] == ["[kPa]", "[%]", "[N]", "flags"]
     assert "payload" in names
     assert text.splitlines()[0].endswith("at 1 N, the lowest solved force at which a grasp holds the object")
     assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
