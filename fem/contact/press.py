@@ -27,7 +27,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
-# Of Newton's method for one force; half of them where other gaps can take over, and all for these. Usual forces take 4 to 15.
+# Of Newton's method for one force; half of them where other gaps can take over, and all for these. Usual: 4 to 15.
 MOST_ITERATIONS = 300
 AGREE = 0.1  # of the closing displacement: the other pad's path is not the same one where they differ by more
 
