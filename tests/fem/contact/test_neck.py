@@ -61,6 +61,9 @@ def test_from_shoulder_to_neck_all_is_smooth_and_cheap():
     assert iterations.max() <= 8 * np.median(iterations)
     assert (np.diff(closing, axis=1) > 0).all()
     steps = np.diff(stations)[:, None]
-    # changes of the logarithm per mm of station, beside what two stations that are nearly one may differ by
+    # changes of the logarithm per mm of station, beside what two stations that are nearly one may differ by: more where
+    # the flag "jumped" says that the state depends on the load path
+    forked = np.array([jumped for jumped, _, _ in known]).reshape(closing.shape)
+    apart = np.where(forked[1:] & forked[:-1], 5e-3, 1e-3)
     for values, slope in ((closing, 0.1), (e_n, 0.3)):
-        assert (np.abs(np.diff(np.log(values), axis=0)) < slope * steps + 1e-3).all()
+        assert (np.abs(np.diff(np.log(values), axis=0)) < slope * steps + apart).all()
