@@ -135,11 +135,12 @@ BASES, CASES = _load()
 def scene_of(case: HardCase) -> Scene:
     """Scene of a case: sections over those of its base key by key, but another shape or place replaces the whole."""
     base = BASES.get(case.base) or tomllib.loads((FOLDER / case.base).read_text())
-    # what is right for a case does not hang on a second mesh, unless it asks for one
-    data: dict[str, Any] = {"accuracy": {"meshes": 1}} | {name: dict(table) for name, table in base.items()}
+    data: dict[str, Any] = {name: dict(table) for name, table in base.items()}
     for name, table in case.sections.items():
         whole = any(key in table for key in WHOLE.get(name, ()))
         data[name] = table if whole else {**data.get(name, {}), **table}
+    # what is right for a case does not hang on a second mesh, unless it asks for one
+    data["accuracy"] = {"meshes": 1} | data.get("accuracy", {})
     return parse_scene(toml_text(data), FOLDER / f"{case.name}.toml")
 
 
