@@ -88,16 +88,12 @@ class Case:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error estimates by quantity, in its unit: differences to a mesh half as fine; none where there is one mesh.
-
-        They are those of the curved model.
-        """
-        found = {}
-        for q in TABLE:
-            if q.error and q.of_error.key in self.result.values:
-                scale = abs(self.value(q.name)) if q.error == "relative" else 1.0
-                found[q.name] = self.value(q.of_error.name) * scale
-        return found
+        """Error estimates of the curved model by quantity, in its unit, from two meshes; none where there is one."""
+        return {
+            q.name: q.error_in_unit(self.value(q.of_error.name), self.value(q.name))
+            for q in TABLE
+            if q.error and q.of_error.key in self.result.values
+        }
 
     @property
     def e_n(self) -> float:

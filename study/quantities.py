@@ -107,8 +107,6 @@ class Quantity:
         Place among the main maps, 1 for the first; 0 for all others.
     among : str
         Dimension of the candidates that it is stored for alone, ``sampled`` or ``probe``; else nothing.
-    relative_to : str
-        The map of which a relative error is a share.
     meanings : tuple of str
         What the integers 0, 1, ... of a code mean; -1 is none.
     error : str
@@ -125,7 +123,6 @@ class Quantity:
     needs: tuple[str, ...] = ()
     rank: int = 0
     among: str = ""
-    relative_to: str = ""
     meanings: tuple[str, ...] = ()
     error: str = ""
 
@@ -144,6 +141,10 @@ class Quantity:
         """Whether there is one value for each of `MODELS`."""
         return "model" in self.dims
 
+    def error_in_unit(self, error: Any, value: Any) -> Any:
+        """An error of this map as it is stored, in the map's unit; ``value`` is what a relative one is a share of."""
+        return abs(error * value) if self.error == "relative" else error
+
     @property
     def of_error(self) -> Quantity:
         """The row of the error of this map."""
@@ -151,13 +152,12 @@ class Quantity:
         return Quantity(
             f"{self.name}_error", (), "" if relative else self.unit, f"{'relative ' * relative}error of {self.name}",
             f"{MESHES}{' (CCM)' * self.by_model}{', over its value' * relative}.", needs=(*self.needs, NEEDS[0]),
-            relative_to=self.name * relative,
         )  # fmt: skip
 
 
 SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect", "probes": "probe"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
-MESHES = "Difference between the mesh and one with half as many elements per direction"
+MESHES = "Error estimate, from the differences of the mesh to one with half as many elements per direction"
 AS_MAP = "As the map, for each finger."
 ROWS = (
     # maps of every case, with what is said beside them

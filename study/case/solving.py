@@ -53,7 +53,8 @@ class PressedContact(Contact):
         state: Pressed,
         seen: Callable[[ContactPatch], ContactPatch] | None = None,
     ) -> None:
-        self.finger, self.state, self._seen, self._solved = finger, state, seen or (lambda patch: patch), self
+        self.finger, self.state, self._seen = finger, state, seen or (lambda patch: patch)
+        self._views: list[Contact] = []  # shared by all copies, so that the first one asked fills it for all
         super().__init__(self._seen(extract(state.pad, state)), scene.friction.mu, finger.pose, whole_face=True)
         self.nodal_instead = state.instead and state.pad.contact == "nodal"
 
@@ -79,12 +80,11 @@ class PressedContact(Contact):
     @property
     def views(self) -> list[Contact]:
         """The contact of the same pressures at Gauss points and at nodes; a finer mesh would make them alike."""
-        return [view.at(self.pose) for view in self._solved._views]
-
-    @cached_property
-    def _views(self) -> list[Contact]:
-        patches = (self._seen(extract(self.state.pad, self.state, rule)) for rule in ("weighted", "nodal"))
-        return [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
+        if not self._views:
+            patches = (self._seen(extract(self.state.pad, self.state, rule)) for rule in ("weighted", "nodal"))
+            self._views += [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
+            _ = [view.ellipsoids for view in self._views]  # computed once for both fingers, as in `of`
+        return [view.at(self.pose) for view in self._views]
 
     @property
     def coarse(self) -> bool:

@@ -84,8 +84,7 @@ class GraspPoint:
         q = BY_KEY.get(f"maps/{name}")
         if q is None or not q.error or not self.map.source.has(q.of_error.name):
             return self._shaped(np.full(len(self.states), np.nan))
-        found = self.value(q.of_error.name)
-        return np.abs(found * self.value(name)) if q.of_error.relative_to else found
+        return q.error_in_unit(self.value(q.of_error.name), self.value(name))
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""

@@ -166,8 +166,7 @@ def mesh_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
     q = BY_KEY.get(f"maps/{name}")
     if q is None or not q.error or q.of_error.name not in ds:
         return None
-    found = values_of(ds, q.of_error.name)
-    return np.abs(found * values_of(ds, name)) if q.of_error.relative_to else found
+    return np.asarray(q.error_in_unit(values_of(ds, q.of_error.name), values_of(ds, name)))
 
 
 def maps_in(ds: xr.Dataset) -> dict[str, str]:

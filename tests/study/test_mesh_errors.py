@@ -37,7 +37,7 @@ OVAL = "[object]\nshape = 'elliptic_cylinder'\nsemi_axis_a_mm = {}\nsemi_axis_b_
 SCENES = {
     "ball": "[object]\nshape = 'sphere'\nradius_mm = 32\n" + PAD.format(40, 24, 14),
     "oval": OVAL.format(20, 30, 150) + PAD.format(50, 22, 15),
-    "stub": OVAL.format(30, 14, 45) + PAD.format(36, 30, 12),  # shorter than its axis is far from the pad's end
+    "stub": OVAL.format(30, 14, 45) + PAD.format(36, 30, 12),  # its ends lie under the pad
     "bottle": (ROOT / "jobs" / "bottle-rigid.toml").read_text(),
 }
 

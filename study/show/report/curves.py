@@ -43,7 +43,7 @@ COMPONENTS = {
     "tau_z": ("torque, tau_z", "#2a8c82", "triangle-up"),
 }
 AGAINST = {"pcm": "against PCM, scaled by S", "pcm_projected": "against PCM, scaled by F_N"}
-HALF_AS_FINE = " Bars: difference to a mesh half as fine."
+HALF_AS_FINE = " Bars: error estimate from two meshes."
 MOST_LINES, FEWEST = 40, 4
 
 

@@ -47,7 +47,7 @@ CAVEAT = (
     "used here are in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
     "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
 )
-ESTIMATED = "± is the difference to a mesh half as fine, in per cent of the value; the error is usually smaller."
+ESTIMATED = "± is the error estimate from two meshes, in per cent of the value; the error is usually smaller."
 NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
 WITH_INTERVALS = (
     "± is the half-width of the interval within which about 95 of 100 cases lie, in per cent of the value; it has the"
