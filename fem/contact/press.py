@@ -1,11 +1,11 @@
 """Press a pad on an object along a load path, each normal force started from the one before, or from a coarser mesh.
 
 A force that Newton's method does not reach in one step is approached by step halving, then by displacement control
-until the force is bracketed. Where that fails and a fallback pad with other gaps is given, the load path continues with
-that one, from first contact: nodal gaps let a small object slip between the nodes, so that the force stays low. A pad
-with other gaps leaves its path to one with nodal gaps sooner, before displacement control and where it jumps: they
-couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for ever. Every
-state that is passed on has converged and has been checked.
+until the force is bracketed. Where that fails and fallback pads with other gaps are given, the load path continues with
+the first that leads on, from first contact: nodal gaps let a small object slip between the nodes, so that the force
+stays low. A pad with other gaps leaves its path to one with nodal gaps sooner, before displacement control and where it
+jumps: they couple neighbouring pressures, and a pad's rim on a steep slope can fold or make their active set cycle for
+ever. Every state that is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 
 FloatArray = NDArray[np.float64]
-# Of Newton's method for one force; half of them where other gaps can take over, and all for these. Usual: 4 to 15.
+# Of Newton's method for one force; half of them where other gaps can take over, all for the next. Usual: 4 to 15.
 MOST_ITERATIONS = 300
 AGREE = 0.1  # of the closing displacement: the other pad's path is not the same one where they differ by more
 
@@ -101,8 +101,8 @@ class Press(LoadPath):
         ``(n, 3)`` points to signed distance, gradient and Hessian.
     options : dict
         PETSc options with the prefix ``contact_``.
-    fallback : Pad, optional
-        The same pad with other gaps, for forces at which ``pad`` has no solution.
+    fallbacks : sequence of Pad
+        The same pad with other gaps, the best first, for forces at which ``pad`` has no solution.
     settings : Settings
     problem_of : callable
         Pad and gap to the problem.
@@ -115,7 +115,7 @@ class Press(LoadPath):
     pad: Pad
     gap: Gap
     options: dict[str, Any] = field(default_factory=dict)
-    fallback: Pad | None = None
+    fallbacks: Sequence[Pad] = ()
     settings: Settings = field(default_factory=Settings)
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
     load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
@@ -123,13 +123,13 @@ class Press(LoadPath):
 
     def __post_init__(self) -> None:
         """Set up the solver."""
-        self._wanted, self._other, self._last = self.pad, self.fallback, (np.zeros(self.pad.size), 0.0)
+        self._wanted, self._left, self._last = self.pad, tuple(self.fallbacks), (np.zeros(self.pad.size), 0.0)
         super().__post_init__()
 
     @property
     def _leads(self) -> bool:
         """Whether displacement control may take over, and jumps are passed, with the pad at hand."""
-        return self.fallback is None or self.pad.contact == "nodal"
+        return not self._left or self.pad.contact == "nodal"
 
     def _set_up(self) -> None:
         self._bed = SpringBed(self.pad, self.gap)
@@ -218,7 +218,7 @@ class Press(LoadPath):
 
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""
-        self._last, self.fallback = (np.zeros(self._wanted.size), 0.0), self._other
+        self._last, self._left = (np.zeros(self._wanted.size), 0.0), tuple(self.fallbacks)
         if self.pad is self._wanted:
             self.solver.forget()
             self._stepping = self._steps()
@@ -268,14 +268,13 @@ class Press(LoadPath):
 
     def _next(self, x: FloatArray | None, reached: float, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one at ``reached`` [N]."""
-        if self.fallback is None:
+        if not self._left:
             return self._step_to(x, reached, force, work)
         # where these gaps do not lead on soon, the others are given the time
         self.solver.left = MOST_ITERATIONS // 2
         try:
             return self._step_to(x, reached, force, work)
         except (ConvergenceError, SpentError) as error:
-            self.solver.left = MOST_ITERATIONS
             below = None if x is None else (reached, self.problem.closing(x))
             # the path of one pad does not lead to states of the other, so it starts afresh
             return self._from_first_contact(below, force, work, error)
@@ -283,28 +282,31 @@ class Press(LoadPath):
     def _from_first_contact(
         self, below: tuple[float, float] | None, force: float, work: Work, failed: Exception
     ) -> FloatArray:
-        """State at ``force`` of the other pad, else of the pad itself beyond a jump, from first contact on.
+        """State at ``force`` of a fallback, else of the pad itself beyond a jump, from first contact on.
 
         All forces that follow keep to the pad that was found to serve. ``below`` are force [N] and closing displacement
         [m] of the last state, which the path has to meet, or it is another one.
         """
         # no fallback from here on, so that displacement control may take over and jumps are passed
-        assert self._other is not None
-        pads = (self.fallback,) if self._leads else (self.fallback, self.pad)
-        self.fallback, errors = None, [failed]
+        pads = self._left if self._leads else (*self._left, self.pad)
+        self._left, errors = (), list[Exception]()
+        self.solver.left = MOST_ITERATIONS
         for pad in pads:
-            assert pad is not None
             self.pad = pad
             self._start_again()
             try:
                 return self._through(below, force, work)
-            except ConvergenceError as error:
+            except (ConvergenceError, SpentError) as error:
                 errors.append(error)
-        # a limit that was seen is the reason; else what stopped the other pad
-        limits = [error for error in errors if isinstance(error, NotReachedError)]
-        tried = f"neither {self._wanted.contact} nor {self._other.contact} gaps lead further"
-        text = f"{(limits or errors[1:])[0]}; {tried}, a finer mesh was not tried"
-        raise (NotReachedError if limits else ConvergenceError)(text) from errors[1]
+            # as much as a pad with a fallback has, or a force without a state would take for ever
+            self.solver.left = max(self.solver.left, MOST_ITERATIONS // 2)
+        # a limit that was seen is the reason; else what stopped the first that knows of one
+        if not (known := [error for error in errors if isinstance(error, ConvergenceError)]):
+            raise errors[0]
+        limits = [error for error in (failed, *known) if isinstance(error, NotReachedError)]
+        tried = " nor ".join(dict.fromkeys(pad.contact for pad in (self._wanted, *pads)))
+        text = f"{(limits or known)[0]}; neither {tried} gaps lead further, a finer mesh was not tried"
+        raise (NotReachedError if limits else ConvergenceError)(text) from known[0]
 
     def _through(self, below: tuple[float, float] | None, force: float, work: Work) -> FloatArray:
         """State at ``force`` [N] from first contact on, through the force of the state ``below``."""

@@ -23,7 +23,7 @@ BALL = reference.placed(Sphere(0.02), reference.facing(0.02))
 def press_of(law=NEO, gap=ROUND, symmetry=(True, True), elements=(12, 6, 4), **choices):
     shape = PadShape(SIZE, elements)
     nodal = Pad(shape, law, symmetry, "nodal")
-    return Press(Pad(shape, law, symmetry), gap, fallback=nodal, **choices)
+    return Press(Pad(shape, law, symmetry), gap, fallbacks=(nodal,), **choices)
 
 
 def last(press, forces):
@@ -247,7 +247,7 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
         error.end = known.unknowns * (1 + scatter), 1e-5
         raise error
 
-    press.solver.solve, press.fallback = stalls, None
+    press.solver.solve, press._left = stalls, ()
     if passes:
         state = last(press, [5])
         assert state.closing == pytest.approx(known.closing, rel=1e-6)
@@ -290,7 +290,7 @@ def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():
     tried = []
 
     def step_to(x, reached, goal, work):
-        tried.append((press.pad.contact, press.fallback is None))
+        tried.append((press.pad.contact, not press._left))
         if len(tried) < 3:
             raise ConvergenceError("the pad jumps at 7 N")
         press._stepping.jumped = True

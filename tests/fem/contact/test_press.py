@@ -287,7 +287,7 @@ def test_petsc_options_are_taken_back():
 
 def test_the_ladder_goes_on_with_the_fallback_where_the_pad_has_no_solution():
     pad, nodal = pad_of(), pad_of(contact="nodal")
-    press = Press(pad, OVAL, fallback=nodal)
+    press = Press(pad, OVAL, fallbacks=(nodal,))
     ladder = press.load_path(FORCES)
     assert next(ladder).pad is pad
 
