@@ -97,8 +97,10 @@ def test_claims_of_the_lookup_hold(tmp_path):
         true = (held[name].sel(model="ccm") if "model" in held[name].dims else held[name]).values[point.ok]
         error, claim = np.abs(point.value(name)[point.ok] / true - 1), (point.error(name)[point.ok] / np.abs(true))
         middle, most, worst = np.quantile(error, [0.5, 0.9, 1.0])
-        times = (error / np.maximum(claim, 1e-12)).max()
-        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times its claim), claims"
+        # the mesh is wrong by another amount at each node, which three nodes cannot see
+        mesh = np.nan_to_num(point.mesh_error(name)[point.ok] / np.abs(true))
+        times = (error / np.maximum(claim + mesh, 1e-12)).max()
+        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times claim and mesh error), claims"
               f" {np.median(claim):.1%}; {(error <= claim).mean():.1%} within")  # fmt: skip
         # its error by the mesh, which differs from case to case, is larger than what interpolation costs
         noisy = name == "contact_area"
