@@ -24,6 +24,7 @@ LOWEST, HIGHEST = 0.5, 6.0  # orders that are believed
 NOISE = 1e-9  # relative changes below this say nothing
 SAFETY = 0.25  # of the correction by an observed order, which may be off by so much: Roache's factor of 1.25
 ASSUMED = 1.5  # order with which the last step is taken to shrink where none is seen: that of a contact's edge
+FOR_A_LINE = 3  # levels that a line through errors needs, so that its spread is known
 SAME = 1e-9  # relative difference of values that is none: the same state by another order of sums
 
 
@@ -131,6 +132,40 @@ def observed_order(h: FloatArray, f: FloatArray) -> tuple[float, str]:
     if excess(HIGHEST) < 0:
         return np.nan, f"the last step is {ratio:.3g} times smaller than the one before, more than any order gives"
     return float(brentq(excess, LOWEST, HIGHEST, xtol=1e-10)), ""
+
+
+def order_of_errors(size: ArrayLike, errors: ArrayLike) -> tuple[float, float]:
+    """Order of a straight line through the logarithms of errors over sizes, and its standard error.
+
+    The error of a contact goes to and fro while its edge passes element edges, so that three levels show no order; the
+    root mean square over all cases and all levels does.
+
+    Parameters
+    ----------
+    size : (levels,) array
+    errors : (levels, cases) array
+        Relative errors; cases that lack one at some level are left out.
+
+    Returns
+    -------
+    order, spread : float
+        NaN for fewer than `FOR_A_LINE` levels.
+
+    Examples
+    --------
+    >>> order_of_errors([4, 2, 1], [[0.16], [0.04], [0.01]])
+    (2.0, 0.0)
+    """
+    h, e = np.asarray(size, float), np.asarray(errors, float)
+    mean = np.sqrt((e[:, np.isfinite(e).all(axis=0)] ** 2).mean(axis=1)) if e.size else np.zeros(0)
+    used = np.isfinite(h) & (mean > NOISE)
+    if used.sum() < FOR_A_LINE:
+        return math.nan, math.nan
+    x, y = np.log(h[used]), np.log(mean[used])
+    x, y = x - x.mean(), y - y.mean()
+    slope = float(x @ y / (x @ x))
+    spread = math.sqrt(float(((y - slope * x) ** 2).sum()) / (len(x) - 2) / float(x @ x))
+    return round(slope, 9), round(spread, 9)
 
 
 def pareto_front(cost: ArrayLike, error: ArrayLike) -> list[int]:
@@ -241,6 +276,19 @@ class ParameterErrors:
             message = "; ".join(dict.fromkeys(m.message for m in own if m.message))
             made.append(LevelErrors(level, seconds, part, errors, message, flags_of(own)))
         return tuple(made)
+
+    @cached_property
+    def orders(self) -> tuple[tuple[float, float], ...]:
+        """Order of the errors over all levels and its spread, for each of `QUANTITIES`; see `order_of_errors`."""
+        if not self.series:
+            return ((math.nan, math.nan),) * len(QUANTITIES)
+        sizes, found = [level.size for level in self.parameter.levels], []
+        for q, limit in enumerate(self.limits):
+            # the finest level is its own reference where nothing leads further
+            last = -1 if self.reference is None and limit.note else len(sizes)
+            errors = [level.by_case[q] for level in self.levels]
+            found.append(order_of_errors(sizes[:last], errors[:last]))
+        return tuple(found)
 
     @property
     def estimates(self) -> FloatArray:

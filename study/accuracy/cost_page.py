@@ -109,7 +109,15 @@ def _orders(errors: ParameterErrors) -> str:
         for name, found in zip(NAMES, errors.limits, strict=True)
     ]
     end = " Both kinds of pad meshes are measured against the better known of their limits." if family else ""
-    return f"Observed on the three finest levels: {'; '.join(seen)}.{end}"
+    lines = "; ".join(
+        f"{name} {_order(*found)}" for name, found in zip(NAMES, errors.orders, strict=True) if math.isfinite(found[0])
+    )
+    line = f" Order of the root mean square of the errors, over all levels: {lines}." if lines else ""
+    return f"Observed on the three finest levels: {'; '.join(seen)}.{line}{end}"
+
+
+def _order(order: float, spread: float) -> str:
+    return f"{order:.1f} +- {spread:.1f}"
 
 
 def _method(study: CostStudy) -> list[str]:
@@ -140,6 +148,10 @@ def _work_precision(tables: Sequence[ParameterErrors], best: Sequence[Combinatio
         for errors, (colour, marker) in zip(lines, LOOKS * 3, strict=False):
             look = {"marker": marker, "ls": "-" if errors.series else "", "color": colour, "label": errors.name}
             _draw(panel, errors.levels, q, **look)
+            if math.isfinite((order := errors.orders[q])[0]):
+                end = errors.levels[-1]
+                panel.annotate(f"order {order[0]:.1f}", (end.seconds, end.worst[q]), (4, 4), color=colour, fontsize=8,
+                               textcoords="offset points", annotation_clip=True)  # fmt: skip
             if errors.own >= 0:
                 _draw(panel, [errors.levels[errors.own]], q, marker="o", ms=9, mfc="none", mec=pictures.INK, mew=0.9)
         for errors in tables:
@@ -181,7 +193,8 @@ def sentences(study: CostStudy, tables: Sequence[ParameterErrors]) -> list[str]:
     """The answer: what an error of e_n costs, what the next halving costs, which effects are needed."""
     meshes = [t for t in tables if "mesh" in t.name or t.name == "object grid"]
     best = best_of(combinations(meshes, study.base_seconds, {}))
-    found = [_price(best, _known(meshes)), _scene(meshes, study.base_seconds), *map(_need, tables)]
+    found = [_price(best, _known(meshes)), _scene(meshes, study.base_seconds)]
+    found += [*map(_falls, meshes), *map(_need, tables)]
     return [sentence for sentence in found if sentence]
 
 
@@ -205,7 +218,8 @@ def _price(best: Sequence[Combination], known: float) -> str:
     now = next(c for c in best if c.error <= goal)
     half = next((c for c in best if c.error <= 0.5 * now.error), None)
     price = f"{percent(now.error)} in e_n costs {seconds_text(now.seconds)} per case"
-    price += f" with {settings(dict(now.level.values))}"
+    values = dict(now.level.values)
+    price += f" with {settings(values)}" if values else " with the scene as it is"
     if half is None:
         return f"{price}; half that error is less than the {percent(known)} to which the finest meshes are known."
     return f"{price}; the next halving of the error costs {half.seconds / now.seconds:.2g} times as much."
@@ -218,6 +232,14 @@ def _scene(meshes: Sequence[ParameterErrors], base: float) -> str:
     return f"The scene as it is costs {seconds_text(base)} per case and has {parts}." if own else ""
 
 
+def _falls(errors: ParameterErrors) -> str:
+    """With which order of the element size the error of e_n falls."""
+    order = errors.orders[0]
+    if not math.isfinite(order[0]):
+        return ""
+    return f"{errors.name[:1].upper()}{errors.name[1:]}: the error of e_n falls with order {_order(*order)}."
+
+
 def _need(errors: ParameterErrors) -> str:
     """Whether an effect is needed: what its cheapest level moves e_n by."""
     if not errors.name.startswith("effect: ") or errors.name in NO_LOSS:
@@ -225,6 +247,8 @@ def _need(errors: ParameterErrors) -> str:
     cheap, fine = errors.levels[0], errors.levels[-1]
     need = "is needed" if cheap.worst[0] > NEEDED else "is not needed"
     effect = errors.name.removeprefix("effect: ").capitalize()
+    if not math.isfinite(cheap.worst[0]):
+        return f"{effect}: '{fine.level.name}' was not solved, so what it changes is not known."
     faster = f"is {fine.seconds / cheap.seconds:.2g} times as fast"
     return (f"{effect}: '{fine.level.name}' {need}, '{cheap.level.name}' moves e_n by {percent(cheap.worst[0])} and"
             f" {faster}.")  # fmt: skip

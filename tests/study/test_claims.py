@@ -100,8 +100,8 @@ def test_claims_of_the_lookup_hold(tmp_path):
         # the mesh is wrong by another amount at each node, which three nodes cannot see
         mesh = np.nan_to_num(point.mesh_error(name)[point.ok] / np.abs(true))
         times = (error / np.maximum(claim + mesh, 1e-12)).max()
-        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times claim and mesh error), claims"
-              f" {np.median(claim):.1%}; {(error <= claim).mean():.1%} within")  # fmt: skip
+        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times claim and mesh"
+              f" error), claims {np.median(claim):.1%}; {(error <= claim).mean():.1%} within")  # fmt: skip
         # its error by the mesh, which differs from case to case, is larger than what interpolation costs
         noisy = name == "contact_area"
         assert (error <= claim).mean() >= (0.85 if noisy else 0.95), name

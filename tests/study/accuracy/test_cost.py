@@ -225,6 +225,7 @@ def test_errors_and_orders_are_those_of_the_formula():
     what, study, *_ = formula_study(scene(overrides=COARSE))
     table = next(t for t in error_tables(what, study) if t.name == "pad mesh, hex8")
     assert table.limits[0].order == pytest.approx(2.0, abs=1e-6)
+    assert table.orders[0] == (pytest.approx(2.0, abs=0.1), pytest.approx(0.0, abs=0.1))
     h = np.array([level.size for level in table.parameter.levels])
     assert [level.worst[0] for level in table.levels] == pytest.approx(list(h**2), rel=1e-6)
     assert table.levels[table.own].level.name == "12 x 6 x 4"
