@@ -11,7 +11,7 @@ PICTURE = $(RESULT:.hdf=.png)
 FIGURES = results/figures
 BIN     = .venv/bin
 LIMIT   = timeout -k 30
-# Of the benchmark: any of kernels linearised element contact factors map; all if empty.
+# Of the benchmark: any of kernels linearised element contact factors getfem map; all if empty.
 PARTS   =
 # Of the random scenes and bodies of `make objects`: the page of 0 is kept in docs, those of others beside their results.
 SEED    = 0

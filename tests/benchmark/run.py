@@ -26,7 +26,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching
 from softjaw.study.doctor import launch_environment, mpirun
-from tests.benchmark import factors, kernels
+from tests.benchmark import factors, kernels, other_code
 from tests.benchmark.table import fastest, line, title
 
 ROOT = Path(__file__).parents[2]
@@ -148,6 +148,7 @@ def main() -> None:
         "element": element_routine,
         "contact": contact_solve,
         "factors": lambda: factors.kept_factors(ROOT / "jobs"),
+        "getfem": other_code.compare,
         "map": lambda: whole_map(options.scene),
     }
     parser = argparse.ArgumentParser(description=__doc__)
