@@ -39,7 +39,7 @@ from softjaw.study.show.tables.show import as_text
 from softjaw.study.show.tables.show import best as best_table
 from softjaw.study.show.tables.status import no_grasps
 
-LEAST = 1e-4  # relative error below which only a bound is given
+LEAST = 1e-4  # relative error below which this one is shown
 NBSP = "\u00a0"
 ROUNDING = 1e-9  # of the largest force, by which a bound may miss it
 CAVEAT = (
@@ -129,7 +129,7 @@ def _best(ds: xr.Dataset, best: Index) -> str:
     same = f" The same score at {listed([place(ds, i) for i in alike])}." if alike else ""
     swept = "Best point of the sweep" if max(lengths[:-3], default=1) > 1 else "The grasp"
     name = "Best grasp" if max(lengths[-3:-1]) > 1 else swept
-    e_n = f"e_n {value(ds, 'e_n', best, 3)}{' mm' * bool(np.isfinite(at(ds, 'e_n', best)))}"
+    e_n = f"e_n {value(ds, 'e_n', best, 3, 'mm' * bool(np.isfinite(at(ds, 'e_n', best))))}"
     by = "the force to use" if score == "payload" and "force_low" in ds else f"{score} at this force"
     ranked = f"ranked by {by}, {ds.attrs['why']}" * bool(score != "e_n")
     text = f"{name} at {_force(ds, best)} per finger: {place(ds, best)}, {what}, {e_n}"
@@ -137,11 +137,12 @@ def _best(ds: xr.Dataset, best: Index) -> str:
 
 
 def _carried(ds: xr.Dataset, best: Index, mu: float | None) -> str:
-    f_x, f_y, tau = (value(ds, name, best, 3) for name in ("f_x_max", "f_y_max", "tau_z_max"))
+    units = {"f_x_max": "N", "f_y_max": "N", "tau_z_max": "N mm"}
+    f_x, f_y, tau = (value(ds, name, best, 3, unit) for name, unit in units.items())
     friction = f", mu = {mu:g}" if mu is not None else ""
     return (
-        f"There a contact carries up to f_x = {f_x} N along the pad, f_y = {f_y} N across it and tau_z = {tau} N mm of"
-        f" torque about its normal (CCM{friction}; weaker finger)."
+        f"There a contact carries up to f_x = {f_x} along the pad, f_y = {f_y} across it and a torque tau_z ="
+        f" {tau} about its normal (CCM{friction}; weaker finger)."
     )
 
 
@@ -206,13 +207,13 @@ def uncertainty(ds: xr.Dataset, name: str, index: Index) -> str:
         error /= size
     if not np.isfinite(error):
         return ""
-    share = "<\u00a00.01" if error < LEAST else number(100 * error, 2)
-    return f" ±\u00a0{share}\u00a0%"
+    return f" ±\u00a0{number(100 * max(error, LEAST), 2)}\u00a0%"
 
 
-def value(ds: xr.Dataset, name: str, index: Index, digits: int = 4) -> str:
-    """A map's value in the displayed unit, with its uncertainty where that is known."""
-    return number(at(ds, name, index) * quantity(ds, name)[2], digits) + uncertainty(ds, name, index)
+def value(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: str = "") -> str:
+    """A map's value in the displayed unit, with its uncertainty where that is known; ``unit`` is written behind it."""
+    own = number(at(ds, name, index) * quantity(ds, name)[2], digits)
+    return own + f" {unit}" * bool(unit) + uncertainty(ds, name, index)
 
 
 def _planar(ds: xr.Dataset, index: Index) -> list[str]:

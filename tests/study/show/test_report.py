@@ -245,8 +245,8 @@ def test_values_are_told_with_their_error_where_the_file_has_it(tmp_path):
         said = " ".join(verdict.verdict(data, 0.8)).replace("\u00a0", " ")
         (folded,) = tables.every_case(data)
         assert verdict.meaning(data) == verdict.ESTIMATED
-    assert "e_n 10 ± 0.42 % mm" in said
-    assert "50 ± 1.1 % N mm" in said
+    assert "e_n 10 mm ± 0.42 %" in said
+    assert "50 N mm ± 1.1 %" in said
     rows = folded["blocks"][0]["rows"]
     assert len(rows) == 24
     assert all(any("±\u00a00.42\u00a0%" in cell for cell in row) for row in rows)
