@@ -120,4 +120,3 @@ def _finger(f: int, contact: PointContact) -> list[str]:
         f'      <geom name="pad{f}" {geom}/>',
         "    </body>",
     ]
-
