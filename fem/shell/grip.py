@@ -52,7 +52,8 @@ class WallState:
     reaction : (3,) array
         Force of supports and springs on the whole object [N].
     snapped : bool
-        Whether the wall has snapped in before: the force fell while the fingers closed, or it hardly grew.
+        Whether the wall has snapped in before: the force fell while the fingers closed, more force would open them
+        (the stiffness of the grasp is negative), or the force hardly grew.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
     """
@@ -242,8 +243,8 @@ class Grip(LoadPath):
         low, high = sorted([limit, self._peak])
         if left < INDENTED and high - low <= ALIKE * high:
             raise CheckError(
-                f"the wall gives way at {high:.3g} N: with gaps of either kind its load path ends there (at {low:.4g} and "
-                f"{high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; press less or take a "
+                f"the wall gives way at {high:.3g} N: with gaps of either kind its load path ends there (at {low:.4g} "
+                f"and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; press less or take a "
                 f"thicker wall ({error})"
             ) from error
 

@@ -39,7 +39,9 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 def pad_material(gripper: Gripper) -> Material:
     """Foam of the pads."""
-    return material(gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha)
+    return material(
+        gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha
+    )
 
 
 def backing_plate(gripper: Gripper) -> BackingPlate:

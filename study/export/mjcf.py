@@ -120,3 +120,4 @@ def _finger(f: int, contact: PointContact) -> list[str]:
         f'      <geom name="pad{f}" {geom}/>',
         "    </body>",
     ]
+

@@ -201,3 +201,4 @@ def usable(found: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     left = [grasp for grasp in found if grasp.lost]
     words = sorted({word for grasp in left for word in grasp.warnings})
     return kept, f"{len(left)} grasps left out ({', '.join(words)})" if left else ""
+

@@ -184,3 +184,4 @@ def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the
     [worst] = cases(PLATE, few, forces="[5]")
     assert 0.95 * expected / np.hypot(1, MU) < worst["maps/payload"][CURVED] <= expected / np.hypot(1, MU)
     assert not above["maps/flags"] & Flag.NOT_BORNE
+
