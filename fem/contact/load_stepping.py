@@ -260,7 +260,7 @@ class Stepping:
     ) -> FloatArray:
         """Closing displacement on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
 
-        The forces of the steps are appended to ``forces``; ``shortest`` is the part of the longest step to halve down to.
+        The forces of the steps are appended to ``forces``. Steps are halved down to a part ``shortest`` of the longest.
         """
         problem, failures, self.closed = self.problem, 0, True
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
