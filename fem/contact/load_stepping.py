@@ -250,17 +250,23 @@ class Stepping:
         return x
 
     def displacement_control(
-        self, x: FloatArray, force: float, work: Work, longest: float = np.inf, forces: list[float] | None = None
+        self,
+        x: FloatArray,
+        force: float,
+        work: Work,
+        longest: float = np.inf,
+        forces: list[float] | None = None,
+        shortest: float = SHORTEST,
     ) -> FloatArray:
         """Closing displacement on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
 
-        The forces of the steps are appended to ``forces``.
+        The forces of the steps are appended to ``forces``. Steps are halved down to a part ``shortest`` of the longest.
         """
         problem, failures, self.closed = self.problem, 0, True
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
         step, low = min(0.02 * self.thickness, longest), (x, problem.normal_force(x))
         peak = low[1], problem.closing(x)
-        shortest = max(1e-5 * self.thickness, SHORTEST * longest if np.isfinite(longest) else 0.0)
+        least = max(1e-5 * self.thickness, shortest * longest if np.isfinite(longest) else 0.0)
         for _ in range(MOST_STEPS):
             try:
                 ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
@@ -280,7 +286,7 @@ class Stepping:
                 raise
             except ConvergenceError as error:
                 step, failures = 0.5 * step, failures + 1
-                if step < shortest or failures > MOST_FAILURES:
+                if step < least or failures > MOST_FAILURES:
                     if falls([peak[0], low[1]]):
                         raise self._limit(peak, low, force) from error
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error

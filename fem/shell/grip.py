@@ -26,12 +26,14 @@ from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
 LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, while a wall snaps in [m]
+SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-LONGEST_SOLVE = 15  # Newton iterations of a step from one state to the next; good ones take 3 to 8
-MOST_ITERATIONS = 300  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
+LONGEST_SOLVE = 12  # Newton iterations of a step from one state to the next; good ones take 3 to 8
+MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
+ALIKE = 0.05  # part of the force by which the ends of the load path with both kinds of gaps may differ to be the wall's
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
@@ -50,7 +52,8 @@ class WallState:
     reaction : (3,) array
         Force of supports and springs on the whole object [N].
     snapped : bool
-        Whether the wall has snapped in before: the force fell while the fingers closed, or it hardly grew.
+        Whether the wall has snapped in before: the force fell while the fingers closed, more force would open them
+        (the stiffness of the grasp is negative), or the force hardly grew.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
     """
@@ -119,7 +122,7 @@ class Grip(LoadPath):
 
     def __post_init__(self) -> None:
         """Set up the solver."""
-        self._wanted, self._other = self.problem, self.fallback
+        self._wanted, self._other, self._peak = self.problem, self.fallback, 0.0
         super().__post_init__()
 
     def _set_up(self) -> None:
@@ -193,7 +196,7 @@ class Grip(LoadPath):
             work.halvings += 1
             raise ConvergenceError(f"the state at {force:.4g} N is not the one that the coarser mesh has come to")
         self._watch(x, force)
-        here = _OnPath(x, force, compliance, start.wall.snapped or self._gives_way(x, force), False)
+        here = _OnPath(x, force, compliance, start.wall.snapped or self._gives_way(x, force, compliance), False)
         self._gripped(here, work, Seconds())
         return here
 
@@ -218,6 +221,7 @@ class Grip(LoadPath):
             self._refuse_folded(error, INDENTED if self.fallback is None else FOLDED)
             if self.fallback is None:
                 raise
+        limit = self._peak
         # the unknowns are numbered alike, so the path goes on from the last state
         last, self.problem, self.fallback = self.opening.last, self.fallback(), None
         self._start_again()
@@ -225,8 +229,24 @@ class Grip(LoadPath):
         try:
             return self._level(here, force, work)
         except ConvergenceError as again:
+            self._refuse_unstable(again, limit)
             self._refuse_folded(again, INDENTED)
             raise
+
+    def _refuse_unstable(self, error: ConvergenceError, limit: float) -> None:
+        """Say that a wall seems to give way where the load path ends at the same force with both kinds of gaps.
+
+        ``limit`` is the largest force with the first kind [N]. Which nodes touch depends on the kind, so a Newton
+        method that does not find them stops elsewhere with the other one.
+        """
+        left, _ = self.opening.last
+        low, high = sorted([limit, self._peak])
+        if left < INDENTED and high - low <= ALIKE * high:
+            raise CheckError(
+                f"the wall seems to give way at {high:.3g} N on this mesh: with gaps of either kind its load path ends there (at {low:.4g} "
+                f"and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; press less or take a "
+                f"thicker wall ({error})"
+            ) from error
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found, or that it may have."""
@@ -245,7 +265,7 @@ class Grip(LoadPath):
 
     def _level(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact."""
-        self.solver.left = MOST_ITERATIONS
+        self.solver.left, self._peak = MOST_ITERATIONS, 0.0 if here is None else here.force
         try:
             return self._climb(here, force, work)
         except SpentError as error:
@@ -261,7 +281,10 @@ class Grip(LoadPath):
             here = _OnPath(x, reached, self.problem.closing(x) / reached, False, False)
         x, reached = here.x, here.force
         ahead, fell = self._step_to(x, reached, force, here.compliance, work)
-        slope, gives_way = np.inf, self._gives_way(ahead, force)
+        compliance = self._compliance()
+        slope, gives_way = np.inf, self._gives_way(ahead, force, compliance)
+        # a state at which more force would open the fingers lies beyond a limit, even if no step saw the force fall
+        fell |= compliance < 0.0
         # the first contact may have more force than the first level asks for: no slope yet
         if force > reached:
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
@@ -282,19 +305,20 @@ class Grip(LoadPath):
             pass
         # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
-        ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces)
+        ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces, SHORTEST_STEP)
         return ahead, falls([reached, *forces])
 
     def _watch(self, x: FloatArray, force: float) -> None:
         self.opening.watch(self.problem.wall_state(x), force)
+        self._peak = max(self._peak, force)
 
-    def _gives_way(self, x: FloatArray, force: float) -> bool:
+    def _gives_way(self, x: FloatArray, force: float, compliance: float) -> bool:
         """Whether the force grows much more slowly with the closing displacement here than it has done so far.
 
         Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
         when they snap in, and no force falls there.
         """
-        return bool(self._compliance() * force > self.problem.closing(x) / GIVES_WAY)
+        return bool(compliance * force > self.problem.closing(x) / GIVES_WAY)
 
     def _compliance(self) -> float:
         """Change of the closing displacement per force where the last solve has ended [m/N]."""

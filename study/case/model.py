@@ -155,8 +155,9 @@ def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) 
 
 def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     """How gaps are collocated, and how where that has no solution; ``walled``: on a wall that gives way."""
-    if scene.accuracy.contact == "auto" and scene.gripper.element == "hex8" and not walled:
-        return "blended", "nodal", "weighted"  # weighted gaps reach strains of 80 % where others end
+    if scene.accuracy.contact == "auto" and scene.gripper.element == "hex8":
+        # weighted gaps reach strains of 80 % where others end; a wall gives way before
+        return ("blended", "nodal") if walled else ("blended", "nodal", "weighted")
     chosen = "weighted" if scene.accuracy.contact == "auto" else scene.accuracy.contact
     return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 

@@ -297,7 +297,7 @@ class Accuracy(SceneSection):
         2, ge=1, le=2, description="2 solves every case on a coarser mesh too, which tells the error of every number"
     )
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
-        "auto", description="how gaps are collocated; auto is blended for hex8 on rigid objects, else weighted"
+        "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
     residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
     min_step_fraction: float = Field(

@@ -356,7 +356,7 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
     ("choice", "element", "walled", "rules"),
     [
         ("auto", "hex8", False, ("blended", "nodal", "weighted")), ("auto", "hex27", False, ("weighted", "nodal")),
-        ("auto", "hex8", True, ("weighted", "nodal")), ("weighted", "hex8", False, ("weighted", "nodal")),
+        ("auto", "hex8", True, ("blended", "nodal")), ("weighted", "hex8", False, ("weighted", "nodal")),
         ("nodal", "hex27", False, ("nodal",)), ("blended", "hex8", True, ("blended", "nodal")),
     ],
 )  # fmt: skip

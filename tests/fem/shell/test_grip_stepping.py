@@ -7,8 +7,8 @@ import pytest
 
 from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.errors import ConvergenceError
-from softjaw.fem.shell.grip import Grip
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.shell.grip import Grip, _OnPath
 
 MM = 1e-3
 
@@ -114,13 +114,14 @@ def test_beyond_the_limit_the_force_is_said_to_have_fallen():
     assert fell
 
 
-def test_a_first_force_above_the_limit_does_not_jump_there_unseen():
+@pytest.mark.parametrize("slope", [1e-9, -1e-9])
+def test_a_first_force_above_the_limit_does_not_jump_there_unseen(slope):
     grip = climbing()
     first = np.array([0.1 * MM])
     grip._stepping.first = lambda closing, F, work: (first, grip.problem.normal_force(first))
     grip._beds = [SimpleNamespace(closing=lambda F: 0.1 * MM)]
     grip._stepping.problem.closing = lambda x: float(x[0])
-    grip._gives_way = lambda x, F: False
+    grip._compliance = lambda: slope
     found = grip._climb(None, 6.0, Work())
     assert found.x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
     assert found.fell
@@ -138,3 +139,31 @@ def test_steps_that_keep_failing_end_the_walk():
     with pytest.raises(ConvergenceError, match="stuck at 0 N of 1 N: no luck"):
         steps.displacement_control(np.zeros(1), 1.0, work, 0.5 * MM)
     assert work.halvings < 12
+
+
+@pytest.mark.parametrize(("slope", "beyond"), [(1e-9, False), (-1e-9, True)])
+def test_a_state_at_which_more_force_would_open_the_fingers_is_beyond_a_limit(slope, beyond):
+    grip, start = climbing(), np.array([crossings(1.0)[0] * MM])
+    grip._compliance = lambda: slope
+    found = grip._climb(_OnPath(start, 1.0, 0.2 * MM, False, False), 2.2, Work())
+    assert (found.fell, found.snapped) == (beyond, beyond)
+
+
+@pytest.mark.parametrize(("ends", "code"), [((3.74, 3.72), CheckError), ((3.74, 2.9), ConvergenceError)])
+def test_a_path_that_ends_at_one_force_with_either_kind_of_gaps_is_ended_by_the_wall(ends, code):
+    grip, left = climbing(), iter(ends)
+    grip.opening, grip.fallback, grip._start_again = (
+        SimpleNamespace(last=(0.82, 3.7)),
+        lambda: grip.problem,
+        lambda: None,
+    )
+
+    def level(here, F, work):
+        grip._peak = next(left)
+        grip.opening.last = (0.96 if code is ConvergenceError else 0.82), grip._peak
+        raise ConvergenceError("no further")
+
+    grip._level = level
+    with pytest.raises(code) as failure:
+        grip._next(None, 5.0, Work())
+    assert ("3.74 N" in str(failure.value)) == (code is CheckError)
