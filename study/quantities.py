@@ -189,8 +189,15 @@ ROWS = (
     Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
-             "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.",
-             rank=2, error="relative"),
+             "max tau_z / (mu S), Eq. (12) with the paper's F_N read as S, the sum of pressure times area over the "
+             "patch; of the weaker finger.", rank=2, error="relative"),
+    Quantity("e_n_ratio", M, "m", "eccentricity parameter, torque over force",
+             "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane over all motions, in"
+             " whichever direction. In the planar models it is e_n, or e_n_projected; in the curved one it is no "
+             "smaller than e_n. Of the finger where it is smaller."),
+    Quantity("e_n_commanded", M, "m", "eccentricity parameter, force of the gripper",
+             "max tau_z / (mu F), Eq. (12) with the paper's F_N read as the force F that the gripper is commanded to "
+             "exert, the normal_force of the case; of the weaker finger."),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
              "max tau_z / (mu F_N), with F_N the sum of pressure times area times the cosine between face normal and "
              "contact normal; of the weaker finger."),
@@ -215,6 +222,10 @@ ROWS = (
     Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
+    Quantity("force_excess", (), "", "force along the contact normal over the gripper's, less 1",
+             "F_N / F - 1, with F the normal_force of the case, along the approach. On a slope the contact is pushed "
+             "aside too, which the pad's backing bears: F_N is F over the cosine between approach and contact normal "
+             "where the pressure's resultant lies along that normal. Of the finger where it is larger in size."),
     Quantity("closing", (), "m", "closing displacement of the pad",
              "How far the pad's back moved towards the object after first touch; mean of both fingers.",
              error="relative"),
@@ -268,8 +279,10 @@ ROWS = (
     Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
     Quantity("tau_z_max", FM, "N m", "largest friction torque about z", AS_MAP, "fingers"),
     Quantity("tau_pure", F, "N m", "largest torque without a net force", AS_MAP, "fingers"),
+    Quantity("e_n_ratio", FM, "m", "eccentricity parameter, torque over force", AS_MAP, "fingers"),
     Quantity("S", F, "N", "pressure times area", AS_MAP, "fingers"),
     Quantity("F_N", F, "N", "normal force", AS_MAP, "fingers"),
+    Quantity("force_excess", F, "", "force along the contact normal over the gripper's, less 1", AS_MAP, "fingers"),
     Quantity("closing", F, "m", "closing displacement of the pad", AS_MAP, "fingers"),
     Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
              "In the pad's frame: where the line through the centre of pressure along z meets the pad's deformed "

@@ -40,6 +40,7 @@ FACING = math.radians(0.5)  # misalignment up to which the closed form is off by
 OF_MESHES, OF_VIEWS = 0.7, 0.2
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
+ECCENTRICITIES = ("e_n", "e_n_ratio", "e_n_projected")  # attributes and quantities alike
 PLANAR = (
     ("pcm", ""),
     ("pcm_projected", "_pcm_projected"),
@@ -139,7 +140,7 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     # axes: finger, friction model
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
-        for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
+        for name in ("f_x", "f_y", "tau_z", *ECCENTRICITIES)
     }
     S, F_N = (np.array([getattr(c.limits["ccm"], name) for c in contacts]) for name in ("S", "F_N"))
     tau_pure = [c.tau_pure for c in contacts]
@@ -166,7 +167,8 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     # a grasp carries what its weaker finger carries
     for name, key in LIMITS:
         values |= {f"maps/{key}": limits[name].min(axis=0), f"fingers/{key}": limits[name]}
-    values |= {f"maps/{key}": limits[key].min(axis=0) for key in ("e_n", "e_n_projected")}
+    values |= {f"maps/{key}": limits[key].min(axis=0) for key in ECCENTRICITIES}
+    values["fingers/e_n_ratio"] = limits["e_n_ratio"]
     return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
 
 
