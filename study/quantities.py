@@ -162,9 +162,10 @@ AS_MAP = "As the map, for each finger."
 ROWS = (
     # maps of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
-             "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
-             "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
-             " as in the paper.", rank=1, error="relative"),
+             "Volume of the grasp wrench space spanned by both contacts with unit normal forces. The arms of forces are"
+             " divided by the object's extents along x, y and z of its own frame, as in the paper, torques about the "
+             "normals by the contact's length, unless [score] says otherwise. The limit surfaces are the ellipsoids "
+             "from three motions, as in the paper.", rank=1, error="relative"),
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
@@ -203,8 +204,8 @@ ROWS = (
              "contact normal; of the weaker finger."),
     Quantity("epsilon", M, "", "largest-minimum resisted wrench",
              "Radius of the largest ball around the origin inside the grasp wrench space of quality, with torques "
-             "about the midpoint of the contacts. NaN where the contacts are more than 0.5 degrees from antipodal, "
-             "unless score.epsilon is 'everywhere'."),
+             "about the midpoint of the contacts. NaN where the contacts, with their arms scaled, are more than "
+             "0.5 degrees from antipodal, unless score.epsilon is 'everywhere'."),
     Quantity("f_x_max", M, "N", "largest friction along x",
              "Total friction force along the contact frame's x axis when the pad slides along x, Eqs. (6)-(8); of the"
              " weaker finger.", rank=7, error="relative"),

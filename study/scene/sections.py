@@ -197,7 +197,12 @@ class ScoreKeys(SceneSection):
         "contact", description="length that scales soft torques: of the contact, as in the paper, or of the object"
     )
     object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
-        "auto", description="length that scales torque arms; auto is the object's largest extent"
+        "auto", description="length that scales torque arms along all axes; auto: those of length_scale"
+    )
+    length_scale: Literal["per_axis", "longest"] = Field(
+        "per_axis",
+        description="extents of the object that scale torque arms: its own along each of x, y and z, as in the paper,"
+        " or the longest along all",
     )
     contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
         "auto", description="length that scales soft torques; auto is the pad's length"

@@ -240,8 +240,9 @@ def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
 
 
 @pytest.mark.parametrize(("overrides", "rho", "length"), [
-    ((), 0.05, 0.12),
-    (('score.torque_scale="object"',), 0.12, 0.12),
+    ((), 0.05, 0.05),
+    (('score.length_scale="longest"',), 0.05, 0.12),
+    (('score.torque_scale="object"', 'score.length_scale="longest"'), 0.12, 0.12),
     (("score.contact_length_mm=20", "score.object_length_mm=80"), 0.02, 0.08),
 ])  # fmt: skip
 def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, length):
