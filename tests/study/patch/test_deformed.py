@@ -72,7 +72,7 @@ def told(capsys):
         code = main(["patch", "--deformed", *map(str, words), "--json"])
         answer = capsys.readouterr()
         assert code == 0, answer.err
-        return json.loads(answer.out)
+        return json.loads(answer.out[answer.out.index("{") :])
 
     return ask
 
