@@ -64,6 +64,8 @@ def test_sheets_behind_the_pads_on_a_thin_wall():
         closing[name] = result.values["maps/closing"]
     assert closing["steel"] == pytest.approx(closing["rigid"], rel=1e-3)
     assert closing["plastic"] > 1.02 * closing["rigid"]
+    (mounted,) = on_wall(CUP, "gripper.tilt_stiffness_nm_per_rad=10000", forces="[1]")
+    assert mounted.values["maps/closing"] == pytest.approx(closing["rigid"], rel=1e-4)
 
 
 def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_changes_nothing():
