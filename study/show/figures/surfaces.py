@@ -158,7 +158,7 @@ def fit_error_along(ds: xr.Dataset) -> tuple[Any, str]:
     k, z = nearest(forces(ds), FORCE), 1e3 * ds.station.values
     found: dict[str, Any] = {name: 100 * field(ds, name) for name in FITS}
     grid = on_grid_along(ds, k)
-    drawn, axes = pictures.figure(WIDTH, 2.9, 1, ds.sizes["angle"], gap=0.1, sharey=True)
+    drawn, axes = pictures.figure(WIDTH, 3.3, 1, ds.sizes["angle"], gap=0.1, sharey=True)
     for j, panel in enumerate(axes[0]):
         for name, (label, colour, line, mark) in FITS.items():
             panel.plot(z, found[name][:, j, k], color=colour, ls=line, marker=mark, label=label)
@@ -166,7 +166,8 @@ def fit_error_along(ds: xr.Dataset) -> tuple[Any, str]:
         panel.set(xlabel="station along the axis [mm]", ylim=(0, None))
         panel.set_title(f"{'(c) ' * (j == 0)}pressed at {axis_text(ds, 'angle', j)}, {number(forces(ds)[k])} N")
     axes[0, 0].set_ylabel("mean error of the radius [%]")
-    axes[0, -1].legend(frameon=False, fontsize=8)
+    named = axes[0, 0].get_legend_handles_labels()
+    drawn.legend(*named, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
     ellipsoid, quartic = (found[name] for name in FITS)
     better = 100 * float(np.mean((quartic < ellipsoid)[np.isfinite(quartic)]))
     one, two = (float(np.nanmean(values[..., k])) for values in (ellipsoid, quartic))
