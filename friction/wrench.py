@@ -32,6 +32,7 @@ from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
 MODELS = ("ccm", "pcm", "pcm_projected", "unrolled")
+DIRECTIONS, NARROWED = 12, 1e-4  # on each side of the best one so far; width at which the search for it ends [rad]
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,10 @@ class FrictionLimits:
     F_N : float
         Resultant along the contact normal, the force of the gripper [N].
     e_n : float
-        Eccentricity parameter ``tau_z / (mu S)``, a length that does not depend on ``mu`` [m].
+        Eccentricity parameter ``tau_z / (mu S)``, Eq. (12), a length that does not depend on ``mu`` [m].
+    e_n_ratio : float
+        Eccentricity parameter ``tau_z / max f_t``, Eq. (11), with the largest force in the contact plane, in whichever
+        direction; it does not depend on ``mu`` either [m].
     """
 
     f_x: float
@@ -58,6 +62,7 @@ class FrictionLimits:
     S: float
     F_N: float
     e_n: float
+    e_n_ratio: float
 
     @property
     def e_n_projected(self) -> float:
@@ -126,8 +131,25 @@ def friction_limits(
     f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model, unrolled).tolist()
     faces = patch.loaded
     S, F_N = float(faces.load.sum()), float((faces.load * faces.normal[:, 2]).sum())
+    largest = max(f_x, f_y, _largest_force(patch) if model == "ccm" else 0.0)
     mu = checked_mu(mu)
-    return FrictionLimits(mu * f_x, mu * f_y, mu * tau_z, S, F_N, tau_z / S)
+    return FrictionLimits(mu * f_x, mu * f_y, mu * tau_z, S, F_N, tau_z / S, tau_z / largest)
+
+
+def _largest_force(patch: ContactPatch) -> float:
+    """Largest force ``max f_t`` in the contact plane over all motions, for ``mu = 1`` [N].
+
+    It is the largest value of the support function over translations, whose direction is found on a grid that narrows
+    round the best one, to `NARROWED` of a right angle; the maximum is flat there, so that its own error is the square.
+    A planar contact carries the same in all directions and needs no search.
+    """
+    best, width, largest = 0.5 * math.pi, 0.5 * math.pi, 0.0
+    while width > NARROWED:
+        angles = best + width * np.linspace(-1.0, 1.0, 2 * DIRECTIONS + 1)
+        forces = friction_support(patch, np.column_stack([np.cos(angles), np.sin(angles), np.zeros(angles.size)]), 1.0)
+        k = int(forces.argmax())
+        best, width, largest = float(angles[k]), width / DIRECTIONS, max(largest, float(forces[k]))
+    return largest
 
 
 def model_faces(

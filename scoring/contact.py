@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,14 +47,14 @@ class SoftContact:
         object.__setattr__(self, "axes", axes)
 
     def wrench_map(
-        self, object_length: float, contact_length: float, centre_of_mass: ArrayLike = (0.0, 0.0, 0.0)
+        self, object_length: ArrayLike, contact_length: float, centre_of_mass: ArrayLike = (0.0, 0.0, 0.0)
     ) -> FloatArray:
         """Wrenches on the object of a unit normal force, ``f_x``, ``f_y`` and ``tau_z``.
 
         Parameters
         ----------
-        object_length : float
-            Length by which the torques of forces are divided [m].
+        object_length : float or (3,) array
+            Length by which the arms of forces are divided, or one along each of x, y and z [m].
         contact_length : float
             Length by which the torque about the contact's normal is divided [m].
         centre_of_mass : (3,) array
@@ -66,10 +65,11 @@ class SoftContact:
         (6, 4) array
             Columns as named above; rows are three forces and three torques [-].
         """
-        for name, length in (("object_length", object_length), ("contact_length", contact_length)):
-            if not 0 < length < math.inf:
+        lengths = np.asarray(object_length, float)
+        for name, length in (("object_length", lengths), ("contact_length", np.asarray(contact_length, float))):
+            if not np.all((length > 0) & np.isfinite(length)):
                 raise ValueError(f"{name} is {length}: it must be a positive length in metres")
-        arm = (self.position - _vector("centre_of_mass", centre_of_mass)) / object_length
+        arm = (self.position - _vector("centre_of_mass", centre_of_mass)) / lengths
         x, y, N = self.axes
         C = np.zeros((6, 4))
         for column, force in enumerate((N, x, y)):

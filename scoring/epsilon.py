@@ -54,7 +54,7 @@ class EpsilonBound(NamedTuple):
 
 def epsilon(
     contacts: Sequence[SoftContact],
-    object_length: float,
+    object_length: ArrayLike,
     contact_length: float,
     centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
     kind: str = "linf",
@@ -66,7 +66,9 @@ def epsilon(
     ----------
     contacts : sequence of SoftContact
         One or more, in any pose.
-    object_length, contact_length : float
+    object_length : float or (3,) array
+        As in `scoring.contact.SoftContact.wrench_map` [m].
+    contact_length : float
         Lengths by which the torques of forces and those about the normals are divided [m]; epsilon depends on both.
     centre_of_mass : (3,) array
         Point about which torques are taken [m]; epsilon depends on it.

@@ -71,7 +71,7 @@ class PoseVolume(NamedTuple):
 def pose_volume(
     contact1: SoftContact,
     contact2: SoftContact,
-    object_length: float,
+    object_length: ArrayLike,
     contact_length: float,
     centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
     relative_error: float = 1e-5,
@@ -83,7 +83,9 @@ def pose_volume(
     ----------
     contact1, contact2 : SoftContact
         In any pose; ellipsoids are fastest, polytopes exact.
-    object_length, contact_length : float
+    object_length : float or (3,) array
+        As in `scoring.contact.SoftContact.wrench_map` [m].
+    contact_length : float
         Lengths by which arms and torques about the normals are divided [m].
     centre_of_mass : (3,) array
         Point about which torques are taken [m]; the volumes do not depend on it.

@@ -67,6 +67,9 @@ class Flag(IntFlag):
     DENTED = 1 << 22, "dented", "the wall is dented deep", (
         "by more than a fifth of the object's half width between the fingers: what is held there has another shape"
     )  # fmt: skip
+    OBLIQUE = 1 << 24, "oblique", "a contact normal lies oblique to the approach", (
+        "the force along it differs from the one that the gripper commands by 5 % or more: see force_excess"
+    )  # fmt: skip
     # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"

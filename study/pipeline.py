@@ -133,6 +133,10 @@ def _state_values(contacts: Sequence[PressedContact]) -> dict[str, Any]:
     """What the solved states say beside their patches."""
     closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
+    # of the force that the gripper commands, which the checks compare with the force along the approach
+    excess = [c.force_excess for c in contacts]
+    values |= {"maps/force_excess": max(excess, key=abs), "fingers/force_excess": excess}
+    values["maps/e_n_commanded"] = np.min([c.e_n_commanded for c in contacts], axis=0)
     one, two = (c.pose for c in contacts)
     opening = float((two.origin - one.origin) @ one.rotation[:, 2])
     values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}

@@ -162,9 +162,10 @@ AS_MAP = "As the map, for each finger."
 ROWS = (
     # maps of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
-             "Volume of the grasp wrench space spanned by both contacts with unit normal forces; torque components "
-             "are divided by the scales given in the scene. The limit surfaces are the ellipsoids from three motions,"
-             " as in the paper.", rank=1, error="relative"),
+             "Volume of the grasp wrench space spanned by both contacts with unit normal forces. The arms of forces are"
+             " divided by the object's extents along x, y and z of its own frame, as in the paper, torques about the "
+             "normals by the contact's length, unless [score] says otherwise. The limit surfaces are the ellipsoids "
+             "from three motions, as in the paper.", rank=1, error="relative"),
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
@@ -189,15 +190,22 @@ ROWS = (
     Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
-             "max tau_z / (mu S), with S the sum of pressure times area over the patch; of the weaker finger.",
-             rank=2, error="relative"),
+             "max tau_z / (mu S), Eq. (12) with the paper's F_N read as S, the sum of pressure times area over the "
+             "patch; of the weaker finger.", rank=2, error="relative"),
+    Quantity("e_n_ratio", M, "m", "eccentricity parameter, torque over force",
+             "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane over all motions, in"
+             " whichever direction. In the planar models it is e_n, or e_n_projected; in the curved one it is no "
+             "smaller than e_n. Of the finger where it is smaller."),
+    Quantity("e_n_commanded", M, "m", "eccentricity parameter, force of the gripper",
+             "max tau_z / (mu F), Eq. (12) with the paper's F_N read as the force F that the gripper is commanded to "
+             "exert, the normal_force of the case; of the weaker finger."),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
              "max tau_z / (mu F_N), with F_N the sum of pressure times area times the cosine between face normal and "
              "contact normal; of the weaker finger."),
     Quantity("epsilon", M, "", "largest-minimum resisted wrench",
              "Radius of the largest ball around the origin inside the grasp wrench space of quality, with torques "
-             "about the midpoint of the contacts. NaN where the contacts are more than 0.5 degrees from antipodal, "
-             "unless score.epsilon is 'everywhere'."),
+             "about the midpoint of the contacts. NaN where the contacts, with their arms scaled, are more than "
+             "0.5 degrees from antipodal, unless score.epsilon is 'everywhere'."),
     Quantity("f_x_max", M, "N", "largest friction along x",
              "Total friction force along the contact frame's x axis when the pad slides along x, Eqs. (6)-(8); of the"
              " weaker finger.", rank=7, error="relative"),
@@ -215,6 +223,10 @@ ROWS = (
     Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
+    Quantity("force_excess", (), "", "force along the contact normal over the gripper's, less 1",
+             "F_N / F - 1, with F the normal_force of the case, along the approach. On a slope the contact is pushed "
+             "aside too, which the pad's backing bears: F_N is F over the cosine between approach and contact normal "
+             "where the pressure's resultant lies along that normal. Of the finger where it is larger in size."),
     Quantity("closing", (), "m", "closing displacement of the pad",
              "How far the pad's back moved towards the object after first touch; mean of both fingers.",
              error="relative"),
@@ -268,8 +280,10 @@ ROWS = (
     Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
     Quantity("tau_z_max", FM, "N m", "largest friction torque about z", AS_MAP, "fingers"),
     Quantity("tau_pure", F, "N m", "largest torque without a net force", AS_MAP, "fingers"),
+    Quantity("e_n_ratio", FM, "m", "eccentricity parameter, torque over force", AS_MAP, "fingers"),
     Quantity("S", F, "N", "pressure times area", AS_MAP, "fingers"),
     Quantity("F_N", F, "N", "normal force", AS_MAP, "fingers"),
+    Quantity("force_excess", F, "", "force along the contact normal over the gripper's, less 1", AS_MAP, "fingers"),
     Quantity("closing", F, "m", "closing displacement of the pad", AS_MAP, "fingers"),
     Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
              "In the pad's frame: where the line through the centre of pressure along z meets the pad's deformed "

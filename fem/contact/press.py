@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import NEAR, Checks, check, explained, refuse_fall
 from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, State, Stepping, Work
-from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Gap, SpringBed
+from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.interpolation import interpolated
@@ -29,6 +29,7 @@ from softjaw.fem.petsc import NonlinearSolver, Seconds
 FloatArray = NDArray[np.float64]
 # Of Newton's method for one force; half of them where other gaps can take over, all for the next. Usual: 4 to 15.
 MOST_ITERATIONS = 300
+LONGEST_CLOSING, SHORTEST_CLOSING = 0.05, 1 / 64  # step to a given closing, of the thickness; of it, the shortest
 AGREE = 0.1  # of the closing displacement: the other pad's path is not the same one where they differ by more
 
 
@@ -208,6 +209,52 @@ class Press(LoadPath):
             below, x = x, self._within_budget(x, reached, force, work)
             self._refuse_fall(below, reached, x, force)
         return self._pressed(x, force, work, elapsed())
+
+    def at_closing(self, closing: float) -> Pressed:
+        """State at a closing displacement of the backing plate [m], by steps from first contact.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If no pad, the fallbacks included, has an acceptable state.
+        """
+        work, elapsed = Work(), self._stopwatch()
+        self._begin_afresh()
+        failed: ConvergenceError | CheckError | None = None
+        for pad in (self._wanted, *self.fallbacks):
+            if pad is not self.pad:
+                self.pad = pad
+                self._start_again()
+            try:
+                self.solver.left = MOST_ITERATIONS
+                x = self._close_to(closing, work)
+                return self._pressed(x, self.problem.normal_force(x), work, elapsed())
+            except (ConvergenceError, CheckError) as error:
+                failed = failed or error
+        assert failed is not None
+        raise failed
+
+    def _close_to(self, closing: float, work: Work) -> FloatArray:
+        """State at a closing displacement [m], each step started on the secant of the two before."""
+        longest = LONGEST_CLOSING * self.pad.shape.size[2]
+        step, here, before = min(longest, closing), 0.0, None
+        x = None
+        while here < closing:
+            ahead = closing if closing - here <= 1.001 * step else here + step
+            guess = self._bed.guess(ahead) if x is None else x
+            if x is not None and before is not None:
+                guess = x + (ahead - here) / (here - before[1]) * (x - before[0])
+            try:
+                found = self._stepping.solve(guess, Control(closing=ahead), work)
+            except ConvergenceError:
+                step *= 0.5
+                if step < SHORTEST_CLOSING * longest:
+                    raise
+                continue
+            before = None if x is None else (x, here)
+            x, here, step = found, ahead, min(1.5 * step, longest)
+        assert x is not None
+        return x
 
     def _from(self, start: Pressed, work: Work) -> State:
         """State at the force of a coarser mesh's, checked."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from softjaw.fem.pad.shape import BackingPlate
+from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.shell.element import Shell, patch
 from softjaw.fem.shell.wall_model import LinearShell
 
@@ -66,6 +66,34 @@ def back_stiffness(
     # a rigid motion along the approach needs no force: the finger's row and column follow from equilibrium
     Se = S @ approach
     return BackStiffness(free, np.block([[S, -Se[:, None]], [-Se[None], np.atleast_2d(approach @ Se)]]))
+
+
+@lru_cache(maxsize=8)
+def mount_stiffness(
+    x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], mount: TiltingMount
+) -> BackStiffness:
+    """Stiffness of a rigid plate that may tilt by ``theta``, for nodes on the lines ``x`` and ``y`` [m].
+
+    With the modes ``B = [y, -x]`` of tilting and the bond ``G`` of each node the energy is
+    ``1/2 (u - c - B theta) G (u - c - B theta) + 1/2 k theta^2`` (small rotations; the plate moves along the approach
+    alone). Its minimum over ``theta`` is ``1/2 (u - c) S (u - c)`` with ``S = G - G B (k + B^T G B)^-1 B^T G``.
+    """
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    weights = np.outer(*(0.5 * (np.diff(line, prepend=line[0]) + np.diff(line, append=line[-1])) for line in (x, y)))
+    share = 0.5 ** sum(symmetry)
+    G = (mount.glue * weights).ravel()
+    # tilting is odd in a plane of symmetry, so that the plane forbids it
+    modes = [mode.ravel() for mode, odd in ((Y, symmetry[1]), (-X, symmetry[0])) if not odd]
+    S = np.diag(G)
+    if modes:
+        GB = G[:, None] * np.stack(modes, axis=1)
+        k = mount.stiffness * share * np.eye(len(modes))
+        S = S - GB @ np.linalg.solve(k + np.stack(modes) @ GB, GB.T)
+    S = 0.5 * (S + S.T)
+    e = np.ones(len(G))
+    free = np.zeros((len(x), len(y), 3), dtype=bool)
+    free[..., 2] = True
+    return BackStiffness(free, np.block([[S, -(S @ e)[:, None]], [-(S @ e)[None], np.atleast_2d(e @ S @ e)]]))
 
 
 def relative_compliance(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementHex2, ElementLineP1, ElementLineP2, MeshHex
 
 from softjaw.fem.materials import Material
-from softjaw.fem.pad.backing_plate import BackStiffness, back_stiffness
-from softjaw.fem.pad.shape import BackingPlate, PadShape
+from softjaw.fem.pad.backing_plate import BackStiffness, back_stiffness, mount_stiffness
+from softjaw.fem.pad.shape import BackingPlate, PadShape, TiltingMount
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -46,7 +46,7 @@ class Pad:
     contact : str
         The points of the contact face that gap and pressure are integrated with, of `RULES`: ``"weighted"`` takes Gauss
         points, ``"nodal"`` the nodes, so that each has a gap of its own, ``"blended"`` points between these.
-    backing_plate : BackingPlate, optional
+    backing_plate : BackingPlate or TiltingMount, optional
         The plate behind the pad; rigid without.
 
     Attributes
@@ -78,7 +78,7 @@ class Pad:
         material: Material,
         symmetry: tuple[bool, bool] = (False, False),
         contact: str = "weighted",
-        backing_plate: BackingPlate | None = None,
+        backing_plate: BackingPlate | TiltingMount | None = None,
     ) -> None:
         # with an odd number the plane of symmetry would cut through a row of elements
         if any(s and n % 2 for s, n in zip(symmetry, shape.elements, strict=False)):
@@ -124,11 +124,13 @@ class Pad:
         self.size = self.closing_dof + 1 + len(self.contact_nodes)
 
     def _on_plate(self, back_nodes: IntArray) -> BackStiffness | None:
-        """Stiffness of the elastic backing plate behind the nodes of the back."""
+        """Stiffness of what lies behind the nodes of the back."""
         if self.backing_plate is None:
             return None
         grid = self.nodes[back_nodes].reshape(*self.contact_grid, 3)
         lines = (tuple(map(float, line)) for line in (grid[:, 0, 0], grid[0, :, 1]))
+        if isinstance(self.backing_plate, TiltingMount):
+            return mount_stiffness(*lines, self.symmetry, self.backing_plate)
         return back_stiffness(*lines, self.symmetry, self.backing_plate)
 
     def _describe_contact_face(self, lines: list[FloatArray], contact: str) -> None:

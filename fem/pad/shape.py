@@ -98,6 +98,27 @@ class BackingPlate:
             )
 
 
+@dataclass(frozen=True)
+class TiltingMount:
+    """Rigid plate behind a pad that may tilt about the axes through its middle.
+
+    Parameters
+    ----------
+    stiffness : float
+        Moment per angle, the same about both axes [N m].
+    glue : float
+        Stiffness per area of the bond [Pa/m], high beside that of the pad.
+    """
+
+    stiffness: float
+    glue: float
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no mount."""
+        if not (self.stiffness > 0 and self.glue > 0):
+            raise ValueError(f"a mount needs positive stiffnesses, found {self.stiffness} N m and {self.glue} Pa/m")
+
+
 def _graded(n: int, ratio: float) -> FloatArray:
     """Lines ``0..1`` whose intervals grow geometrically so that the last is ``ratio`` times the first."""
     steps = ratio ** np.linspace(0.0, 1.0, n) if n > 1 else np.ones(1)

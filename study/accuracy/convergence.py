@@ -347,8 +347,8 @@ def places(found: Sequence[Measured]) -> list[str]:
 
 
 def flagged(flags: NDArray[np.int64], reference: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which cases carry a flag that those of the reference do not."""
-    return (flags & ~reference) != 0
+    """Which cases carry a flag that those of the reference do not; how they press says nothing of a mesh."""
+    return (flags & ~reference & ~Flag.OBLIQUE) != 0
 
 
 def unsure(reference: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from softjaw.fem.materials import Material, material
 from softjaw.fem.pad.backing_plate import relative_compliance
-from softjaw.fem.pad.shape import BackingPlate
+from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.result import surely_below
@@ -23,6 +23,7 @@ from softjaw.study.scene.sections import Gripper
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid plate put e_n off by at most 3.5 times the relative
 # compliance of the plate that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
 STIFF_PLATE = 0.005
+GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
 # tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.
 SMALL_TRACTION = 0.03
@@ -49,6 +50,14 @@ def backing_plate(gripper: Gripper) -> BackingPlate:
     return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
 
 
+def tilting_mount(gripper: Gripper) -> TiltingMount | None:
+    """Mount of each pad that lets it tilt, or None; its glue is stiff beside the foam."""
+    if gripper.tilt_stiffness_nm_per_rad is None:
+        return None
+    glue = GLUE * pad_material(gripper).young_modulus / gripper.pad_thickness
+    return TiltingMount(gripper.tilt_stiffness_nm_per_rad, glue)
+
+
 @dataclass(frozen=True)
 class BackingPlateLevel:
     """Level of the backing plates of a scene; ``reason`` is an index of `study.quantities.REASONS`.
@@ -64,6 +73,8 @@ class BackingPlateLevel:
 def backing_plate_level(scene: Scene) -> BackingPlateLevel:
     """The level that the scene asks for, else the cheapest whose e_n is good to 2 %."""
     compliance = _compliance(scene.gripper)
+    if scene.gripper.tilt_stiffness_nm_per_rad is not None:  # of a plate that is rigid itself
+        return BackingPlateLevel(False, compliance, FORCED)
     if scene.effects.sheet != "auto":
         return BackingPlateLevel(scene.effects.sheet == "elastic", compliance, FORCED)
     if surely_below(compliance, STIFF_PLATE):

@@ -25,7 +25,7 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
-from softjaw.study.case.contact import Contact, angles, pose_flags
+from softjaw.study.case.contact import Contact, angle, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.case.task import Task, payload_alone, payload_values, task_of
 from softjaw.study.flags import raised
@@ -40,6 +40,7 @@ FACING = math.radians(0.5)  # misalignment up to which the closed form is off by
 OF_MESHES, OF_VIEWS = 0.7, 0.2
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
+ECCENTRICITIES = ("e_n", "e_n_ratio", "e_n_projected")  # attributes and quantities alike
 PLANAR = (
     ("pcm", ""),
     ("pcm_projected", "_pcm_projected"),
@@ -53,8 +54,10 @@ class EvaluationSettings:
 
     Parameters
     ----------
-    arms, torques : float
-        Lengths by which arms of forces and torques about the normals are divided [m].
+    arms : (3,) array or float
+        Lengths by which the arms of forces are divided along x, y and z of the object's frame, or one for all [m].
+    torques : float
+        Length by which torques about the normals are divided [m].
     surface : LimitSurface
         Section ``[limit_surface]`` of a scene.
     task : Task, optional
@@ -65,7 +68,7 @@ class EvaluationSettings:
         Whether to find epsilon in any pose, GraspIt!'s volume, 6-D ellipsoids, and to keep the sampled wrenches.
     """
 
-    arms: float
+    arms: ArrayLike
     torques: float
     surface: Choice = field(default_factory=Choice)
     task: Task | None = None
@@ -76,13 +79,21 @@ class EvaluationSettings:
     sampled: bool = False
 
 
-def lengths(scene: Scene, obj: Any) -> tuple[float, float]:
-    """Lengths of arms and of torques about the normals [m], as ``[score]`` and the object give them."""
-    arms = scene.score.object_length or float(np.ptp(obj.bounds, axis=0).max())
-    return (
-        arms,
-        arms if scene.score.torque_scale == "object" else scene.score.contact_length or scene.gripper.pad_length,
-    )
+def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
+    """Lengths of arms ``(3,)`` and of torques about the normals [m], as ``[score]`` and the object give them.
+
+    The paper scales the object's length along x, y and z to one, so that the arms are divided by its extents in its own
+    frame, each along its axis.
+    """
+    extents = np.ptp(np.asarray(obj.bounds, float), axis=0)
+    if scene.object.axis_symmetry in (0, 4):
+        extents[:2] = extents[:2].max()  # alike but for rounding, so that images by that symmetry are
+    longest = scene.score.object_length or float(extents.max())
+    uniform = scene.score.object_length is not None or scene.score.length_scale == "longest"
+    arms = np.full(3, longest) if uniform else extents
+    if scene.score.torque_scale == "object":
+        return arms, longest
+    return arms, scene.score.contact_length or scene.gripper.pad_length
 
 
 def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
@@ -139,7 +150,7 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     # axes: finger, friction model
     limits = {
         name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
-        for name in ("f_x", "f_y", "tau_z", "e_n", "e_n_projected")
+        for name in ("f_x", "f_y", "tau_z", *ECCENTRICITIES)
     }
     S, F_N = (np.array([getattr(c.limits["ccm"], name) for c in contacts]) for name in ("S", "F_N"))
     tau_pure = [c.tau_pure for c in contacts]
@@ -166,7 +177,8 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     # a grasp carries what its weaker finger carries
     for name, key in LIMITS:
         values |= {f"maps/{key}": limits[name].min(axis=0), f"fingers/{key}": limits[name]}
-    values |= {f"maps/{key}": limits[key].min(axis=0) for key in ("e_n", "e_n_projected")}
+    values |= {f"maps/{key}": limits[key].min(axis=0) for key in ECCENTRICITIES}
+    values["fingers/e_n_ratio"] = limits["e_n_ratio"]
     return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
 
 
@@ -261,7 +273,7 @@ def _scores(
 
     In closed form where the contacts face each other, exactly in any pose elsewhere.
     """
-    facing = max(angles(*contacts)) <= FACING
+    facing = faces(contacts, settings)
     found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
     if settings.graspit:
         found["quality_graspit"] = [_graspit(contacts, m, settings, facing) for m in MODELS]
@@ -293,24 +305,34 @@ def _scores(
 def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: str = MODELS[0]) -> float:
     """The map ``quality`` of one friction model alone."""
     closed = _closed(contacts, model, settings).quality
-    if max(angles(*contacts)) <= FACING or closed == 0:
+    if faces(contacts, settings) or closed == 0:
         return closed
     return _volume(contacts, [c.ellipsoids[model] for c in contacts], settings)
 
 
+def faces(contacts: Sequence[Contact], settings: EvaluationSettings) -> bool:
+    """Whether the contacts face each other, up to `FACING`, also where their line is scaled along the object's axes."""
+    one, two = contacts
+    line = _line(contacts, settings)
+    return max(*angles(*contacts), angle(one.normal, line), angle(two.normal, -line)) <= FACING
+
+
+def _line(contacts: Sequence[Contact], settings: EvaluationSettings) -> FloatArray:
+    """From the first contact to the second ``(3,)``, over the lengths of arms [-]."""
+    return (contacts[1].origin - contacts[0].origin) / np.asarray(settings.arms, float)
+
+
 def _closed(contacts: Sequence[Contact], model: str, settings: EvaluationSettings) -> Score:
     """Score of the ellipsoids of contacts that face each other."""
-    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
     one, two = (c.ellipsoids[model].semi_axes for c in contacts)
-    return score(one, two, distance, settings.arms, settings.torques)
+    return score(one, two, float(np.linalg.norm(_line(contacts, settings))), 1.0, settings.torques)
 
 
 def _closed_volume(
     sizes: Sequence[tuple[float, float]], contacts: Sequence[Contact], settings: EvaluationSettings
 ) -> float:
     """Volume of the grasp wrench space of contacts that face each other, from volume and shadow of both surfaces."""
-    distance = float(np.linalg.norm(contacts[1].origin - contacts[0].origin))
-    return volume_linf(*sizes[0], *sizes[1], distance / settings.arms)
+    return volume_linf(*sizes[0], *sizes[1], float(np.linalg.norm(_line(contacts, settings))))
 
 
 def _graspit(contacts: Sequence[Contact], model: str, settings: EvaluationSettings, facing: bool) -> float:
@@ -352,7 +374,7 @@ def soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact
     return [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
 
 
-def volume_in_pose(pair: Sequence[SoftContact], arms: float, torques: float) -> float:
+def volume_in_pose(pair: Sequence[SoftContact], arms: ArrayLike, torques: float) -> float:
     """Volume of the grasp wrench space (L-infinity) of two contacts with any full bodies, in any pose."""
     one, two = pair
     return pose_volume(one, two, arms, torques, with_l1=False).linf

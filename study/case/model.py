@@ -18,7 +18,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.effects import backing_plate, backing_plate_level, pad_material
+from softjaw.study.case.effects import backing_plate, backing_plate_level, pad_material, tilting_mount
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -33,7 +33,7 @@ DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face 
 @lru_cache(maxsize=8)
 def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_plate: bool) -> Pad:
     """Discrete pad with its backing plate; the same for all candidates, so it is made once."""
-    behind = backing_plate(gripper) if elastic_plate else None
+    behind = backing_plate(gripper) if elastic_plate else tilting_mount(gripper)
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.study.case import model
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import build_object, own_frame
 from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of, volume_in_pose
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.case.solving import solver
@@ -87,20 +88,23 @@ def change_by_mu(result: Any, scene: Scene, quality: FloatArray) -> FloatArray:
     """Relative change of the quality of every case for a mu larger by its half-width; ``quality`` is over all cases."""
     share = scene.uncertainty.mu / scene.friction.mu
     change = np.full(quality.shape, facing_change_by_mu(share))
-    tilted = np.argwhere((result.read("misalignment/misalignment") > FACING) & (quality > 0))
+    names = ("frame_origin", "frame_axes", "pose_rotation", "pose_origin")
+    read = _in_object(own_frame(scene.object), *(result.read(f"fingers/{name}") for name in names))
+    arms, torques = lengths(scene, build_object(scene.object))
+    off = np.maximum(result.read("misalignment/misalignment"), _scaled_lean(*read, arms))
+    tilted = np.argwhere((off > FACING) & (quality > 0))
     if not len(tilted):
         return change
-    names = ("frame_origin", "frame_axes", "pose_rotation", "pose_origin")
-    read = {name: result.read(f"fingers/{name}") for name in names}
     semi_axes = result.read("limit_surface/semi_axes")[..., 0, :]
-    arms, torques = lengths(scene, build_object(scene.object))
     known: dict[bytes, float] = {}  # images of one grasp have the same surfaces
     for place in map(tuple, tilted):
         key = semi_axes[place].tobytes() + quality[place].tobytes()
         if key not in known:
-            frames = {name: values[place] for name, values in read.items()}
+            origin, axes = (values[place] for values in read)
             # Both sides, because the volume is far from linear in mu.
-            more, less = (_volume(frames, times * semi_axes[place], arms, torques) for times in (1 + share, 1 - share))
+            more, less = (
+                _volume(origin, axes, times * semi_axes[place], arms, torques) for times in (1 + share, 1 - share)
+            )
             known[key] = (more - less) / (2 * quality[place])
         change[place] = known[key]
     return change
@@ -117,14 +121,25 @@ def facing_change_by_mu(share: float) -> float:
     return ((1 + share) ** POWER - (1 - share) ** POWER) / 2
 
 
-def _volume(frames: dict[str, FloatArray], semi_axes: FloatArray, arms: float, torques: float) -> float:
-    """Volume of the grasp wrench space of two contacts, from what a file holds of them; ``semi_axes`` is ``(2, 3)``."""
-    contacts = [
-        SoftContact(
-            frames["pose_rotation"][i] @ frames["frame_origin"][i] + frames["pose_origin"][i],
-            frames["frame_axes"][i] @ frames["pose_rotation"][i].T,
-            Ellipsoid(semi_axes[i]),
-        )
-        for i in range(2)
-    ]
+def _in_object(
+    placed: Pose, origin: FloatArray, axes: FloatArray, rotation: FloatArray, at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Origins ``(..., 3)`` [m] and axes ``(..., 3, 3)`` of contact frames in the object's frame, from a file's."""
+    points = np.einsum("...ij,...j->...i", rotation, origin) + at
+    return (points - placed.origin) @ placed.rotation, axes @ np.swapaxes(rotation, -1, -2) @ placed.rotation
+
+
+def _scaled_lean(origin: FloatArray, axes: FloatArray, arms: FloatArray) -> FloatArray:
+    """Larger angle of the scaled line of two contacts to their normals ``(...)`` [rad], as in `evaluate.faces`."""
+    line = (origin[..., 1, :] - origin[..., 0, :]) / arms
+    lines, normals = np.stack([line, -line], axis=-2), axes[..., 2, :]
+    lean = np.arctan2(np.linalg.norm(np.cross(lines, normals), axis=-1), (lines * normals).sum(axis=-1))
+    return np.asarray(lean.max(axis=-1))
+
+
+def _volume(
+    origin: FloatArray, axes: FloatArray, semi_axes: FloatArray, arms: FloatArray, torques: float
+) -> float:
+    """Volume of the grasp wrench space of two contacts in the object's frame; ``semi_axes`` is ``(2, 3)``."""
+    contacts = [SoftContact(*own[:2], Ellipsoid(own[2])) for own in zip(origin, axes, semi_axes, strict=True)]
     return volume_in_pose(contacts, arms, torques)

@@ -28,8 +28,10 @@ from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
 from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin_body, wall_values
 from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
+EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
 OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
@@ -87,6 +89,16 @@ class PressedContact(Contact):
         return [view.at(self.pose) for view in self._views]
 
     @property
+    def force_excess(self) -> float:
+        """Force along the contact normal over the one commanded, which is along the approach, less 1."""
+        return self.limits["ccm"].F_N / self.state.force - 1.0
+
+    @property
+    def e_n_commanded(self) -> list[float]:
+        """``max tau_z / (mu F)`` in each of `MODELS`, with the force ``F`` that is commanded [m]."""
+        return [self.unit_limits[name].tau_z / self.state.force for name in MODELS]
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
         shape, law = self.state.pad.shape, self.state.pad.material
@@ -113,6 +125,7 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
     found = Flag.COLLISION * (one.free_face + two.free_face > between_faces * (1.0 - ALIKE))
     found |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
+    found |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > EXCESS - ALIKE)
     for c in contacts:
         found |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
     return found

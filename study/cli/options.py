@@ -268,7 +268,10 @@ def _add_cost_options(parser: argparse.ArgumentParser) -> None:
 def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
-    add("--mu", type=values.positive, default=0.8, help="friction coefficient (default 0.8)")
+    add("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved")
+    add("--deformed", action="store_true", help="FILE holds points of the pad's deformed contact face (CSV with x, y, "
+        "z), or of a contour along its width (y, z), seen from the backing plate")
+    add("--mu", type=values.positive, help="friction coefficient (default 0.8; with --deformed that of the scene)")
     add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
         "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
         )  # fmt: skip

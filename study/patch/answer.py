@@ -15,7 +15,7 @@ from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_flags
-from softjaw.study.case.evaluate import exact_score, soft
+from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
 from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, StudyError
@@ -32,11 +32,11 @@ SURFACES = {  # as a scene names them, and in the text
 }
 FITTED_ON = 500  # motions; a fit is judged on others
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
-LIMITS = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "e_n": "e_n", "e_n_projected": "e_n_projected"}
-FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected")
+LIMITS = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", **{name: name for name in ECCENTRICITIES}}
+FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", *ECCENTRICITIES)
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",
-    "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", "e_n": "m", "e_n_projected": "m",
+    "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", **dict.fromkeys(ECCENTRICITIES, "m"),
     "volume": "m", "semi_axes": "-, -, m", "E_dir": "rad", "distance": "m", "object_length": "m",
     "contact_length": "m", "misalignment": "rad",
 }  # fmt: skip
@@ -49,6 +49,7 @@ DEFINITIONS = {
     "f_x_max, f_y_max, tau_z_max": "largest friction along x and y, and about the contact normal through the origin",
     "tau_pure": "largest friction torque while no net force is transmitted",
     "e_n": "tau_z_max / (mu S)",
+    "e_n_ratio": "tau_z_max / max f_t, with the largest force in the contact plane, in any direction",
     "e_n_projected": "tau_z_max / (mu F_N)",
     "limit surface": "all loads (f_x, f_y, tau_z) that friction can carry, here per newton of S",
     "E_rad, E_dir": "mean error of a fitted surface's radius, and mean angle between its normal and the sliding motion",

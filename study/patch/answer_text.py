@@ -26,9 +26,11 @@ from softjaw.study.patch.answer import (
 )
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.quantities import MODELS
+from softjaw.study.scene import Scene, SceneError, load_scene
 from softjaw.study.units import shown, shown_unit
 
 PICTURES = (".png", ".svg")
+FRICTION_COEFFICIENT, ALONG_PAD = 0.8, np.array([1.0, 0.0, 0.0])
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
 PLANES = ((0, 1), (0, 2), (1, 2))
 LOOK: dict[str, dict[str, Any]] = {
@@ -53,8 +55,20 @@ def patch(options: Namespace) -> str:
         text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
         raise StudyError(USAGE, f"{text}; for numbers write --json and redirect the output into a file")
     reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
-    read = [read_patch(file, reading) for file in (options.file, options.other) if file]
-    patches = [evaluate_patch(patch, options.mu, options.long_side) for patch in read]
+    mu, long_side = options.mu or FRICTION_COEFFICIENT, options.long_side
+    if options.deformed:
+        # solves: PETSc would slow down all other answers
+        from softjaw.study.patch.deformed_face import solve_deformed
+
+        scene = _scene_of(options)
+        mu, long_side = options.mu or scene.friction.mu, ALONG_PAD if long_side is None else long_side
+        read = [solve_deformed(options.file, options.unit, scene)]
+    elif options.scene:
+        text = f"found '{options.scene}' behind the file, expected it with --deformed only"
+        raise StudyError(USAGE, f"SCENE: {text}; add --deformed if the file holds a deformed face")
+    else:
+        read = [read_patch(file, reading) for file in (options.file, options.other) if file]
+    patches = [evaluate_patch(patch, mu, long_side) for patch in read]
     grasp = None
     if scored:
         lengths = (options.distance, options.object_length, options.contact_length)
@@ -64,6 +78,21 @@ def patch(options: Namespace) -> str:
         write_picture(patches, options.surface, Path(options.picture))
     record = as_record(patches, grasp)
     return as_json(record) if options.json else as_text(record)
+
+
+def _scene_of(options: Namespace) -> Scene:
+    """The scene whose pad has a deformed face; options that say something else are refused."""
+    if not options.scene:
+        text = "found no scene, expected one behind the file, whose [gripper] is the pad"
+        raise StudyError(USAGE, f"--deformed: {text}; write softjaw patch --deformed {options.file} SCENE.toml")
+    for name in ("other", "pressure_unit", "pressure_name", "flip_normals"):
+        if getattr(options, name):
+            text = f"--{name.replace('_', '-')}: found with --deformed, which solves one pad for its pressure"
+            raise StudyError(USAGE, f"{text}; remove one of them")
+    try:
+        return load_scene(Path(options.scene))
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
 
 
 def as_text(record: dict[str, Any]) -> str:

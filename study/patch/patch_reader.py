@@ -71,11 +71,33 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     StudyError
         With code 3 if the file cannot be read as what its ending says, 2 if what it holds is no patch.
     """
-    path = Path(file)
+    path = checked_file(file, ENDINGS)
     ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        text = f"{file}: found {f'the ending {path.suffix}' if path.suffix else 'no ending'}, expected one of "
-        raise StudyError(USAGE, f"{text}{', '.join(ENDINGS)}; export the patch as CSV, or as VTU or VTP from ParaView")
+    if ending == ".csv":
+        return checked(_read_table(path, reading), reading.flip_normals)
+    # slow to import (VTK, HDF5), and not needed for tables
+    from softjaw.study.patch.vtk_faces import read_vtk
+    from softjaw.study.result.guarded import trouble
+
+    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
+        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
+    return checked(read_vtk(path, reading), reading.flip_normals)
+
+
+def checked_file(file: str, endings: Sequence[str]) -> Path:
+    """The path of a file with one of these endings, which can be read and is not too large.
+
+    Raises
+    ------
+    StudyError
+        With code 3 if it cannot be read, 2 if it has another ending or is too large.
+    """
+    path = Path(file)
+    if path.suffix.lower() not in endings:
+        found = f"the ending {path.suffix}" if path.suffix else "no ending"
+        expected = f"{'one of ' * (len(endings) > 1)}{', '.join(endings)}"
+        remedy = "export the patch as CSV, or as VTU or VTP from ParaView" if len(endings) > 1 else "export a table"
+        raise StudyError(USAGE, f"{file}: found {found}, expected {expected}; {remedy}")
     try:
         size = path.stat().st_size
         if not path.is_file():  # a device or a pipe may have no end
@@ -86,15 +108,7 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     if size > LARGEST_FILE:
         text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
         raise StudyError(USAGE, f"{text}; export the contact surface alone")
-    if ending == ".csv":
-        return checked(_read_table(path, reading), reading.flip_normals)
-    # slow to import (VTK, HDF5), and not needed for tables
-    from softjaw.study.patch.vtk_faces import read_vtk
-    from softjaw.study.result.guarded import trouble
-
-    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
-        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
-    return checked(read_vtk(path, reading), reading.flip_normals)
+    return path
 
 
 def refused(path: Path, line: int | None, key: str, found: str, expected: str, remedy: str) -> StudyError:
@@ -140,7 +154,7 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
 
 def _read_table(path: Path, reading: Reading) -> Faces:
     """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
-    numbers, (headers, *cells) = _rows(path)
+    numbers, (headers, *cells) = table_rows(path)
     headers = [header.strip() for header in headers]
     found = [split_header(header, reading.pressure_name) for header in headers]
     position = {pair[0]: i for i, pair in enumerate(found) if pair}
@@ -152,9 +166,9 @@ def _read_table(path: Path, reading: Reading) -> Faces:
     given = {pair[0]: pair[1] for pair in found if pair}
     units = {name: given[name] or reading.unit_of(KINDS[name]) or "" for name in needed}
     bare = [name for name in needed if not units[name]]
-    refuse([_without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
+    refuse([without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
             for kind in dict.fromkeys(KINDS[name] for name in bare)])  # fmt: skip
-    values = _numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
+    values = table_numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
     with np.errstate(over="ignore"):  # what is not finite is reported with its place
         values = {name: FACTORS[KINDS[name]][units[name]] * row for name, row in values.items()}
     unused = [h for pair, h in zip(found, headers, strict=True) if pair and pair[0] not in needed]
@@ -174,7 +188,7 @@ def _read_table(path: Path, reading: Reading) -> Faces:
     return Faces(str(path), lambda i: f"line {numbers[i + 1]}", *geometry, values["pressure"], corners, notes)
 
 
-def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
+def table_rows(path: Path) -> tuple[list[int], list[list[str]]]:
     """Numbers of the lines that are neither empty nor comments, and their cells."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -221,13 +235,14 @@ def _missing(path: Path, headers: Sequence[str], names: Any, reading: Reading) -
     return [Problem(str(path), 1, "", found, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
 
 
-def _without_unit(path: Path, kind: str, headers: Sequence[str]) -> Problem:
+def without_unit(path: Path, kind: str, headers: Sequence[str]) -> Problem:
+    """The problem of columns of a kind that name no unit, where no option gives one."""
     option, suffix, unit = OPTIONS[kind]
     remedy = f"write {headers[0]}_{suffix}, or add {option} {unit}: units are not guessed"
     return Problem(str(path), 1, ", ".join(headers), "no unit", f"a unit of {kind}", remedy)
 
 
-def _numbers(
+def table_numbers(
     path: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], headers: Sequence[str], position: dict[str, int]
 ) -> dict[str, FloatArray]:
     """Values of the columns at some positions, as they stand there; a fourth corner may be empty (NaN)."""

@@ -67,6 +67,9 @@ class Gripper(SceneSection):
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
     sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
     sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
+    tilt_stiffness_nm_per_rad: float | None = Field(
+        None, ge=1e-3, le=1e5, description="moment per angle of a mount that lets the pad tilt; left out: it does not"
+    )
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
     shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
     max_opening: ClassVar[Any] = si("max_opening_mm")
@@ -161,7 +164,12 @@ class Gripper(SceneSection):
 
     def support_findings(self, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
         """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
-        if effects.sheet == "rigid":
+        tilts = self.tilt_stiffness_nm_per_rad is not None
+        if tilts and effects.sheet == "elastic":
+            expected = 'effects.sheet "rigid" or "auto": a plate that tilts is rigid itself'
+            remedy = "remove the key, or write effects.sheet = \"rigid\""
+            yield Finding(("tilt_stiffness_nm_per_rad",), 'a mount with effects.sheet = "elastic"', expected, remedy)
+        if effects.sheet == "rigid" or tilts:
             return
         counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
         size = self.pad_length_mm, self.pad_width_mm
@@ -197,7 +205,12 @@ class ScoreKeys(SceneSection):
         "contact", description="length that scales soft torques: of the contact, as in the paper, or of the object"
     )
     object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
-        "auto", description="length that scales torque arms; auto is the object's largest extent"
+        "auto", description="length that scales torque arms along all axes; auto: those of length_scale"
+    )
+    length_scale: Literal["per_axis", "longest"] = Field(
+        "per_axis",
+        description="extents of the object that scale torque arms: its own along each of x, y and z, as in the paper,"
+        " or the longest along all",
     )
     contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
         "auto", description="length that scales soft torques; auto is the pad's length"

@@ -37,7 +37,7 @@ class StoredSurface:
 
     unit: np.ndarray
     rho: float
-    ellipsoid: LimitSurface
+    ellipsoid: Ellipsoid
     chosen: LimitSurface | None
     patch: ContactPatch | None
     model: Any  # one of `softjaw.study.quantities.MODELS`

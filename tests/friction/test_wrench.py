@@ -5,10 +5,12 @@ import time
 
 import numpy as np
 import pytest
+from scipy.special import ellipe
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_grid, cor_twists
+from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits, friction_limits, friction_sums, friction_support, friction_wrench
-from tests.generators import cap_polar, cylinder_grid, friction_sums_reference, lcg_patch
+from tests.generators import cap_polar, cylinder_grid, friction_sums_reference, lcg_patch, wedge
 
 SEEDS = range(1, 21)
 
@@ -54,7 +56,31 @@ def test_e_n_does_not_depend_on_mu_not_even_on_zero():
     assert with_friction.e_n_projected == pytest.approx(with_friction.tau_z / (0.8 * with_friction.F_N), rel=1e-14)
     assert (without.f_x, without.f_y, without.tau_z) == (0, 0, 0)
     assert without.per_unit_force == (0, 0, 0)
-    assert math.isnan(FrictionLimits(1.0, 1.0, 0.1, 1.0, -0.2, 0.1).e_n_projected)
+    assert math.isnan(FrictionLimits(1.0, 1.0, 0.1, 1.0, -0.2, 0.1, 0.1).e_n_projected)
+
+
+def test_the_largest_force_of_a_turned_wedge_lies_along_its_ridge():
+    """Eq. (11): along the ridge a wedge resists with mu S, whichever way it lies; in the planar models all ways."""
+    upright = wedge(0.6, 0.03, 0.05, 8, 8)
+    for angle in (0.0, 0.3, 0.5, math.pi / 4, 2.5):
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+        patch = ContactPatch(upright.centroid @ turn.T, upright.area, upright.normal @ turn.T, upright.pressure)
+        limits, planar = friction_limits(patch, 0.7), friction_limits(patch, 0.7, "pcm_projected")
+        assert limits.e_n_ratio == pytest.approx(limits.e_n, rel=1e-8)
+        assert planar.e_n_ratio == pytest.approx(planar.tau_z / (0.7 * planar.F_N), rel=1e-12)
+        assert friction_limits(patch, 0.0).e_n_ratio == limits.e_n_ratio
+
+
+def test_on_a_cap_the_largest_force_is_that_in_every_direction():
+    """Eq. (11) on a spherical cap, where it differs from Eq. (12): max f_t = 4 R^2 int E(sin^2 t) sin t dt."""
+    patch = cap_polar(0.02, 1.0, 40, 160)
+    limits = friction_limits(patch, 1.0)
+    t = (np.arange(4000) + 0.5) / 4000
+    force = 4 * 0.02**2 * np.mean(ellipe(np.sin(t) ** 2) * np.sin(t))
+    torque = np.pi * 0.02**3 * (1.0 - np.sin(1.0) * np.cos(1.0))
+    assert limits.e_n_ratio == pytest.approx(torque / force, rel=1e-3)
+    assert limits.e_n_ratio > 1.1 * limits.e_n
 
 
 def test_a_turn_of_a_cap_costs_no_friction_to_curvature():

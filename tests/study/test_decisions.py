@@ -166,7 +166,7 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
 # --- flags ------------------------------------------------------------------------------------------------------------
 
 
-def facing(turn, lean, mu, distance=0.06, free=0.0):
+def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
     from softjaw.friction.frame import FrameFlag
 
@@ -177,6 +177,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0):
         pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
         made.append(SimpleNamespace(
             mu=mu, normal=R[:, 2], origin=origin, free_face=free, coarse=False, nodal_instead=False,
+            force_excess=excess,
             frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose),
             state=SimpleNamespace(checks=SimpleNamespace(ellipticity=1.0), path_dependent=False),
         ))  # fmt: skip
@@ -188,7 +189,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0):
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
     from softjaw.study.case.contact import ANTIPODAL, pose_flags
-    from softjaw.study.case.solving import state_flags
+    from softjaw.study.case.solving import EXCESS, state_flags
     from softjaw.study.flags import Flag
 
     turn = Rotation.random(random_state=seed)
@@ -196,6 +197,8 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.NOT_ANTIPODAL
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.COLLISION
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.0299)) == 0
+    assert state_flags(facing(turn, 0.0, 1.0, excess=moved([-EXCESS], seed)[0])) == Flag.OBLIQUE
+    assert state_flags(facing(turn, 0.0, 1.0, excess=0.9999 * EXCESS)) == 0
 
 
 @tries

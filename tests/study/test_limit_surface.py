@@ -21,6 +21,7 @@ from softjaw.study.quantities import MODELS
 from tests.study.test_pipeline import CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
 WEIGHT = 9.80665
+EXTENTS = [0.05, 0.04, 0.12]  # of OVAL [m]
 
 
 def exact(result, f, model, count):
@@ -118,11 +119,11 @@ def soft_contacts(values, m):
 
 
 def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand():
-    """The object's length is 120 mm, the pad's 50 mm; the closed form would be off by some percent."""
+    """Arms over the object's extents, torques over the pad's length; the closed form would be off by some percent."""
     for values in cases(OVAL, angles="[30]"):
         assert values["maps/misalignment"] > np.radians(5)
         for m in range(len(MODELS)):
-            expected = pose_volume(*soft_contacts(values, m), 0.12, 0.05, relative_error=1e-6).linf
+            expected = pose_volume(*soft_contacts(values, m), EXTENTS, 0.05, relative_error=1e-6).linf
             assert values["maps/quality"][m] == pytest.approx(expected, rel=1e-4)
         assert np.isnan(values["maps/epsilon"]).all()
     [near, far] = (cases(OVAL, angles=f"[{a}]")[1] for a in (0, 30))
@@ -142,13 +143,13 @@ def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
         quartic = Quartic(values["limit_surface/coefficients"][f][CURVED], exponents(3, 4))
         body = quartic.scaled(MU * np.array([1.0, 1.0, values["limit_surface/rho"][f]]))
         contacts[f] = SoftContact(contact.position, contact.axes, body)
-    expected = pose_volume(*contacts, 0.12, 0.05, relative_error=1e-4, with_l1=False).linf
+    expected = pose_volume(*contacts, EXTENTS, 0.05, relative_error=1e-4, with_l1=False).linf
     assert values["maps/quality_fitted"][CURVED] == pytest.approx(expected, rel=2e-3)
 
 
 def test_epsilon_in_any_pose_is_computed_on_demand():
-    [facing] = cases(OVAL, forces="[5]")
-    [askew] = cases(OVAL, "score.epsilon=everywhere", angles="[30]", forces="[5]")
+    [facing] = cases(OVAL, "score.length_scale=longest", forces="[5]")
+    [askew] = cases(OVAL, "score.length_scale=longest", "score.epsilon=everywhere", angles="[30]", forces="[5]")
     assert (np.array(facing["maps/epsilon"]) > 0).all()
     assert (np.array(askew["maps/epsilon"]) > 0).all()
     assert (np.array(askew["maps/epsilon"]) < facing["maps/epsilon"]).all()

@@ -79,7 +79,8 @@ def differing(found, expected, tolerance, scale=None):
 # Values that are zero up to rounding, with the size that rounding is to be compared with.
 SCALES = {
     "maps/misalignment": 1.0, "fingers/frame_origin": 0.01, "fingers/pose_origin": 0.01, "fingers/frame_axes": 1.0,
-    "maps/curvature_loss": 1.0, "checks/force_balance": 1.0, "checks/adhesion": 1.0, "checks/penetration": 1.0,
+    "maps/curvature_loss": 1.0, "maps/force_excess": 1.0, "fingers/force_excess": 1.0,
+    "checks/force_balance": 1.0, "checks/adhesion": 1.0, "checks/penetration": 1.0,
     "checks/complementarity": 1.0, "maps/payload": 1e5,  # known to 5e-4, by a search that rounding turns
     **{f"maps/{n}_overestimate{s}": 1.0 for n in ("f_x", "f_y", "tau_z") for s in ("", "_pcm_projected")},
 }  # fmt: skip
@@ -135,7 +136,8 @@ def test_the_curved_limits_lie_between_the_planar_ones(angle):
 
 
 def test_both_definitions_of_e_n_say_the_same_torque():
-    for values in cases(OVAL, angles="[0, 30]") + cases(CONE, stations="[75]"):
+    oval, cone = cases(OVAL, angles="[0, 30]"), cases(CONE, stations="[75]")
+    for values, force in zip(oval + cone, (2.0, 5.0) * 3, strict=True):
         tau = values["fingers/tau_z_max"]
         S, F_N = values["fingers/S"], values["fingers/F_N"]
         assert values["maps/e_n"] == pytest.approx((tau / (MU * S[:, None])).min(axis=0), rel=1e-12)
@@ -144,6 +146,26 @@ def test_both_definitions_of_e_n_say_the_same_torque():
         assert values["maps/e_n"] * values["maps/S"] == pytest.approx(
             values["maps/e_n_projected"] * values["maps/F_N"], rel=1e-9
         )
+        # Eqs. (11) and (12) as the paper prints them, the latter with the force that the gripper commands
+        largest = tau / values["fingers/e_n_ratio"]
+        along_axes = np.maximum(values["fingers/f_x_max"], values["fingers/f_y_max"])[:, CURVED]
+        assert (largest[:, CURVED] >= (1.0 - 1e-12) * along_axes).all()
+        assert largest[:, FLAT] == pytest.approx(MU * S)
+        assert (values["fingers/e_n_ratio"] >= tau / (MU * S[:, None]) * (1.0 - 1e-12)).all()
+        assert values["maps/e_n_commanded"] == pytest.approx((tau / (MU * force)).min(axis=0), rel=1e-12)
+        assert values["fingers/force_excess"] == pytest.approx(F_N / force - 1.0)
+
+
+def test_on_a_slope_the_force_along_the_normal_is_the_commanded_one_over_the_cosine():
+    """Where the resultant of the pressure lies along the contact normal, as on one straight side of a cone it does."""
+    for slope, flagged in ((8.0, False), (25.0, True)):
+        rise = 60.0 * np.tan(np.radians(slope))
+        outline = [[z, float(25.0 + rise * (1.0 - z / 60.0))] for z in (0, 20, 40, 60)]
+        cone = f'shape = "revolution"\nprofile_mm = {outline}'
+        for values in cases(cone, stations="[30]"):
+            expected = 1.0 / np.array(values["fingers/frame_axes"])[:, 2, 2] - 1.0
+            assert values["fingers/force_excess"] == pytest.approx(expected, abs=0.1 * expected.max())
+            assert bool(int(values["maps/flags"]) & Flag.OBLIQUE) == flagged
 
 
 @pytest.mark.parametrize(("shape", "overrides"), [
@@ -218,8 +240,9 @@ def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
 
 
 @pytest.mark.parametrize(("overrides", "rho", "length"), [
-    ((), 0.05, 0.12),
-    (('score.torque_scale="object"',), 0.12, 0.12),
+    ((), 0.05, 0.05),
+    (('score.length_scale="longest"',), 0.05, 0.12),
+    (('score.torque_scale="object"', 'score.length_scale="longest"'), 0.12, 0.12),
     (("score.contact_length_mm=20", "score.object_length_mm=80"), 0.02, 0.08),
 ])  # fmt: skip
 def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, length):

@@ -5,7 +5,8 @@ import pytest
 
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.quantities import REASONS
-from tests.study.test_pipeline import OVAL, cases, e_n, solved
+from softjaw.study.scene import SceneError, parse_scene
+from tests.study.test_pipeline import CONE, OVAL, cases, e_n, solved
 from tests.study.test_walls import CUP
 from tests.study.test_walls import solved as on_wall
 
@@ -63,3 +64,23 @@ def test_sheets_behind_the_pads_on_a_thin_wall():
         closing[name] = result.values["maps/closing"]
     assert closing["steel"] == pytest.approx(closing["rigid"], rel=1e-3)
     assert closing["plastic"] > 1.02 * closing["rigid"]
+    (mounted,) = on_wall(CUP, "gripper.tilt_stiffness_nm_per_rad=10000", forces="[1]")
+    assert mounted.values["maps/closing"] == pytest.approx(closing["rigid"], rel=1e-4)
+
+
+def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_changes_nothing():
+    place = dict(stations="[75]", forces="[3]")
+    rigid, stiff, soft = (
+        cases(CONE, *([f"gripper.tilt_stiffness_nm_per_rad={k}"] if k else []), **place)[0] for k in (None, 1e4, 0.2)
+    )
+    assert stiff["maps/e_n"] == pytest.approx(rigid["maps/e_n"], rel=2e-3)
+    # turned to the slope the pad bears on more of its length
+    assert soft["maps/contact_area"] > 1.05 * rigid["maps/contact_area"]
+    assert soft["maps/e_n"][0] > 1.02 * rigid["maps/e_n"][0]
+
+
+def test_a_plate_that_tilts_cannot_be_elastic():
+    text = f"[object]\n{OVAL}\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
+    parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1"])
+    with pytest.raises(SceneError, match="tilt_stiffness_nm_per_rad"):
+        parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"'])

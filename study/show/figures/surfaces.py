@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.motion import cor_grid, fibonacci_twists
+from softjaw.lsfit.fit_error import fit_error
 from softjaw.study import pictures
+from softjaw.study.case.limit_surface import fitted
+from softjaw.study.quantities import FINGERS
 from softjaw.study.ranking import nearest
 from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.grasps import Index, at, axis_text, field, forces, number
@@ -33,6 +36,7 @@ ROWS, COLUMNS = 61, 121  # directions from pole to pole, and round
 ERRORS = "viridis"
 FITS = {"fit_error_ellipsoid": ("ellipsoid from three motions", "#801650", "--", "D"),
         "fit_error": ("convex quartic", pictures.INK, "-", "v")}  # fmt: skip
+GRID = 21  # centres of rotation along a side of the paper's grid
 FORCE = 3.0  # at which the error is drawn along the object [N]
 
 
@@ -107,9 +111,22 @@ def fitted_surfaces(ds: xr.Dataset) -> tuple[Any, str]:
         image = solids.rendered(draw, (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))
         fit, mean, most = FITS[name][0], number(100 * at(ds, name, index), 2), number(error.max(), 2)
         pictures.placed(panel, image, f"({letter}) {fit}: {mean} % off on average")
-        results.append(f"{fit}: mean {mean} % over motions, largest {most} %")
+        grid = number(100 * errors_on_grid(found)[name], 2)
+        results.append(f"{fit}: mean {mean} % over even motions, {grid} % on the paper's grid, largest {most} %")
     pictures.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
     return drawn, "; ".join(results)
+
+
+def errors_on_grid(found: StoredSurface) -> dict[str, float]:
+    """Mean errors of the radius on the paper's wrenches, of the surfaces in `FITS` [-].
+
+    They are those of turns about a grid of centres of rotation, to which the quartic is fitted, too, and of which nine
+    in ten are nearly translations.
+    """
+    twist = cor_grid(GRID, 1.0)
+    W, T = found.wrenches(twist), twist / np.linalg.norm(twist, axis=1, keepdims=True)
+    surfaces = found.ellipsoid, fitted(found.ellipsoid, W, T, "quartic", "least_squares")[0]
+    return {name: fit_error(surface, W, T).Erad for name, surface in zip(FITS, surfaces, strict=True)}
 
 
 def _most(found: StoredSurface) -> np.ndarray:
@@ -140,18 +157,36 @@ def fit_error_along(ds: xr.Dataset) -> tuple[Any, str]:
     """(c) Mean error of both fitted surfaces at every candidate along the object."""
     k, z = nearest(forces(ds), FORCE), 1e3 * ds.station.values
     found: dict[str, Any] = {name: 100 * field(ds, name) for name in FITS}
-    drawn, axes = pictures.figure(WIDTH, 2.9, 1, ds.sizes["angle"], gap=0.1, sharey=True)
+    grid = on_grid_along(ds, k)
+    drawn, axes = pictures.figure(WIDTH, 3.3, 1, ds.sizes["angle"], gap=0.1, sharey=True)
     for j, panel in enumerate(axes[0]):
         for name, (label, colour, line, mark) in FITS.items():
             panel.plot(z, found[name][:, j, k], color=colour, ls=line, marker=mark, label=label)
+            panel.plot(z, grid[name][:, j], color=colour, ls=line, lw=0.8, label=f"{label}, on the paper's grid")
         panel.set(xlabel="station along the axis [mm]", ylim=(0, None))
         panel.set_title(f"{'(c) ' * (j == 0)}pressed at {axis_text(ds, 'angle', j)}, {number(forces(ds)[k])} N")
     axes[0, 0].set_ylabel("mean error of the radius [%]")
-    axes[0, -1].legend(frameon=False, fontsize=8)
+    named = axes[0, 0].get_legend_handles_labels()
+    drawn.legend(*named, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
     ellipsoid, quartic = (found[name] for name in FITS)
     better = 100 * float(np.mean((quartic < ellipsoid)[np.isfinite(quartic)]))
     one, two = (float(np.nanmean(values[..., k])) for values in (ellipsoid, quartic))
+    on_grid = " and ".join(f"{number(float(np.nanmean(values)), 2)} %" for values in grid.values())
     return drawn, (
         f"at {number(forces(ds)[k])} N on average {number(one, 2)} % for the ellipsoid, {number(two, 2)} % for the "
-        f"quartic; the quartic fits better in {number(better)} % of the cases at all forces"
+        f"quartic; the quartic fits better in {number(better)} % of the cases at all forces; on the paper's grid "
+        f"of {GRID} x {GRID} centres of rotation {on_grid}"
     )
+
+
+def on_grid_along(ds: xr.Dataset, k: int) -> dict[str, np.ndarray]:
+    """Errors of `errors_on_grid` at a force ``(station, angle)`` [%], of the finger where they are larger."""
+    view, shape = View(ds, ()), (ds.sizes["station"], ds.sizes["angle"])
+    errors = {name: np.full(shape, np.nan) for name in FITS}
+    for place in np.ndindex(shape):
+        index = (*place, k)
+        surfaces = [stored_surface(ds, index, finger, "ccm", view.faces(index)) for finger in range(FINGERS)]
+        known = [errors_on_grid(found) for found in surfaces if found is not None and found.patch is not None]
+        for name in FITS:
+            errors[name][place] = 100 * max((own[name] for own in known), default=np.nan)
+    return errors

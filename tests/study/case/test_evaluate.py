@@ -11,7 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.payload import GRAVITY
+from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import (
@@ -21,12 +24,14 @@ from softjaw.study.case.evaluate import (
     EvaluationSettings,
     estimate,
     evaluate,
+    lengths,
     mesh_errors,
     quality,
 )
 from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses
+from softjaw.study.scene import parse_scene
 from softjaw.study.scene.objects import SphereShape
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
@@ -69,6 +74,43 @@ def test_the_quality_of_facing_ellipsoids_is_its_closed_form_and_nearly_that_of_
         assert values["maps/quality"][m] == pytest.approx(expected, rel=1e-9)
         assert quality(contacts, SETTINGS, model) == values["maps/quality"][m]
     assert quality(pair(1.01 * FACING), SETTINGS) == pytest.approx(values["maps/quality"][0], rel=1e-3)
+
+
+def turned(contacts, angle):
+    """The contacts with their object turned about y."""
+    turn = Rotation.from_euler("y", angle).as_matrix()
+    return tuple(c.at(Pose(turn @ c.pose.rotation, turn @ c.pose.origin)) for c in contacts)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2])
+def test_arms_are_scaled_along_the_axes_of_the_object(angle):
+    """With one length for all axes the object may turn; with one for each, contacts stand where the scaled arms end."""
+    contacts, sizes = turned(pair(), angle), np.array([0.05, 0.03, 0.09])
+    assert quality(contacts, SETTINGS) == pytest.approx(quality(pair(), SETTINGS), rel=1e-9)
+    found = quality(contacts, replace(SETTINGS, arms=sizes))
+    along = contacts[0].normal
+    if angle != 0.4:  # along an axis: in closed form, with its length
+        assert found == pytest.approx(quality(pair(), replace(SETTINGS, arms=sizes @ np.abs(along))), rel=1e-9)
+    else:
+        bodies = [SoftContact(c.origin / sizes, c.axes, Ellipsoid(c.ellipsoids["ccm"].semi_axes)) for c in contacts]
+        assert found == pytest.approx(pose_volume(*bodies, 1.0, 0.05).linf, rel=1e-4)
+        closed = quality(pair(), SETTINGS) * (0.09 * np.linalg.norm(along / sizes)) ** 2
+        assert found < 0.97 * closed
+
+
+def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
+    text = '[object]\nshape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4\n'
+    text += "[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
+    for overrides, arms, torques in (
+        ([], [0.05, 0.04, 0.12], 0.05),
+        (['score.length_scale="longest"'], [0.12] * 3, 0.05),
+        (["score.object_length_mm=80"], [0.08] * 3, 0.05),
+        (['score.torque_scale="object"'], [0.05, 0.04, 0.12], 0.12),
+    ):
+        scene = parse_scene(text, overrides=overrides)
+        found = lengths(scene, build_object(scene.object))
+        assert found[0] == pytest.approx(arms, rel=1e-12)
+        assert found[1] == pytest.approx(torques, rel=1e-12)
 
 
 def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():

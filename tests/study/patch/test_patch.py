@@ -357,7 +357,7 @@ def keys(record):
 
 
 def test_the_json_keeps_its_names(told):
-    limits = dict.fromkeys(["f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_projected"])
+    limits = dict.fromkeys(["f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n", "e_n_ratio", "e_n_projected"])
     fit = dict.fromkeys(["volume", "semi_axes", "stands_in", "E_1", "E_rad", "E_dir"])
     surfaces = {
         "exact": dict.fromkeys(["volume", "semi_axes"]),

@@ -7,13 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 import softjaw
+from softjaw.fem.objects.gap import Pose
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.closed_form import volume_linf
 from softjaw.study.case import candidates, probing
 from softjaw.study.case.candidates import axis_poses
-from softjaw.study.case.probing import _volume
+from softjaw.study.case.probing import _in_object, _scaled_lean, _volume
 from softjaw.study.case.variations import by_formula, moved_poses, variations
 from softjaw.study.export.cases import cases
 from softjaw.study.lookup import GraspMap
@@ -67,9 +69,24 @@ def test_the_quality_goes_with_the_fifth_power_of_mu_where_contacts_face_each_ot
         for t in (1.0, 1 + share, 1 - share)
     ]
     assert probing.facing_change_by_mu(share) == pytest.approx((volumes[1] - volumes[2]) / (2 * volumes[0]), rel=1e-12)
-    stored = [_volume(facing(d), t * axes, 1.0, 1.0) for t in (1.0, 1 + share, 1 - share)]
+    nowhere = Pose(np.eye(3), np.zeros(3))
+    frames = _in_object(nowhere, *facing(d).values())
+    stored = [_volume(*frames, t * axes, np.ones(3), 1.0) for t in (1.0, 1 + share, 1 - share)]
     assert (stored[1] - stored[2]) / (2 * stored[0]) == pytest.approx(probing.facing_change_by_mu(share), rel=1e-6)
     assert stored[0] == pytest.approx(volumes[0], rel=1e-6)
+
+
+def test_contacts_face_each_other_in_the_object_s_frame_where_their_scaled_line_does():
+    """Contacts along z of a file whose object lies along x and y of it: only unequal lengths turn their line."""
+    turn = Rotation.from_euler("x", 0.3).as_matrix()
+    origin, axes = _in_object(Pose(turn, np.array([0.1, 0.2, 0.3])), *facing(0.05).values())
+    line = turn.T @ [0, 0, 0.05]
+    assert origin[1] - origin[0] == pytest.approx(line, abs=1e-15)
+    assert axes[0, 2] == pytest.approx(line / 0.05, abs=1e-15)
+    assert float(_scaled_lean(origin, axes, np.full(3, 0.07))) < 1e-12
+    scaled = line / [0.1, 0.05, 0.1]
+    lean = np.arccos(scaled @ line / np.linalg.norm(scaled) / 0.05)
+    assert float(_scaled_lean(origin, axes, np.array([0.1, 0.05, 0.1]))) == pytest.approx(lean, rel=1e-9)
 
 
 @pytest.mark.parametrize("power", [-1.0, 0.0, 0.7])

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_limits
+from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import DONE
@@ -17,7 +19,9 @@ from softjaw.study.result.store import open_result
 from softjaw.study.show.figures import JOBS, studies, surfaces
 from softjaw.study.show.figures.drawing import FIGURES, Figure, chosen, draw, find, targets
 from softjaw.study.show.grasps import field, judge
+from softjaw.study.show.stored_surface import StoredSurface
 from softjaw.study.show.view import solids
+from tests.generators import cylinder_grid
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 
@@ -111,6 +115,17 @@ def test_the_exact_radius_is_that_of_an_ellipsoid_where_the_body_is_one(axes):
     assert (found >= known * (1 - 1e-12)).all()
 
 
+def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
+    """A curved contact under even pressure, 21 x 21 centres of rotation: case l12 of tests/data/friction_table.json."""
+    patch = cylinder_grid(1.0, np.pi / 3, 2.0, 48, 48)
+    limits = friction_limits(patch, 1.0)
+    ellipsoid = Ellipsoid(np.array(limits.per_unit_force) / [1.0, 1.0, 2.0])
+    found = surfaces.errors_on_grid(StoredSurface(np.ones(3), 2.0, ellipsoid, None, patch, "ccm"))
+    assert found["fit_error_ellipsoid"] == pytest.approx(0.003113307368265586, rel=1e-6)
+    # the reference's quartic is fitted to the wrenches alone, ours to the motions, too
+    assert 0.7 < found["fit_error"] / 0.0003705396009936843 < 1.0
+
+
 def test_images_lose_their_empty_margins_and_keep_a_little():
     image = np.full((60, 80, 3), 255, np.uint8)
     assert solids.trimmed(image).shape == image.shape
@@ -198,6 +213,11 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
 def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
     found = data(name)
     assert (field(found, "fit_error") < field(found, "fit_error_ellipsoid")).all()
+    if found.status.ndim == 3:  # of one object
+        # nearly all motions of the paper's grid are translations, which any surface through the axes fits
+        grid = surfaces.on_grid_along(found, 0)
+        assert grid["fit_error"].mean() < grid["fit_error_ellipsoid"].mean()
+        assert (grid["fit_error_ellipsoid"] < 100 * field(found, "fit_error_ellipsoid")[..., 0]).all()
 
 
 @pytest.mark.long

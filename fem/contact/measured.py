@@ -1,0 +1,139 @@
+"""The state of a pad from its deformed contact face, as it was measured: pressures without knowledge of the object.
+
+The face is pressed into the shape that it had (see `fem.objects.measured_face`). Noise would load it where it was free:
+where the measured face lies deeper than the true one, foam is pressed that was not. So the solve is done twice. At a
+closing displacement that is less by `MARGIN` standard errors of the face only what surely bears still does. Farther
+from there than the contact grows on the rest of the way, the object is not where the face was measured but beyond, and
+is taken away by as much as the face may be wrong. What grows is told from a parabola, whose contact goes with the root
+of the closing displacement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.spatial import cKDTree
+
+from softjaw.fem.contact.load_stepping import Settings
+from softjaw.fem.contact.press import Press, Pressed
+from softjaw.fem.objects.gap import FloatArray, Gap, NoContactError
+from softjaw.fem.objects.measured_face import MeasuredFace
+from softjaw.fem.pad.mesh import Pad
+
+MARGIN = 2.0  # standard errors of the face that a contact has to stand
+TAKEN_AWAY = 3.0  # of them, by which the face is lifted where nothing surely bears
+DOUBTFUL = 0.5  # of the closing displacement: with a larger margin nothing tells contact from noise
+RAMP = 2.0  # elements over which it is lifted
+SAMPLES = 60  # of the lift along a side of the pad
+LEAST_DEPTH = 1e-6  # of the pad's thickness: less is no contact
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A pad pressed into the shape of its measured face.
+
+    Parameters
+    ----------
+    state : Pressed
+        In the frame at first touch, from which the backing plate has moved on by the closing displacement.
+    margin : float
+        What the closing displacement is uncertain by, `MARGIN` standard errors of the face [m].
+    judged : bool
+        Whether contact could be told from noise.
+    """
+
+    state: Pressed
+    margin: float
+    judged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedFace:
+    """A measured face that is lifted off the pad by a smooth function of the place."""
+
+    face: MeasuredFace
+    lift: RectBivariateSpline
+
+    def gap(self, X: FloatArray) -> Gap:
+        """As of `MeasuredFace`, with the lift added: where the pad bears there is none."""
+        g, normal, hessian = self.face.gap(X)
+        x, y = X[:, 0], X[:, 1]
+        d = {(i, j): self.lift.ev(x, y, dx=i, dy=j) for i in range(3) for j in range(3 - i)}
+        normal[:, 0] += d[1, 0]
+        normal[:, 1] += d[0, 1]
+        second = np.stack([np.stack([d[2, 0], d[1, 1]], -1), np.stack([d[1, 1], d[0, 2]], -1)], -2)
+        hessian[:, :2, :2] += second
+        return g + d[0, 0], normal, hessian
+
+
+@dataclass
+class MeasuredPress:
+    """Presses pads into the shape of measured faces.
+
+    Parameters
+    ----------
+    pad : Pad
+        Whole, on a rigid backing plate.
+    fallbacks : sequence of Pad
+        With other gaps, as in `fem.contact.press.Press`.
+    options : dict
+        PETSc options with the prefix ``contact_``.
+    settings : Settings
+    """
+
+    pad: Pad
+    fallbacks: Sequence[Pad] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=Settings)
+
+    def solve(self, face: MeasuredFace) -> Measured:
+        """State of the pad with this face, which is measured from where the undeformed face would be.
+
+        Raises
+        ------
+        NoContactError
+            If the face is not pressed in anywhere.
+        ConvergenceError, CheckError
+            If there is no acceptable state.
+        """
+        depth = self._depth(face)
+        if not depth > LEAST_DEPTH * self.pad.shape.size[2]:
+            raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
+        touching, margin = face.lifted(depth), MARGIN * face.doubt
+        if margin >= DOUBTFUL * depth:
+            return Measured(self._pressed(touching, depth), margin, False)
+        sure = self._pressed(touching, depth - margin)
+        return Measured(self._pressed(self._released(touching, sure, depth), depth), margin, True)
+
+    def _pressed(self, face: MeasuredFace | LiftedFace, closing: float) -> Pressed:
+        press = Press(self.pad, face.gap, self.options, self.fallbacks, self.settings)
+        try:
+            return press.at_closing(closing)
+        finally:
+            press.destroy()
+
+    def _depth(self, face: MeasuredFace) -> float:
+        """How far the deepest point of the face lies below the undeformed one [m]."""
+        nodes = self.pad.nodes[self.pad.contact_nodes]
+        x, y = (np.linspace(nodes[:, k].min(), nodes[:, k].max(), 4 * SAMPLES + 1) for k in (0, 1))
+        X, Y = np.meshgrid(x, y, indexing="ij")
+        return float(-face.height(X.ravel(), Y.ravel())[0].min())
+
+    def _released(self, face: MeasuredFace, sure: Pressed, depth: float) -> LiftedFace | MeasuredFace:
+        """The face, lifted where the pad bears nothing on the way to it, nor may on the rest of the way."""
+        bearing = sure.contact_face[sure.pressure > 0][:, :2]
+        if not len(bearing):
+            return face
+        widths = [side / n for side, n in zip(self.pad.shape.size[:2], self.pad.shape.elements, strict=False)]
+        growth = math.sqrt(depth / sure.closing) - 1.0
+        reach = 0.5 * float(np.ptp(bearing, axis=0).max()) * growth + max(widths)
+        x, y = (np.linspace(-0.7, 0.7, SAMPLES) * side for side in self.pad.shape.size[:2])
+        places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+        t = np.clip((cKDTree(bearing).query(places)[0] - reach) / (RAMP * max(widths)), 0.0, 1.0)
+        lift = TAKEN_AWAY * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+        return LiftedFace(face, RectBivariateSpline(x, y, lift))

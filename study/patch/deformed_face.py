@@ -1,0 +1,127 @@
+"""A contact patch from the deformed face of a pad, as a camera sees it: points read, pad solved, its patch taken.
+
+Points are in the frame of the backing plate: x along the pad's length, y along its width, z along the approach, the
+undeformed contact face at z = 0, so that foam that is pressed in has z < 0. A contour has y and z alone and holds all
+along the pad.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.measured import Measured, MeasuredPress
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.objects.gap import NoContactError
+from softjaw.fem.objects.measured_face import MeasuredFace, cell_of, measured_face
+from softjaw.friction.patch import ContactPatch, FloatArray
+from softjaw.study.case.model import contact_rules, pad_of, settings
+from softjaw.study.messages import SOME_FAILED, USAGE, StudyError
+from softjaw.study.patch.faces import ReadPatch, refuse
+from softjaw.study.patch.patch_reader import (
+    FACTORS,
+    Reading,
+    checked_file,
+    refused,
+    split_header,
+    table_numbers,
+    table_rows,
+    without_unit,
+)
+from softjaw.study.scene import Scene
+from softjaw.study.scene.problems import Problem
+
+LOADED = 1e-9  # of the largest pressure, below which a face carries no load
+BESIDE = 1.5  # half sides of the pad: a point beyond them belongs to something else, or has another unit
+COVERED = 0.8  # of the pad's side: what fewer points cover is continued by much
+MOST_POINTS = 20_000
+COLUMNS = "x_mm, y_mm, z_mm, or y_mm, z_mm of a contour along the pad's width"
+
+
+def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
+    """Contact patch of the pad of a scene with the deformed face in a file, in the file's coordinates.
+
+    Parameters
+    ----------
+    file : str
+        Table (.csv) of points.
+    unit : str or None
+        Unit of columns that name none.
+    scene : Scene
+        Whose ``[gripper]``, ``[accuracy]`` and ``[petsc]`` say how the pad is solved.
+
+    Raises
+    ------
+    StudyError
+        With code 3 if the file cannot be read, 2 if it holds no deformed face, 6 if the pad has no such state.
+    """
+    points, notes = _points(checked_file(file, (".csv",)), unit, scene)
+    try:
+        face = measured_face(points, cell_of(scene.gripper.pad_size, scene.gripper.elements))
+    except ValueError as error:
+        raise StudyError(USAGE, f"{file}: {error}; measure more of the face") from error
+    rules = contact_rules(scene, walled=False)
+    wanted, *others = (pad_of(scene, (False, False), rule, False) for rule in rules)
+    try:
+        found = MeasuredPress(wanted, others, dict(scene.petsc), settings(scene)).solve(face)
+    except NoContactError as error:
+        remedy = "z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
+        raise StudyError(USAGE, f"{file}: {error}; {remedy}") from error
+    except (ConvergenceError, CheckError) as error:
+        raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
+    patch = extract(found.state.pad, found.state)
+    loaded = patch.pressure > LOADED * patch.pressure.max(initial=0.0)
+    kept = np.flatnonzero(loaded).tolist()
+    back = np.array([0.0, 0.0, found.state.closing])  # to where the backing plate stands
+    own = ContactPatch(
+        patch.centroid[loaded] - back, patch.area[loaded], patch.normal[loaded], patch.pressure[loaded],
+        None if patch.corners is None else patch.corners[loaded] - back,
+    )  # fmt: skip
+    return ReadPatch(file, own, len(loaded), lambda i: f"face {kept[i]} of the pad", (*notes, *_notes(face, found)))
+
+
+def _notes(face: MeasuredFace, found: Measured) -> tuple[str, ...]:
+    """What a reader should know of the solve."""
+    closing, own = found.state.closing, found.state.notes
+    told = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, which is good to"
+    text = f"{told} {1e3 * face.doubt:.2g} mm; closed by {1e3 * closing:.3g} mm, {found.state.force:.3g} N"
+    if not found.judged:
+        return text, "the face is pressed in by hardly more than its error: contact cannot be told from noise", *own
+    return text, *own
+
+
+def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tuple[str, ...]]:
+    """Points ``(n, 2)`` or ``(n, 3)`` [m] of a table, and notes on it; all that is wrong with it at once."""
+    numbers, (headers, *cells) = table_rows(path)
+    headers = [header.strip() for header in headers]
+    given = {pair[0]: (i, pair[1]) for i, header in enumerate(headers) if (pair := split_header(header))}
+    needed = [name for name in "xyz" if name in given]
+    if len(cells) > MOST_POINTS:
+        raise refused(path, None, "", f"{len(cells)} points", f"at most {MOST_POINTS}", "thin them")
+    if not {"y", "z"} <= given.keys():
+        found = f"the columns {', '.join(headers)}"
+        raise refused(path, 1, "", found, COLUMNS, "name the columns in the first line, with their unit")
+    units = {name: given[name][1] or Reading(unit).unit_of("length") or "" for name in needed}
+    bare = [headers[given[name][0]] for name in needed if not units[name]]
+    refuse([without_unit(path, "length", bare)] if bare else [])
+    values = table_numbers(path, numbers[1:], cells, headers, {name: given[name][0] for name in needed})
+    metres = {name: FACTORS["length"][units[name]] * values[name] for name in needed}
+    sides = dict(zip("xyz", scene.gripper.pad_size, strict=True))
+    problems = []
+    for name in needed:
+        # the face moves into the foam and bulges, but neither through the plate nor far
+        most = sides[name] if name == "z" else 0.5 * BESIDE * sides[name]
+        for i in np.flatnonzero(np.abs(metres[name]) > most).tolist():
+            found, expected = f"{1e3 * metres[name][i]:.4g} mm", f"at most {1e3 * most:.4g} mm from the face's centre"
+            remedy = "check the unit, and that the origin is the centre of the undeformed contact face"
+            problems.append(Problem(str(path), numbers[1 + i], headers[given[name][0]], found, expected, remedy))
+    refuse(problems)
+    notes = [
+        f"the points cover {100 * np.ptp(metres[name]) / sides[name]:.0f} % of the pad along {name}: the face is "
+        "continued straight beyond them"
+        for name in needed
+        if name != "z" and np.ptp(metres[name]) < COVERED * sides[name]
+    ]
+    return np.column_stack([metres[name] for name in needed]), tuple(notes)
