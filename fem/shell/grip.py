@@ -244,8 +244,8 @@ class Grip(LoadPath):
         if left < INDENTED and high - low <= ALIKE * high:
             raise CheckError(
                 f"the wall seems to give way at {high:.3g} N on this mesh: with gaps of either kind its load path ends "
-                f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; press less or take a "
-                f"thicker wall ({error})"
+                f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; "
+                f"press less or take a thicker wall ({error})"
             ) from error
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
