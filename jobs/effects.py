@@ -65,7 +65,7 @@ WALLS = {  # file, wall, modulus [GPa], stations, forces
        for t, E in ((0.4, 2.0), (0.8, 2.0), (0.8, 20), (1.5, 20), (1.5, 70))},
 }  # fmt: skip
 COARSE = ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",
-          "gripper.elements=[10, 6, 4]")  # fmt: skip
+          "gripper.elements=[10, 6, 4]", 'accuracy.contact="weighted"')  # fmt: skip
 SHELL, SHELLS, COUPLING = "object: rigid or shell", "object: linear or nonlinear shell", "friction acting back"
 PANELS = {  # of an effect: indicator up to which it is skipped without a measurement, and what the axis says
     SHELL: (effects.STIFF, "indentation / closing displacement"),

@@ -66,7 +66,7 @@ class Flag(IntFlag):
     DENTED = 1 << 22, "dented", "the wall is dented deep", (
         "by more than a fifth of the object's half width between the fingers: what is held there has another shape"
     )  # fmt: skip
-    LEFT_OUT = 1 << 23, "friction left out", "friction that acts back on the pressure moves e_n and is left out", (
+    LEFT_OUT = 1 << 23, "uncoupled", "friction that acts back on the pressure moves e_n and is left out", (
         "on the coarse mesh by more than accuracy.e_n, or 1 % where the scene names no target"
     )  # fmt: skip
     # of no file: derived where a file holds the safe force range

@@ -19,6 +19,7 @@ import numpy as np
 
 from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.friction.patch import NoContactError
 from softjaw.study.case import effects
 from softjaw.study.case.build import build_object, forces_apart, has_wall
 from softjaw.study.case.effects import ROWS, Level, Row, Step, level_named, neglected_traction
@@ -37,6 +38,8 @@ COUPLING = "friction_pressure_coupling"
 # of the payload. In 72 cases of a bottle no effect was skipped then that moves e_n on the fine mesh by more than 1.6 %;
 # without, two were, by up to 18 %, at forces between changes of either sign.
 BESIDE, OF_PAYLOAD = 0.25, 0.1
+# What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
+BEYOND = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
 SAMPLES = 100  # motions whose wrenches bound the payload; both levels err alike
 LEFT_OUT = "friction that acts back on the pressure was not solved ({reason})"
 
@@ -121,10 +124,18 @@ class Candidate:
     def coarse(self, scene: Scene, forces: Sequence[float]) -> Solver:
         """The candidate on the coarse mesh at the levels of a scene, for these forces; friction in few load steps."""
         # each load path has a solver of its own, or what one needed would change the other
-        key = (*(getattr(scene.effects, name) for name, row in ROWS.items() if row.steps), *forces)
+        levels = (getattr(scene.effects, name) for name, row in ROWS.items() if row.steps)
+        key = (*levels, scene.accuracy.contact, *forces)
         if key not in self._coarse:
             self._coarse[key] = solver(scene, self.fingers, self.poses, coarser=True, hasty=True)
         return self._coarse[key]
+
+    def seen(self, scene: Scene, forces: Sequence[float], k: int) -> list[PressedContact] | None:
+        """Contacts at the ``k``-th of some forces on the coarse mesh; None where it has none."""
+        try:
+            return self.coarse(scene, forces).seen(forces, k)
+        except BEYOND:
+            return None
 
     # --- the loop -----------------------------------------------------------------------------------------------------
 
@@ -185,21 +196,28 @@ class Candidate:
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float]:
         """As `change`."""
         base = self.on_rigid if ROWS[name].each_force else self.scene
+        if name == "object" and base.accuracy.contact == "auto":
+            # the gaps of walls: those that auto takes on rigid objects alone would change e_n, too
+            base = base.model_copy(update={"accuracy": base.accuracy.model_copy(update={"contact": "weighted"})})
         # what all forces share is asked of the highest one alone, which needs no load path through the others
         forces, at = (self.forces, k) if ROWS[name].each_force else (self.forces[k:], 0)
         low, high = (
-            self.coarse(at_levels(base, **{name: level}), forces).seen(forces, at) for level in (step.low, step.high)
+            self.seen(at_levels(base, **{name: level}), forces, at) for level in (step.low, step.high)
         )
         if low is None or high is None:
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
-        return other / e_n - 1.0, other_held / held - 1.0 if held > 0 else nan
+        return other / e_n - 1.0 if e_n > 0 else nan, other_held / held - 1.0 if held > 0 else nan
 
     def _measured(self, contacts: Sequence[PressedContact]) -> tuple[float, float]:
-        """e_n of the weaker finger [m] and payload [kg]."""
+        """e_n of the weaker finger [m] and payload [kg], NaN where that cannot be told."""
+        e_n = min(c.limits["ccm"].e_n for c in contacts)
         task = settings_of(self.scene, build_object(self.scene.object)).task
-        held = payload_alone(contacts, SAMPLES, task)["maps/payload"] if task else nan
-        return min(c.limits["ccm"].e_n for c in contacts), held
+        assert task is not None
+        try:
+            return e_n, payload_alone(contacts, SAMPLES, task)["maps/payload"]
+        except (*BEYOND, RuntimeError, ValueError):  # a contact without torque has no hull
+            return e_n, nan
 
     # --- solving at the levels that were chosen -----------------------------------------------------------------------
 

@@ -149,7 +149,7 @@ def neglected_traction(state: Any, mu: float) -> float:
 
 def _traction(candidate: Candidate, k: int) -> float:
     """`neglected_traction` on the coarse mesh, of the finger where it is larger."""
-    seen = candidate.coarse(candidate.on_rigid, candidate.forces).seen(candidate.forces, k)
+    seen = candidate.seen(candidate.on_rigid, candidate.forces, k)
     return nan if seen is None else max(neglected_traction(c.state, c.mu) for c in seen)
 
 

@@ -8,6 +8,7 @@ from tests.study.test_pipeline import OVAL, cases, e_n, solved
 
 NAME = "friction_pressure_coupling"
 FREE = 'effects.friction_pressure_coupling="none"'
+AUTO = 'effects.friction_pressure_coupling="auto"'
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
 
 
@@ -34,8 +35,8 @@ def test_levels_and_what_they_change():
 
 def test_what_auto_takes_or_leaves_is_what_the_scene_could_ask_for():
     """Bit by bit, at every force by itself; which cases take it follows from the measured change."""
-    auto, taken, free = (e_n(OVAL, *own) for own in ((), (COUPLED,), (FREE,)))
-    found = [result.effects[NAME] for _, path in solved(OVAL) for result in path]
+    auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (FREE,)))
+    found = [result.effects[NAME] for _, path in solved(OVAL, AUTO) for result in path]
     with_it = np.array([own.level == "tangential traction" for own in found]).reshape(auto.shape)
     np.testing.assert_array_equal(auto, np.where(with_it, taken, free))
     for own, true in zip(found, (taken / free - 1.0).ravel(), strict=True):

@@ -36,7 +36,7 @@ BOX = 'shape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4'
 
 @lru_cache(maxsize=64)
 def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", elements="[8, 4, 2]"):
-    """Units of a scene with the results of each."""
+    """Units of a scene with the results of each; friction that acts back is left to tests of its own."""
     text = f"""[object]
 {shape}
 [gripper]
@@ -48,6 +48,8 @@ angles_deg = {angles}
 normal_force_n = {forces}
 [accuracy]
 meshes = 1
+[effects]
+friction_pressure_coupling = "none"
 """
     scene = parse_scene(text, "scene.toml", overrides)
     made = units(scene, lambda point: build_object(point.object).axis_symmetry)
