@@ -201,9 +201,7 @@ class Candidate:
             base = base.model_copy(update={"accuracy": base.accuracy.model_copy(update={"contact": "weighted"})})
         # what all forces share is asked of the highest one alone, which needs no load path through the others
         forces, at = (self.forces, k) if ROWS[name].each_force else (self.forces[k:], 0)
-        low, high = (
-            self.seen(at_levels(base, **{name: level}), forces, at) for level in (step.low, step.high)
-        )
+        low, high = (self.seen(at_levels(base, **{name: level}), forces, at) for level in (step.low, step.high))
         if low is None or high is None:
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))

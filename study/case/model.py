@@ -190,7 +190,9 @@ def press_of(scene: Scene, finger: Finger, coarser: bool, hasty: bool = False) -
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
         steps = few_load_steps if hasty else load_steps
-        return Press(wanted, finger.gap, dict(scene.petsc), (), settings(scene), problem, steps, Stepping)
+        # what is measured only is not compared with other gaps, which would change e_n, too
+        instead = () if hasty else others
+        return Press(wanted, finger.gap, dict(scene.petsc), instead, settings(scene), problem, steps, Stepping)
     return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene))
 
 

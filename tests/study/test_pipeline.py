@@ -212,7 +212,7 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
 
 def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
     text = f"[object]\n{BOX}\n[gripper]\nelements = [8, 4, 2]\n[load]\nnormal_force_n = [2, 5]\n"
-    text += "[accuracy]\nmeshes = 1\n"
+    text += "[accuracy]\nmeshes = 1\n[effects]\nfriction_pressure_coupling = \"none\"\n"
     pose = "[[candidates.poses]]\npoint_mm = [7, 0, 10]\napproach = [-2, 0, 0]\nlong_side = [1, 0, 3]\n"
     [unit] = units(parse_scene(text + pose, "poses.toml"), lambda _: 2)
     for (_, result), expected in zip(pipeline.solve_unit(unit), cases(BOX, stations="[10]"), strict=True):
