@@ -145,8 +145,9 @@ class Candidate:
         if name == "object" and not self.walled:
             return [Level(level_named(name, row.names[0]), reason=effects.NO_WALL)] * count
         if wanted != "auto":
-            level = Level(level_named(name, wanted), row.steps[-1].indicator(self, count - 1), effects.FORCED)
-            return [level] * count
+            # of a force by itself the solved state tells it, see `effects_at`: nothing is solved for it here
+            indicator = nan if row.each_force else row.steps[-1].indicator(self, count - 1)
+            return [Level(level_named(name, wanted), indicator, effects.FORCED)] * count
         found = [self._at(name, row, k) for k in (range(count) if row.each_force else [count - 1])]
         # what is stated is the last step's indicator, whichever step was decided last
         stated = [own._replace(indicator=row.steps[-1].indicator(self, k)) for k, own in enumerate(found)]
