@@ -52,7 +52,6 @@ EFFECT_TABLE = {
     "object": Effect(
         ("rigid", "linear shell", "nonlinear shell"),
         "indentation that a linear wall would get at the largest force, over the wall's thickness",
-        measured=True,
     ),
     "sheet": Effect(
         ("rigid", "elastic plate"),

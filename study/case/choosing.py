@@ -195,14 +195,15 @@ class Candidate:
         return self._changes[name, step.high, k]
 
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float]:
-        """As `change`."""
-        base = self.on_rigid if ROWS[name].each_force else self.scene
-        if name == "object" and base.accuracy.contact == "auto":
-            # the gaps of walls: those that auto takes on rigid objects alone would change e_n, too
-            base = base.model_copy(update={"accuracy": base.accuracy.model_copy(update={"contact": "weighted"})})
-        # what all forces share is asked of the highest one alone, which needs no load path through the others
-        forces, at = (self.forces, k) if ROWS[name].each_force else (self.forces[k:], 0)
-        low, high = (self.seen(at_levels(base, **{name: level}), forces, at) for level in (step.low, step.high))
+        """As `change`; of effects that all forces share the change at the force where e_n changes most."""
+        if ROWS[name].each_force:
+            return self._compared_at(self.on_rigid, name, step, k)
+        each = [self._compared_at(self.scene, name, step, i) for i in range(len(self.forces))]
+        # what is not known at some force may be the largest
+        return max(each, key=lambda found: np.inf if np.isnan(found[0]) else abs(found[0]))
+
+    def _compared_at(self, base: Scene, name: str, step: Step, k: int) -> tuple[float, float]:
+        low, high = (self.seen(at_levels(base, **{name: level}), self.forces, k) for level in (step.low, step.high))
         if low is None or high is None:
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
