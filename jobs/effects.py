@@ -1,36 +1,41 @@
-"""What the indicators of `[effects]` are worth: indicator against true error of e_n in many cases, table and picture.
+"""What choosing effects is worth: wrong skips, effects taken without need and CPU time spent, table and picture.
 
-    python jobs/effects.py results/effects.csv             solve every case at both levels of every effect (10 minutes)
-    python jobs/effects.py results/effects.csv -o e.png    draw the table that is there and print its summary
+    python jobs/effects.py results/effects.csv                    solve every case at both levels of every effect
+    python jobs/effects.py results/effects.csv --only friction    a part of it, of friction, plates, patches, walls
+    python jobs/effects.py results/effects.csv -o effects.png     draw the table that is there and print its summary
 
-`auto` skips an effect where its indicator is small; a skip is wrong where the error is larger than 2 %.
+A part replaces its own rows of the table and leaves the others. A skip is wrong where the effect moves e_n by more than
+2 %, twice the target of `auto`; an effect is taken without need where it moves e_n by less than 1 %.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import time
 from collections.abc import Iterator
 from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 
-from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.bodies import polytope_volume
 from softjaw.study import pictures
-from softjaw.study.case import effects, model, wall
+from softjaw.study.case import effects, model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
+from softjaw.study.case.choosing import COUPLING as COUPLED
+from softjaw.study.case.choosing import Candidate, at_levels
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
-from softjaw.study.case.solving import Solver, solver
+from softjaw.study.case.solving import Solved
+from softjaw.study.quantities import E_N_TARGET, EFFECTS
 from softjaw.study.scene import Scene, load_scene, parse_scene
 from softjaw.study.scene.sections import LimitSurfaceKeys
 
-TARGET = 0.02  # relative error of e_n that a skip may have
+TARGET, WRONG = E_N_TARGET, 2.0 * E_N_TARGET  # relative errors of e_n: what `auto` aims at, and a wrong skip
 FLOOR, LEAST, MOST = 1e-6, 1e-5, 100.0  # errors, and indicators, beyond are drawn there
 HULL = 3000  # motions whose wrenches stand for the limit surface itself
 ROUND = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = {}\nsemi_axis_b_mm = {}\nlength_mm = 160'
@@ -60,49 +65,47 @@ WALLS = {  # file, wall, modulus [GPa], stations, forces
        for t, E in ((0.4, 2.0), (0.8, 2.0), (0.8, 20), (1.5, 20), (1.5, 70))},
 }  # fmt: skip
 COARSE = ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",
-          "gripper.elements=[10, 6, 4]")  # fmt: skip
-SHELLS = "object: linear or nonlinear shell"
-PANELS = {  # of an effect: threshold, and what the axis says
-    "object: rigid or shell": (wall.STIFF, "indentation / closing displacement"),
-    SHELLS: (wall.SMALL_INDENTATION, "indentation / wall thickness"),
+          "gripper.elements=[10, 6, 4]", 'accuracy.contact="weighted"')  # fmt: skip
+SHELL, SHELLS, COUPLING = "object: rigid or shell", "object: linear or nonlinear shell", "friction acting back"
+PANELS = {  # of an effect: indicator up to which it is skipped without a measurement, and what the axis says
+    SHELL: (effects.STIFF, "indentation / closing displacement"),
+    SHELLS: (effects.SMALL_INDENTATION, "indentation / wall thickness"),
     "sheet": (effects.STIFF_PLATE, "compliance over that of the pad"),
-    "friction": (TARGET, "1 - F_N / S"),
-    "friction-pressure coupling": (effects.SMALL_TRACTION, "traction left out / pressure"),
+    COUPLING: (effects.SMALL_TRACTION, "traction left out / pressure"),
+    "friction": (0.0, "1 - F_N / S"),
     "limit surface": (0.0, "radial fit error"),  # quality, not e_n; the quartic is never skipped
 }
-EXACT = "model size"
+EXACT, COST = "model size", "cost"
+PLAIN = {"object": "rigid", "sheet": "rigid", COUPLED: "none"}
 SURFACES = {"three_motions": "s", "full": "^", "quartic": "o"}  # and how they are drawn
-WORDS = {"friction": "could be skipped", "friction-pressure coupling": "not flagged"}  # auto always or never has these
-LEGEND = """filled: skipped by auto; open: simulated
+LEGEND = """filled: skipped by auto; open: taken
 upright line: indicator up to which auto skips
-dashed line: target, 2 %
-shaded: wrong skips; nothing may lie there
+without a look at the coarse mesh
+dashed line: 2 %, twice the target
+shaded: filled marks there are wrong skips
 friction: planar model (auto is always curved)
-coupling: open cases are flagged in the result
 limit surface: from three motions (squares),
 fitted ellipsoids (triangles), quartics (circles)"""
-Row = tuple[str, str, float, float]  # effect, case, indicator, error
+Row = tuple[str, str, float, float, int, float]  # effect, case, indicator, measured change, whether taken, error
 
 
-def solvers(scene: Scene, **levels: str) -> Iterator[Solver]:
-    """Solvers of a scene's candidates at some levels of effects."""
-    scene = scene.with_values({f"effects.{name}": level for name, level in levels.items()})
+def candidates(scene: Scene, **levels: str) -> Iterator[Candidate]:
+    """A scene's candidates, at some levels of effects."""
+    scene = at_levels(scene, **levels)
     for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
         obj, poses = build_object(scene.object), unit.candidate.poses
-        solving = solver(scene, [model.approach(obj, pose, scene.gripper) for pose in poses], poses)
-        yield solving
-        solving.destroy()
+        made = Candidate(scene, [model.approach(obj, pose, scene.gripper) for pose in poses], poses)
+        yield made
+        made.destroy()
 
 
 def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:
-    """Contacts by candidate and force; load paths end where they have no solution."""
+    """Contacts by candidate and force where there is a solution; effects that are not named are left out."""
     found = {}
-    for n, solving in enumerate(solvers(scene, **levels)):
-        try:
-            for force, outcome in zip(scene.load.normal_force, solving.load_path(scene.load.normal_force), strict=True):
-                found[n, force] = [c for c, *_ in outcome.contacts]
-        except (CheckError, ConvergenceError):
-            continue
+    for n, candidate in enumerate(candidates(scene, **(PLAIN | levels))):
+        for k, outcome in candidate.solve(range(len(candidate.forces))):
+            if isinstance(outcome, Solved):
+                found[n, candidate.forces[k]] = [c for c, *_ in outcome.contacts]
     return found
 
 
@@ -126,11 +129,11 @@ def volume(contact: Contact, found: SurfaceFit) -> float:
 def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
     """Effects that are chosen when the contact is solved."""
     S, F_N = (sum(getattr(c.limits["ccm"], value) for c in contacts) for value in ("S", "F_N"))
-    yield "friction", name, 1.0 - F_N / S, off(e_n(contacts, "pcm"), e_n(contacts))
+    yield "friction", name, 1.0 - F_N / S, np.nan, 1, off(e_n(contacts, "pcm"), e_n(contacts))
     c = contacts[0]
     for level in SURFACES:
         found = fit_surface(c, "ccm", LimitSurfaceKeys(model=level))
-        yield "limit surface", f"{name}, {level}", found.own.Erad, off(volume(c, found), 1.0)
+        yield "limit surface", f"{name}, {level}", found.own.Erad, np.nan, 1, off(volume(c, found), 1.0)
 
 
 def rigid_scenes() -> Iterator[tuple[str, Scene]]:
@@ -142,25 +145,57 @@ def rigid_scenes() -> Iterator[tuple[str, Scene]]:
         yield label, load_scene(shape, given) if shape.endswith(".toml") else parse_scene(text, label, given)
 
 
-def rigid_rows() -> Iterator[Row]:
-    """Every effect but the object's."""
+def named(label: str, n: int, force: float) -> str:
+    """Name of a case."""
+    return f"{label}, place {n}, {force:g} N"
+
+
+def friction_rows() -> Iterator[Row]:
+    """Friction that acts back, chosen at every force, and what choosing costs."""
     for label, scene in rigid_scenes():
-        compliance = effects.backing_plate_level(scene).compliance
-        plain = {"sheet": "rigid"}
-        foam, plate = contacts_at(scene, **plain), contacts_at(scene, sheet="elastic")
-        coupled = contacts_at(scene, **plain, friction_pressure_coupling="tangential")
-        coarse = scene.with_values({"gripper.elements": [12, 6, 4]})
-        part, whole = contacts_at(coarse, **plain), contacts_at(coarse, **plain, model_size="full")
-        for key, contacts in foam.items():
-            name = f"{label}, place {key[0]}, {key[1]:g} N"
-            yield from of_patch(name, contacts)
-            if key in plate:
-                yield "sheet", name, compliance, off(e_n(contacts), e_n(plate[key]))
-            if key in coupled:
-                left = max(effects.neglected_traction(c.state, scene.friction.mu) for c in contacts)
-                yield "friction-pressure coupling", name, left, off(e_n(contacts), e_n(coupled[key]))
+        free, coupled = contacts_at(scene), contacts_at(scene, **{COUPLED: "tangential"})
+        for n, candidate in enumerate(timed(label, candidates(at_levels(scene, sheet="rigid")), cost := [])):
+            for force, level in zip(candidate.forces, candidate.levels[COUPLED], strict=True):
+                if (n, force) in free and (n, force) in coupled:
+                    error = off(e_n(free[n, force]), e_n(coupled[n, force]))
+                    taken = int(level.level != "none")
+                    yield COUPLING, named(label, n, force), level.indicator, level.change, taken, error
+        yield from cost
+
+
+def timed(label: str, found: Iterator[Candidate], rows: list[Row]) -> Iterator[Candidate]:
+    """Candidates as they are chosen; afterwards, as rows, CPU time of choosing and of all that is solved [s]."""
+    while True:
+        start = time.process_time()
+        if (candidate := next(found, None)) is None:
+            return
+        choosing = time.process_time() - start
+        for _ in candidate.solve(range(len(candidate.forces))):
+            pass
+        rows.append((COST, f"{label}, place {len(rows)}", choosing, np.nan, 0, time.process_time() - start))
+        yield candidate
+
+
+def plate_rows() -> Iterator[Row]:
+    """Backing plates, chosen for all forces of a candidate."""
+    for label, scene in rigid_scenes():
+        free, plate = contacts_at(scene), contacts_at(scene, sheet="elastic")
+        for n, candidate in enumerate(candidates(at_levels(scene, **{COUPLED: "none"}))):
+            for force, level in zip(candidate.forces, candidate.levels["sheet"], strict=True):
+                if (n, force) in free and (n, force) in plate:
+                    error, taken = off(e_n(free[n, force]), e_n(plate[n, force])), int(level.level != "rigid")
+                    yield "sheet", named(label, n, force), level.indicator, level.change, taken, error
+
+
+def patch_rows() -> Iterator[Row]:
+    """Effects whose choice costs nothing."""
+    for label, scene in rigid_scenes():
+        coarse = at_levels(scene.with_values({"gripper.elements": [12, 6, 4]}), **PLAIN)
+        part, whole = contacts_at(coarse), contacts_at(coarse, model_size="full")
+        for key, contacts in contacts_at(scene).items():
+            yield from of_patch(named(label, *key), contacts)
             if key in part and key in whole:
-                yield EXACT, name, 0.0, off(e_n(part[key]), e_n(whole[key]))
+                yield EXACT, named(label, *key), 0.0, np.nan, 0, off(e_n(part[key]), e_n(whole[key]))
 
 
 def wall_rows() -> Iterator[Row]:
@@ -174,32 +209,40 @@ def wall_rows() -> Iterator[Row]:
             contacts_at(scene, object=level) for level in ("rigid", "linear_shell", "nonlinear_shell")
         )
         for force in scene.load.normal_force:
-            for n, solving in enumerate(solvers(scene.with_values({"load.normal_force_n": [force]}))):
-                key, name, level = (n, force), f"{label}, place {n}, {force:g} N", solving.level
+            alone = at_levels(scene.with_values({"load.normal_force_n": [force]}), **(PLAIN | {"object": "auto"}))
+            for n, candidate in enumerate(timed(f"{label}, {force:g} N", candidates(alone), cost := [])):
+                key, name, level = (n, force), named(label, n, force), candidate.levels["object"][0]
+                number = EFFECTS["object"].index(level.level)
                 if key in shell and key in rigid:
-                    yield "object: rigid or shell", name, level.share, off(e_n(rigid[key]), e_n(shell[key]))
-                if key in shell and key in linear:
-                    yield SHELLS, name, level.indicator, off(e_n(linear[key]), e_n(shell[key]))
+                    change = level.change if number < 2 else np.nan
+                    yield (SHELL, name, candidate.indentation[0], change, int(number > 0),
+                           off(e_n(rigid[key]), e_n(shell[key])))  # fmt: skip
+                if key in shell and key in linear and number > 0:
+                    error = off(e_n(linear[key]), e_n(shell[key]))
+                    yield SHELLS, name, candidate.indentation[1], level.change, int(number > 1), error
+            yield from cost
 
 
-def of_effect(rows: list[Row], effect: str) -> tuple[np.ndarray, np.ndarray]:
-    """Indicators and errors of an effect."""
-    x, error = np.array([row[2:] for row in rows if row[0] == effect], float).reshape(-1, 2).T
-    return x, error
+def of_effect(rows: list[Row], effect: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Indicators, whether the effect was taken, and errors of the cheaper level."""
+    own = np.array([row[2:] for row in rows if row[0] == effect], float).reshape(-1, 4)
+    return own[:, 0], own[:, 2] > 0, own[:, 3]
 
 
 def summary(rows: list[Row]) -> Iterator[str]:
     """One line for each effect."""
-    for effect, (limit, _) in PANELS.items():
-        x, error = of_effect(rows, effect)
-        skipped = x <= limit
-        wrong, worst = np.count_nonzero(error[skipped] > TARGET), error[skipped].max(initial=0.0)
-        yield (f"{effect}: {len(x)} cases, {np.count_nonzero(skipped)} skipped, {wrong} of them wrongly, largest error"
-               f" when skipped {worst:.2%}, largest of all {error.max(initial=0.0):.1%}")  # fmt: skip
-    _, error = of_effect(rows, EXACT)
+    for effect in PANELS:
+        x, taken, error = of_effect(rows, effect)
+        wrong, unneeded = np.count_nonzero(error[~taken] > WRONG), np.count_nonzero(error[taken] < TARGET)
+        yield (f"{effect}: {len(x)} cases, {np.count_nonzero(taken)} taken, {unneeded} of them without need, {wrong}"
+               f" wrong skips, largest error when skipped {error[~taken].max(initial=0.0):.2%}, largest of all"
+               f" {error.max(initial=0.0):.1%}")  # fmt: skip
+    choosing, _, whole = of_effect(rows, COST)
+    yield f"choosing: {choosing.sum() / max(whole.sum(), 1e-9):.1%} of the CPU time of {len(whole)} candidates"
+    _, _, error = of_effect(rows, EXACT)
     yield f"{EXACT}: {len(error)} cases, largest difference from the whole {error.max(initial=0.0):.1e}"
     for level in SURFACES:
-        error = [row[3] for row in rows if row[0] == "limit surface" and row[1].endswith(level)] or [np.nan]
+        error = [row[5] for row in rows if row[0] == "limit surface" and row[1].endswith(level)] or [np.nan]
         yield f"quality with {level}: off by {min(error):.2%} to {max(error):.1%}, on average {np.mean(error):.2%}"
 
 
@@ -208,19 +251,19 @@ def draw(rows: list[Row]) -> bytes:
     with pictures.style():
         drawn, axes = pictures.figure(12, 6.4, 2, 4, gap=0.1)
         for panel, (effect, (limit, text)) in zip(axes.ravel(), PANELS.items(), strict=False):
-            x, error = of_effect(rows, effect)
-            x, error = np.clip(x, LEAST, MOST), np.maximum(error, FLOOR)
-            low, high, skipped = 0.5 * x.min(), 2.0 * max(x.max(), limit), x <= limit
-            panel.axhline(TARGET, color="#566069", lw=0.9, ls="--")
+            x, taken, error = of_effect(rows, effect)
+            x, error, skipped = np.clip(x, LEAST, MOST), np.maximum(error, FLOOR), ~taken
+            low, high = 0.5 * x.min(initial=MOST), 2.0 * max(x.max(initial=LEAST), limit)
+            panel.axhline(WRONG, color="#566069", lw=0.9, ls="--")
             if limit:
-                panel.fill_between([low, limit], TARGET, 10, color="#c05a00", alpha=0.18, lw=0)
+                panel.fill_between([low, high], WRONG, 10, color="#c05a00", alpha=0.18, lw=0)
                 panel.axvline(limit, color="#566069", lw=0.9)
             shape = np.array([SURFACES.get(row[1].split(", ")[-1], "o") for row in rows if row[0] == effect])
             for some, look in ((skipped, {"color": "#12436d"}), (~skipped, {"mec": "#12436d", "mfc": "none"})):
                 for marker in SURFACES.values():
                     panel.plot(x[some & (shape == marker)], error[some & (shape == marker)], marker, ms=3.2, **look)
-            wrong = np.count_nonzero(error[skipped] > TARGET)
-            label = f"{np.count_nonzero(skipped)} of {len(x)} {WORDS.get(effect, 'skipped')}, {wrong} wrongly"
+            wrong = np.count_nonzero(error[skipped] > WRONG)
+            label = f"{np.count_nonzero(skipped)} of {len(x)} skipped, {wrong} wrongly"
             panel.set(xscale="log", yscale="log", xlim=(low, high), ylim=(0.7 * FLOOR, 2), xlabel=text,
                       title=f"{effect}\n{label if limit else 'never skipped'}")  # fmt: skip
         for panel in axes[:, 0]:
@@ -231,30 +274,44 @@ def draw(rows: list[Row]) -> bytes:
         return pictures.as_png(drawn)
 
 
+def read(file: Path) -> list[Row]:
+    """Rows of a table, of none where there is no file."""
+    if not file.exists():
+        return []
+    with file.open(newline="") as stream:
+        rows = list(csv.reader(stream))[1:]
+    return [(e, c, float(x), float(change), int(taken), float(y)) for e, c, x, change, taken, y in rows]
+
+
 def table(file: Path, parts: list[str]) -> None:
-    """Solve all cases and write a row for each as it is done."""
+    """Solve the cases of some parts and write a row for each as it is done; rows of other parts stay."""
     file.parent.mkdir(parents=True, exist_ok=True)
+    gone = {effect for part in parts for effect in PARTS[part][1]}
+    kept = [row for row in read(file) if row[0] not in gone]
     with file.open("w", newline="") as stream:
         out = csv.writer(stream)
-        out.writerow(("effect", "case", "indicator", "error"))
-        for part in parts:
-            for row in PARTS[part]():
-                out.writerow((*row[:2], f"{row[2]:.4g}", f"{row[3]:.3g}"))
-                stream.flush()
+        out.writerow(("effect", "case", "indicator", "change", "taken", "error"))
+        for row in (*kept, *(row for part in parts for row in PARTS[part][0]())):
+            out.writerow((*row[:2], f"{row[2]:.4g}", f"{row[3]:.4g}", row[4], f"{row[5]:.3g}"))
+            stream.flush()
 
 
-PARTS = {"rigid": rigid_rows, "walls": wall_rows}
+PARTS = {  # with the effects that each has rows of
+    "friction": (friction_rows, (COUPLING, COST)),
+    "plates": (plate_rows, ("sheet",)),
+    "patches": (patch_rows, ("friction", "limit surface", EXACT)),
+    "walls": (wall_rows, (SHELL, SHELLS)),
+}
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Indicators of effects against true errors.")
+    parser = argparse.ArgumentParser(description="What choosing effects is worth: wrong skips, unneeded effects, CPU.")
     parser.add_argument("table", type=Path, help="CSV with a row for each case; written without -o, read with it")
     parser.add_argument("-o", dest="out", type=Path, help="PNG to write")
-    parser.add_argument("--only", choices=PARTS, help="leave the other cases out")
+    parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS), help="leave the other parts out")
     given = parser.parse_args()
     if given.out is None:
-        table(given.table, [given.only] if given.only else list(PARTS))
-    with given.table.open(newline="") as stream:
-        found: list[Row] = [(e, c, float(x), float(y)) for e, c, x, y in list(csv.reader(stream))[1:]]
+        table(given.table, given.only)
+    found = read(given.table)
     print("\n".join(summary(found)))
     if given.out is not None:
         given.out.write_bytes(draw(found))

@@ -67,6 +67,9 @@ class Flag(IntFlag):
     DENTED = 1 << 22, "dented", "the wall is dented deep", (
         "by more than a fifth of the object's half width between the fingers: what is held there has another shape"
     )  # fmt: skip
+    LEFT_OUT = 1 << 23, "uncoupled", "friction that acts back on the pressure moves e_n and is left out", (
+        "on the coarse mesh by more than accuracy.e_n, or 1 % where the scene names no target"
+    )  # fmt: skip
     OBLIQUE = 1 << 24, "oblique", "a contact normal lies oblique to the approach", (
         "the force along it differs from the one that the gripper commands by 5 % or more: see force_excess"
     )  # fmt: skip

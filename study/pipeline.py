@@ -14,16 +14,16 @@ import numpy as np
 
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object, own_frame, pad_shape
-from softjaw.study.case.effects import Simulated, effects_of
+from softjaw.study.case.choosing import Candidate
+from softjaw.study.case.effects import Simulated, settled
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import PressedContact, Solved, Solver, followed, solver, state_flags
+from softjaw.study.case.solving import PressedContact, Solved, state_flags
 from softjaw.study.case.topology import of_fingers
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses
-from softjaw.study.scene import Scene
 
 
 def solve_unit(
@@ -38,27 +38,31 @@ def solve_unit(
     obj = build_object(scene.object)
     settings = settings_of(scene, obj)
     fingers = [model.approach(obj, pose, scene.gripper) for pose in unit.candidate.poses]
-    solving, probing = solver(scene, fingers, unit.candidate.poses), Probing(unit)
+    start = time.perf_counter()
+    solving, probing = Candidate(scene, fingers, unit.candidate.poses), Probing(unit)
+    choosing = time.perf_counter() - start
     try:
-        for k, outcome in _outcomes(solving, scene.load.normal_force, wanted):
+        for k, outcome in _outcomes(solving, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             else:
-                result = _result(scene, settings, solving, outcome)
-                yield k, _probed(result, probing, k, unit.candidate.note)
+                result = _result(settings, solving, k, outcome)
+                yield k, _probed(result, probing, k, unit.candidate.note, choosing)
+                choosing = 0.0  # counted once for all forces
     finally:
         probing.close()
         solving.destroy()
 
 
-def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome: Solved) -> CaseResult:
+def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome: Solved) -> CaseResult:
     """Values, checks, work, effects and patches of one case."""
+    scene, solving = candidate.asked, candidate.solver
     # of two meshes the finer one is the result, the coarser one tells its error
     start = time.perf_counter()
     fine = [c for c, *_ in outcome.contacts]
     values, fits = evaluate(fine, settings)
     values |= _state_values(fine) | of_fingers(fine, pad_shape(scene.gripper).patch_faces)
-    values["maps/flags"] |= state_flags(fine)
+    values["maps/flags"] |= state_flags(fine) | candidate.flags_at(k)
     values |= solving.wall_values(outcome)
     if outcome.grips:
         values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
@@ -74,7 +78,8 @@ def _result(scene: Scene, settings: EvaluationSettings, solving: Solver, outcome
     fields = ("pressure", "area", "centroid", "normal")
     patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
     message = _notes(values["maps/flags"], fine, outcome.note)
-    effects = effects_of(Simulated(scene, fine, fits, solving))
+    case = Simulated(scene, fine, fits, solving.planes, solving.fingers_solved)
+    effects = candidate.effects_at(k, fine) | settled(case)
     return CaseResult(values, patch, message, effects, tuple(fine))
 
 
@@ -84,34 +89,36 @@ def _notes(flags: int, contacts: Sequence[PressedContact], note: str) -> str:
     return "; ".join(text for text in (flag_sentences(flags), *own, note) if text)
 
 
-def _probed(result: CaseResult, probing: Probing, k: int, note: str) -> CaseResult:
-    """The result with what the further solves of a probe give, and their time, and a note on the candidate."""
+def _probed(result: CaseResult, probing: Probing, k: int, note: str, choosing: float) -> CaseResult:
+    """The result with what the further solves of a probe give, and a note on the candidate.
+
+    Their time counts, and that in which the effects were chosen [s].
+    """
     start = time.perf_counter()
     values = result.values | probing.values(k)
     for name in ("rest", "total"):
-        values[f"work/seconds_{name}"] += time.perf_counter() - start
+        values[f"work/seconds_{name}"] += choosing + time.perf_counter() - start
     message = "; ".join(text for text in (result.message, note, *probing.failures) if text)
     return replace(result, values=values, message=message)
 
 
-def _outcomes(
-    solving: Solver, forces: Sequence[float], wanted: Collection[int] | None
-) -> Iterator[tuple[int, Solved | CaseFailure]]:
+def _outcomes(candidate: Candidate, wanted: Collection[int] | None) -> Iterator[tuple[int, Solved | CaseFailure]]:
     """For every force the contacts of both fingers, or why there are none."""
-    if solving.apart:
-        for k, found in solving.levels(forces, range(len(forces)) if wanted is None else sorted(wanted)):
+    forces, every = candidate.forces, range(len(candidate.forces))
+    if candidate.apart:
+        for k, found in candidate.solve(every if wanted is None else sorted(wanted)):
             yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
         return
-    last, k = "no force below it was solved", -1
-    for k, found in enumerate(followed(solving.load_path, forces)):
+    last, ended, failed = "no force below it was solved", -1, None
+    for k, found in candidate.solve(every):
         if isinstance(found, Solved):
             last = f"the last good force is {forces[k]:g} N"
             yield k, found
+        elif found is failed:  # the load path has no further states
+            yield k, CaseFailure(f"not tried, because the load path ended at {forces[ended]:g} N: {found}")
         else:
-            ended = f"not tried, because the load path ended at {forces[k]:g} N: {found}"
+            ended, failed = k, found
             yield k, CaseFailure(f"{found}; {last}")
-    for above in range(k + 1, len(forces)):
-        yield above, CaseFailure(ended)
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:

@@ -38,10 +38,14 @@ MONOMIALS = tuple(
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect that a scene may call for: its levels, the cheapest first, and what its indicator is, if it has one."""
+    """An effect that a scene may call for: its levels, the cheapest first, and what its indicator is, if it has one.
+
+    ``measured`` tells whether the coarse mesh decides where the indicator does not.
+    """
 
     levels: tuple[str, ...]
     indicator: str = ""
+    measured: bool = False
 
 
 EFFECT_TABLE = {
@@ -50,7 +54,9 @@ EFFECT_TABLE = {
         "indentation that a linear wall would get at the largest force, over the wall's thickness",
     ),
     "sheet": Effect(
-        ("rigid", "elastic plate"), "mean deflection of the backing plate under an even pressure over that of the pad"
+        ("rigid", "elastic plate"),
+        "mean deflection of the backing plate under an even pressure over that of the pad",
+        measured=True,
     ),
     "model_size": Effect(("quarter", "half", "full")),
     "fingers": Effect(("one", "two")),
@@ -66,7 +72,8 @@ EFFECT_TABLE = {
     "friction_pressure_coupling": Effect(
         ("none", "tangential traction"),
         "share of the pressure sum that friction which acted back would add across it, of the finger where it is"
-        " larger",
+        " larger; on the coarse mesh where it is chosen by it",
+        measured=True,
     ),
 }
 EFFECTS = {name: effect.levels for name, effect in EFFECT_TABLE.items()}
@@ -77,12 +84,20 @@ REASONS = (
     "indicator below the target",
     "indicator above the target",
     "exact by symmetry",
-    "the default level of this version",
     "the object has no wall",
     "never skipped, because it costs next to nothing",
-    "left out, though the indicator is above the target",
     "e_n and quality do not depend on it",
+    "measured change of e_n below the target",
+    "measured change of e_n above the target",
+    "measured change of e_n not surely below the target",
+    "left out, though e_n may change by more than the target: thin walls cannot have it",
+    "left out, though e_n may change by more than the target: it was not solved",
 )
+MEASURED = {  # parts of an effect that the coarse mesh decides
+    "change": "Relative change of e_n (CCM) by the dearer of the two levels that were compared last, on the coarse"
+    " mesh; NaN where nothing was measured.",
+    "payload_change": "The same of the payload.",
+}
 
 
 @dataclass(frozen=True)
@@ -392,6 +407,7 @@ ROWS = (
             ("level", "Position in the list of levels, the cheapest first.", levels),
             ("indicator", INDICATORS.get(name, "None: this effect is not left to an indicator."), ()),
             ("reason", "Why this level was taken.", REASONS),
+            *((part, text, ()) for part, text in MEASURED.items() if EFFECT_TABLE[name].measured),
         )
     ),
     # contact patches

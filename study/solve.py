@@ -74,8 +74,8 @@ def press(
     --------
     >>> scene = Scene.load("jobs/smoke.toml", ["gripper.elements=[8, 4, 2]"])
     >>> case = press(scene, station=0.0, angle=0.0, force=1.0)
-    >>> round(case.limits["ccm"].F_N, 9), case.e_n == case.limits["ccm"].e_n
-    (1.0, True)
+    >>> case.e_n == case.limits["ccm"].e_n, case.result.effects["friction_pressure_coupling"].level
+    (True, 'tangential traction')
     """
     if force is None:
         raise TypeError("force is missing: give the normal force per finger in N")

@@ -24,19 +24,30 @@ from softjaw.fem.pad.mesh import Pad
 FloatArray = NDArray[np.float64]
 STICK = 100.0  # stiffness of stick in units of E / thickness; three times as much moves e_n by less than 0.1 %
 GROWTH, START = 1.5, 0.02  # of the force from step to step, and of the first force at the first step
+FEW = 2.0, 0.1  # the same where e_n need only be good to a third of what friction changes in it
+BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
+MOST_DAMPED = 0.125  # of a step of Newton's method
 
 
-def load_steps(reached: float, force: float) -> list[float]:
-    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
+def load_steps(reached: float, force: float, growth: float = 0.0, start: float = 0.0) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most ``growth`` times the last.
+
+    ``start`` is the share of the first force that is gone to first; 0 takes `GROWTH` and `START`.
 
     >>> load_steps(2.0, 4.0)
     [2.8284271247461903, 4.0]
     """
-    low = reached or START * force
+    growth, start = growth or GROWTH, start or START
+    low = reached or start * force
     # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
-    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
+    steps = max(1, math.ceil(math.log(force / low) / math.log(growth) - 1e-9))
     between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
     return [*([] if reached else [low]), *between, force]
+
+
+def few_load_steps(reached: float, force: float) -> list[float]:
+    """As `load_steps`, to find out what friction does rather than to have the result."""
+    return load_steps(reached, force, *FEW)
 
 
 class CoupledProblem(ContactProblem):
@@ -47,8 +58,15 @@ class CoupledProblem(ContactProblem):
     def __init__(self, pad: Pad, gap: Gap, mu: float) -> None:
         super().__init__(pad, gap)
         self.mu, self.stick = mu, STICK * self.kappa
-        self._at, self._before = np.zeros((*pad.face_area.shape, 3)), np.zeros((*pad.face_area.shape, 3))
-        self._closed = np.zeros(pad.face_area.shape, dtype=bool)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin another load path: nothing has touched yet."""
+        shape = self.pad.face_area.shape
+        self._at, self._before = np.zeros((*shape, 3)), np.zeros((*shape, 3))
+        self._closed = np.zeros(shape, dtype=bool)
+        # the last step of Newton's method and where it led to: nowhere yet
+        self._step, self._reached, self._damping = np.zeros(self.size), np.full(self.size, np.nan), 1.0
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
@@ -57,6 +75,7 @@ class CoupledProblem(ContactProblem):
         self._before = self._traction(x)[0]
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
+        self._reached = np.full(self.size, np.nan)
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""
@@ -72,14 +91,38 @@ class CoupledProblem(ContactProblem):
         super()._evaluate_entries(x)
         N, weight = self.pad.face_N, self.pad.face_area
         _, by_place, by_pressure = self._traction(x, derivatives=True)
-        self._K_uu -= np.einsum("fq,qa,qb,fqik->fiakb", weight, N, N, by_place, optimize=True)
+        # products of shape functions times what each point adds: two matrices, of which one is the same for all facets
+        (m, points), k = weight.shape, N.shape[1]
+        NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
+        K = (NN @ (weight[..., None, None] * by_place).reshape(m, points, 9)).reshape(m, k, k, 3, 3)
+        self._K_uu -= K.transpose(0, 3, 1, 4, 2)
         # slip grows with the pressure, which makes the tangent unsymmetric
         entries = self._parts()[2]
-        entries -= self.kappa * np.einsum("fq,qb,qa,fqi->fbia", weight, N, N, by_pressure, optimize=True).ravel()
+        by_node = (NN @ (weight[..., None] * by_pressure)).reshape(m, k, k, 3)
+        entries -= self.kappa * by_node.transpose(0, 2, 3, 1).ravel()
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """As that of the frictionless problem, but every accepted state changes the tangent."""
         return not first and super().keep(x, first)
+
+    def shorten(self, x: FloatArray, step: FloatArray) -> float:
+        """As that of the frictionless problem; steps that take most of the last one back are damped.
+
+        A point that slips to and fro beyond its place would make Newton's method alternate for ever, with the same
+        nodes in contact and the same points slipping.
+        """
+        factor = super().shorten(x, step)
+        moved = slice(0, self.pad.closing_dof + 1)
+        before, now = self._step[moved], step[moved]
+        if not np.array_equal(x, self._reached):  # another solve has begun
+            self._damping = 1.0
+        elif before @ now < -BACKWARDS * (before @ before):
+            self._damping = max(0.5 * self._damping, MOST_DAMPED)
+        else:
+            self._damping = min(2.0 * self._damping, 1.0)
+        factor = min(factor, self._damping)
+        self._step, self._reached = factor * step, x - factor * step
+        return factor
 
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """As that of the frictionless problem, with the friction forces of the points."""

@@ -180,6 +180,7 @@ class Press(LoadPath):
             At the first force without an acceptable state.
         """
         x, reached = None, 0.0
+        self.problem.forget()
         for force in forces:
             work, elapsed, below = Work(), self._stopwatch(), x
             self.solver.left = MOST_ITERATIONS

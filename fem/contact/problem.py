@@ -336,6 +336,9 @@ class ContactProblem(PressedPad):
         """Factor that keeps the change of closing displacement and the compression of every element within reason."""
         return self.foam.shorten(x, step, self.closing_step)
 
+    def forget(self) -> None:
+        """Begin another load path; without friction it does not matter."""
+
     def accept(self, x: FloatArray) -> None:
         """Note a state that the next one starts from; without friction the load path does not matter."""
 

@@ -19,10 +19,10 @@ from softjaw.scoring.graspit import linearised_contacts
 from softjaw.study.accuracy.parameters import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
+from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, soft, volume_in_pose
 from softjaw.study.case.probes import Probe, winkler_pad
-from softjaw.study.case.solving import solver
 from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +57,7 @@ def solved(probe: Probe) -> SolvedProbe:
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper) for pose in probe.unit.candidate.poses]
     start = time.process_time()
-    solving = solver(scene, fingers, probe.unit.candidate.poses)
+    solving = Candidate(scene, fingers, probe.unit.candidate.poses, probe.forces)
     try:
         contacts = [[c for c, *_ in outcome.contacts] for outcome in solving.load_path(probe.forces)]
     finally:

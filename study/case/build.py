@@ -221,7 +221,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 def forces_apart(scene: Scene) -> bool:
     """Whether every force is solved by itself, on a fine mesh that starts from a coarse one.
 
-    Not with friction that acts back: its state depends on the load path, which is that of the fine mesh.
+    Not with friction that acts back everywhere: its state depends on the load path, which is that of the fine mesh.
     """
     return scene.accuracy.meshes == 2 and scene.effects.friction_pressure_coupling != "tangential"
 

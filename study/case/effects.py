@@ -1,34 +1,41 @@
-"""Levels of every effect: what a case is simulated with, the indicator that says so, and the reason."""
+"""Effects: one table of what a case may be simulated with, and what a cheap indicator says of each.
+
+A row is an effect. Its steps lead from a level to the next dearer one. Below ``skip`` of a step's indicator the cheaper
+level is good to the target, above ``take`` the dearer one is surely needed; in between the coarse mesh decides, see
+`study.case.choosing`. Effects without steps are exact, or cost next to nothing: ``settled`` says so of a solved case.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from math import nan
-from typing import Any
+from math import inf, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softjaw.fem.materials import Material, material
-from softjaw.fem.pad.backing_plate import relative_compliance
-from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.friction.patch import FloatArray
-from softjaw.study.case.build import pad_shape
+from softjaw.study.case.model import plate_compliance
 from softjaw.study.case.result import surely_below
-from softjaw.study.quantities import EFFECTS, REASONS
-from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import Gripper
+from softjaw.study.quantities import E_N_TARGET, EFFECTS, REASONS
 
+if TYPE_CHECKING:
+    from softjaw.study.case.choosing import Candidate
+    from softjaw.study.scene import Scene
+
+(
+    ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, NOT_HERE, FAILED,
+) = range(len(REASONS))  # fmt: skip
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid plate put e_n off by at most 3.5 times the relative
-# compliance of the plate that it stood for (where a pad just reaches the middle of a waist); this keeps it below 1.8 %.
-STIFF_PLATE = 0.005
-GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
+# compliance of the plate that it stood for (where a pad just reaches the middle of a waist).
+STIFF_PLATE, SOFT_PLATE = E_N_TARGET / 3.5, 0.05
 # In 92 cases friction that acts back moved e_n by at most 0.5 times the traction that it adds, where that was below a
-# tenth of the pressure: this keeps it below 1.5 %; see docs/effects.md.
-SMALL_TRACTION = 0.03
-ONLY, FORCED, BELOW, ABOVE, SYMMETRY, DEFAULT, NO_WALL, CHEAP, LEFT_OUT, APART = range(len(REASONS))
-Level = tuple[str, float, int]  # level, indicator (NaN where it is not known) and reason, an index of REASONS
+# tenth of the pressure. No traction is so large that it surely moves e_n.
+SMALL_TRACTION = E_N_TARGET / 0.5
+# Indentation over closing displacement up to which the e_n of a rigid wall was good to 0.5 % (54 cases), and over its
+# thickness up to which that of a linear shell was good to 0.3 %. Above, nothing is measured: indentation and stress are
+# wanted, too, which a rigid wall has not and e_n does not tell.
+STIFF, SMALL_INDENTATION = 0.02, 0.6
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
@@ -38,57 +45,90 @@ SURFACES = {
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
-def pad_material(gripper: Gripper) -> Material:
-    """Foam of the pads."""
-    return material(
-        gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha
-    )
+class Level(NamedTuple):
+    """Level of an effect in one case, and why.
 
+    Attributes
+    ----------
+    level : str
+        Of those that `study.quantities.EFFECTS` lists.
+    indicator : float
+        NaN where it is not known.
+    reason : int
+        Index of `study.quantities.REASONS`.
+    change, payload_change : float
+        Relative change of e_n and of the payload by the dearer of the two levels that were compared last, on the coarse
+        mesh; NaN where nothing was measured.
+    """
 
-def backing_plate(gripper: Gripper) -> BackingPlate:
-    """Plate behind each pad."""
-    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
-
-
-def tilting_mount(gripper: Gripper) -> TiltingMount | None:
-    """Mount of each pad that lets it tilt, or None; its glue is stiff beside the foam."""
-    if gripper.tilt_stiffness_nm_per_rad is None:
-        return None
-    glue = GLUE * pad_material(gripper).young_modulus / gripper.pad_thickness
-    return TiltingMount(gripper.tilt_stiffness_nm_per_rad, glue)
+    level: str
+    indicator: float = nan
+    reason: int = ONLY
+    change: float = nan
+    payload_change: float = nan
 
 
 @dataclass(frozen=True)
-class BackingPlateLevel:
-    """Level of the backing plates of a scene; ``reason`` is an index of `study.quantities.REASONS`.
+class Simulated:
+    """A solved case: contacts of both fingers, their limit surfaces by friction model, and what solved it."""
 
-    ``compliance`` is the mean deflection of the plate under an even pressure over that of the pad.
+    scene: Scene
+    contacts: Sequence[Any]
+    fits: Sequence[Mapping[str, Any]]
+    planes: int
+    fingers_solved: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """From one level to the next dearer one.
+
+    Parameters
+    ----------
+    low, high : str
+        Levels by their names in a scene.
+    indicator : callable
+        Of a candidate at its ``k``-th force; NaN where it is not known.
+    skip, take : float
+        Indicator up to which the effect is surely skipped for a target of 1 % in e_n (the bound grows with the target),
+        and beyond which it is surely taken; 0 takes it wherever it is not skipped.
     """
 
-    elastic: bool
-    compliance: float
-    reason: int
+    low: str
+    high: str
+    indicator: Callable[[Candidate, int], float]
+    skip: float
+    take: float
 
 
-def backing_plate_level(scene: Scene) -> BackingPlateLevel:
-    """The level that the scene asks for, else the cheapest whose e_n is good to 2 %."""
-    compliance = _compliance(scene.gripper)
-    if scene.gripper.tilt_stiffness_nm_per_rad is not None:  # of a plate that is rigid itself
-        return BackingPlateLevel(False, compliance, FORCED)
-    if scene.effects.sheet != "auto":
-        return BackingPlateLevel(scene.effects.sheet == "elastic", compliance, FORCED)
-    if surely_below(compliance, STIFF_PLATE):
-        return BackingPlateLevel(False, compliance, BELOW)
-    return BackingPlateLevel(True, compliance, ABOVE)
+@dataclass(frozen=True)
+class Row:
+    """An effect.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+        From the cheapest level on.
+    each_force : bool
+        Whether every force has a level of its own; else all have that which the highest one needs.
+    possible : callable
+        Whether a candidate, with what is chosen of the effects before this one, can be simulated with it.
+    settled : callable, optional
+        Level of a solved case, for effects whose choice costs nothing.
+    """
+
+    steps: Sequence[Step] = ()
+    each_force: bool = False
+    possible: Callable[[Candidate], bool] = lambda candidate: True
+    settled: Callable[[Simulated], Level] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Levels by their names in a scene, the cheapest first."""
+        return (self.steps[0].low, *(step.high for step in self.steps)) if self.steps else ()
 
 
-@lru_cache(maxsize=8)
-def _compliance(gripper: Gripper) -> float:
-    shape, (n, m, _) = pad_shape(gripper), gripper.elements
-    halves = n % 2 == 0, m % 2 == 0
-    x, y = (tuple(map(float, shape.lines(axis, half))) for axis, half in enumerate(halves))
-    foam = shape.size[2] / pad_material(gripper).young_modulus
-    return relative_compliance(x, y, halves, backing_plate(gripper), foam)
+# --- indicators -------------------------------------------------------------------------------------------------------
 
 
 def neglected_traction(state: Any, mu: float) -> float:
@@ -107,32 +147,29 @@ def neglected_traction(state: Any, mu: float) -> float:
     return float(np.minimum(mu * load, stick).sum() / load.sum())
 
 
+def _traction(candidate: Candidate, k: int) -> float:
+    """`neglected_traction` on the coarse mesh, of the finger where it is larger."""
+    seen = candidate.seen(candidate.on_rigid, candidate.forces, k)
+    return nan if seen is None else max(neglected_traction(c.state, c.mu) for c in seen)
+
+
+def may_bend(scene: Scene) -> bool:
+    """Whether some candidates may be simulated with an elastic backing plate."""
+    if scene.gripper.tilt_stiffness_nm_per_rad is not None:  # of a plate that is rigid itself
+        return False
+    if scene.effects.sheet != "auto":
+        return scene.effects.sheet == "elastic"
+    bound = STIFF_PLATE * (scene.accuracy.e_n or E_N_TARGET) / E_N_TARGET
+    return not surely_below(plate_compliance(scene.gripper), bound)
+
+
 def dropped_share(wrench: FloatArray, rho: float) -> float:
     """Mean share of a wrench that its three components f_z, tau_x and tau_y make up, of ``wrench (m, 6)``."""
     w = wrench / [1, 1, 1, rho, rho, rho]
     return float((np.linalg.norm(w[:, 2:5], axis=1) / np.linalg.norm(w, axis=1)).mean())
 
 
-# --- one function for each effect, by its name in study.quantities ----------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """A solved case: contacts of both fingers, their limit surfaces by friction model, and what solved it."""
-
-    scene: Scene
-    contacts: Sequence[Any]
-    fits: Sequence[Mapping[str, Any]]
-    solver: Any
-
-
-def effects_of(case: Simulated) -> dict[str, Level]:
-    """Level, indicator and reason of every effect of one case, by the names of ``EFFECT_TABLE``.
-
-    Levels that change the solve are chosen before it, by `study.case.wall` and `backing_plate_level`; here they get
-    their names.
-    """
-    return {name: LEVELS[name](case) for name in EFFECTS}
+# --- effects that are exact, or free ----------------------------------------------------------------------------------
 
 
 def _forced(case: Simulated, name: str, otherwise: int) -> int:
@@ -140,65 +177,68 @@ def _forced(case: Simulated, name: str, otherwise: int) -> int:
     return otherwise if getattr(case.scene.effects, name) == "auto" else FORCED
 
 
-def _object(case: Simulated) -> Level:
-    """Compliance of the object: the cheapest level that its indicator allows."""
-    names, level = EFFECTS["object"], case.solver.level
-    if level is None:
-        return names[0], nan, NO_WALL
-    reason = FORCED if level.forced else BELOW if level.number < len(names) - 1 else ABOVE
-    return names[level.number], level.indicator, reason
-
-
-def _sheet(case: Simulated) -> Level:
-    level = backing_plate_level(case.scene)
-    return EFFECTS["sheet"][level.elastic], level.compliance, level.reason
-
-
 def _model_size(case: Simulated) -> Level:
-    return MODEL_SIZES[case.solver.planes], nan, _forced(case, "model_size", SYMMETRY)
+    return Level(MODEL_SIZES[case.planes], reason=_forced(case, "model_size", SYMMETRY))
 
 
 def _fingers(case: Simulated) -> Level:
     """One finger where a plane of symmetry lies between two that press on one wall."""
-    if case.solver.fingers_solved == 1:
-        return "one", nan, SYMMETRY
-    return "two", nan, _forced(case, "fingers", ONLY)
+    if case.fingers_solved == 1:
+        return Level("one", reason=SYMMETRY)
+    return Level("two", reason=_forced(case, "fingers", ONLY))
 
 
 def _friction(case: Simulated) -> Level:
     S, F_N = (sum(getattr(c.limits["ccm"], name) for c in case.contacts) for name in ("S", "F_N"))
-    return "ccm", 1.0 - F_N / S, _forced(case, "friction", CHEAP)
+    return Level("ccm", 1.0 - F_N / S, _forced(case, "friction", CHEAP))
 
 
 def _wrench(case: Simulated) -> Level:
     dropped = max(dropped_share(own["ccm"].wrench, own["ccm"].rho) for own in case.fits)
     wanted = case.scene.effects.wrench
-    return "3-D" if wanted == "auto" else wanted, dropped, _forced(case, "wrench", APART)
+    return Level("3-D" if wanted == "auto" else wanted, dropped, _forced(case, "wrench", APART))
 
 
 def _limit_surface(case: Simulated) -> Level:
     """An ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
     model = case.scene.limit_surface.model
     error = float(np.max([own["ccm"].fit_error.Erad for own in case.fits]))
-    return SURFACES[model], error, _forced(case, "limit_surface", CHEAP) if model == "quartic" else FORCED
+    return Level(SURFACES[model], error, _forced(case, "limit_surface", CHEAP) if model == "quartic" else FORCED)
 
 
-def _coupling(case: Simulated) -> Level:
-    """Only the scene can ask for friction that acts back; a thin wall, where it cannot yet, has no indicator."""
-    levels, wanted = EFFECTS["friction_pressure_coupling"], case.scene.effects.friction_pressure_coupling
-    walled = bool(case.solver.level and case.solver.level.number)
-    left_out = nan if walled else max(neglected_traction(c.state, case.scene.friction.mu) for c in case.contacts)
-    small = DEFAULT if walled else BELOW if surely_below(left_out, SMALL_TRACTION) else LEFT_OUT
-    return levels[wanted == "tangential"], left_out, _forced(case, "friction_pressure_coupling", small)
+# --- the table, in the order of choosing ------------------------------------------------------------------------------
 
-
-LEVELS: dict[str, Callable[[Simulated], Level]] = {
-    "object": _object,
-    "sheet": _sheet,
-    "model_size": _model_size,
-    "fingers": _fingers,
-    "friction": _friction,
-    "wrench": _wrench,
-    "limit_surface": _limit_surface,
-    "friction_pressure_coupling": _coupling,
+ROWS: dict[str, Row] = {
+    "sheet": Row((Step("rigid", "elastic", lambda c, _: c.plate_compliance, STIFF_PLATE, SOFT_PLATE),)),
+    "object": Row(
+        (
+            Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF, 0.0),
+            Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
+        ),
+        possible=lambda candidate: candidate.walled,
+    ),
+    "friction_pressure_coupling": Row(
+        (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
+        each_force=True,
+        possible=lambda candidate: candidate.rigid,
+    ),
+    "model_size": Row(settled=_model_size),
+    "fingers": Row(settled=_fingers),
+    "friction": Row(settled=_friction),
+    "wrench": Row(settled=_wrench),
+    "limit_surface": Row(settled=_limit_surface),
 }
+
+
+def level_named(effect: str, name: str) -> str:
+    """Level as `study.quantities` lists it, by its name in a scene.
+
+    >>> level_named("sheet", "elastic")
+    'elastic plate'
+    """
+    return EFFECTS[effect][ROWS[effect].names.index(name)]
+
+
+def settled(case: Simulated) -> dict[str, Level]:
+    """Levels of a solved case whose choice costs nothing."""
+    return {name: row.settled(case) for name, row in ROWS.items() if row.settled is not None}

@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
+from softjaw.fem.contact.friction_coupling import CoupledProblem, few_load_steps, load_steps
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
+from softjaw.fem.materials import Material, material
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
+from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.effects import backing_plate, backing_plate_level, pad_material, tilting_mount
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -27,7 +29,36 @@ FloatArray = NDArray[np.float64]
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
 BACK = 0.1  # of the pad's thickness: where it stands before it is brought to the smooth surface
 OFF = 1e-9  # gap at first touch [m]
+GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
+
+
+def pad_material(gripper: Gripper) -> Material:
+    """Foam of the pads."""
+    return material(gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha)
+
+
+def backing_plate(gripper: Gripper) -> BackingPlate:
+    """Plate behind each pad."""
+    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
+
+
+def tilting_mount(gripper: Gripper) -> TiltingMount | None:
+    """Mount of each pad that lets it tilt, or None; its glue is stiff beside the foam."""
+    if gripper.tilt_stiffness_nm_per_rad is None:
+        return None
+    glue = GLUE * pad_material(gripper).young_modulus / gripper.pad_thickness
+    return TiltingMount(gripper.tilt_stiffness_nm_per_rad, glue)
+
+
+@lru_cache(maxsize=8)
+def plate_compliance(gripper: Gripper) -> float:
+    """Mean deflection of the backing plate under an even pressure over that of the pad [-]."""
+    shape, (n, m, _) = pad_shape(gripper), gripper.elements
+    halves = n % 2 == 0, m % 2 == 0
+    x, y = (tuple(map(float, shape.lines(axis, half))) for axis, half in enumerate(halves))
+    foam = shape.size[2] / pad_material(gripper).young_modulus
+    return relative_compliance(x, y, halves, backing_plate(gripper), foam)
 
 
 @lru_cache(maxsize=8)
@@ -149,8 +180,8 @@ def settings(scene: Scene) -> Settings:
 
 
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
-    """Pad on its backing plate; ``rule`` collocates the gaps."""
-    return pad(scene.gripper, symmetry, rule, coarser, backing_plate_level(scene).elastic)
+    """Pad on its backing plate, which is rigid unless the scene says that it is elastic; ``rule`` collocates gaps."""
+    return pad(scene.gripper, symmetry, rule, coarser, scene.effects.sheet == "elastic")
 
 
 def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
@@ -162,13 +193,16 @@ def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 
 
-def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
-    """Pad on its object, with friction where the scene wants it to act back."""
+def press_of(scene: Scene, finger: Finger, coarser: bool, hasty: bool = False) -> Press:
+    """Pad on its object, with friction where the scene wants it to act back; ``hasty`` is in few load steps."""
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
-        return Press(wanted, finger.gap, dict(scene.petsc), (), settings(scene), problem, load_steps, Stepping)
+        steps = few_load_steps if hasty else load_steps
+        # what is measured only is not compared with other gaps, which would change e_n, too
+        instead = () if hasty else others
+        return Press(wanted, finger.gap, dict(scene.petsc), instead, settings(scene), problem, steps, Stepping)
     return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene))
 
 

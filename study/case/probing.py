@@ -13,9 +13,9 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object, own_frame
+from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.evaluate import FACING, lengths, quality, settings_of, volume_in_pose
 from softjaw.study.case.result import TimeLimitError
-from softjaw.study.case.solving import solver
 from softjaw.study.case.variations import Variation, moved_poses, variations
 from softjaw.study.messages import StudyError
 from softjaw.study.scene import Scene
@@ -75,7 +75,7 @@ def _path(unit: Any, variation: Variation) -> Generator[tuple[float, float], Non
     poses = moved_poses(unit.candidate.poses, variation.shift, variation.turn)
     obj = build_object(scene.object)
     fingers = [model.approach(obj, pose, scene.gripper) for pose in poses]
-    solving, settings = solver(scene, fingers, poses), settings_of(scene, obj)
+    solving, settings = Candidate(scene, fingers, poses), settings_of(scene, obj)
     try:
         for outcome in solving.load_path(scene.load.normal_force):
             contacts = [c for c, *_ in outcome.contacts]

@@ -16,7 +16,6 @@ import numpy as np
 from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, half_turned, mirrored
 from softjaw.fem.contact.press import Press, Pressed
-from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
@@ -26,7 +25,7 @@ from softjaw.study.case.build import forces_apart, pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
-from softjaw.study.case.wall import LINEAR, RIGID, WallLevel, choose_level, thin_body, wall_values
+from softjaw.study.case.wall import thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -145,18 +144,24 @@ class Solved:
     note: str = ""
 
 
-def solver(scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> Solver:
-    """Solver for both fingers at first touch, at the level of the object's compliance that the candidate calls for."""
-    if getattr(scene.object, "wall", None) is None:
-        return OnRigid(scene, fingers, poses, None)
-    _refuse_along_axis(fingers)
-    held = _grasp(scene, fingers, False)
-    pad = pad_of(scene, held.pad_symmetry, contact_rules(scene, walled=True)[0], False)
-    closing = SpringBed(pad, fingers[0].gap).closing(scene.load.normal_force[-1])
-    level = choose_level(scene, held, closing)
-    if level.number == RIGID:
-        return OnRigid(scene, fingers, poses, level)
-    return OnWall(scene, fingers, level)
+def solver(
+    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False,
+    hasty: bool = False,
+) -> Solver:  # fmt: skip
+    """Solver for both fingers at first touch at the levels that the scene names; an ``auto`` is the cheapest one.
+
+    Parameters
+    ----------
+    coarse : Solver, optional
+        Of the same candidate on the coarser mesh.
+    coarser, hasty : bool
+        Whether this is that one, and whether friction that acts back takes few load steps.
+    """
+    if getattr(scene.object, "wall", None) is not None:
+        refuse_along_axis(fingers)
+        if scene.effects.object.endswith("shell"):
+            return OnWall(scene, fingers, coarse, coarser)
+    return OnRigid(scene, fingers, coarse, coarser, poses, hasty)
 
 
 def followed(
@@ -177,70 +182,114 @@ def followed(
 
 
 class Solver(ABC):
-    """Follows the load path of one candidate on every mesh, or solves each force by itself on the fine one.
+    """Follows the load path of one candidate, or solves each force by itself from the states of a coarser mesh.
 
     Parameters
     ----------
     scene : Scene
     fingers : list of Finger
-    level : WallLevel, optional
-        Of the object's compliance; None for an object without a wall.
+    coarse : Solver, optional
+        Of the same candidate on the coarser mesh, which tells the error of the mesh.
 
     Attributes
     ----------
     apart : bool
         Whether its forces are independent of each other.
     paths : list
-        Of what is pressed by itself, the load path on each mesh, the finest first.
+        Load paths of what is pressed by itself.
     fingers_solved, planes : int
         Fingers that are solved, and planes of symmetry of each.
     """
 
-    paths: list[list[Any]]
+    paths: list[Any]
     fingers_solved: int
     planes: int
 
-    def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel | None) -> None:
-        self.scene, self.fingers, self.level, self.apart = scene, fingers, level, forces_apart(scene)
-        self.meshes = (False, True)[: scene.accuracy.meshes]
+    def __init__(self, scene: Scene, fingers: list[Finger], coarse: Solver | None) -> None:
+        self.scene, self.fingers, self.coarse = scene, fingers, coarse
+        self.apart = coarse is not None and forces_apart(scene)
+        self._followed: dict[tuple[float, ...], list[_Followed]] = {}
+        self._seen: dict[tuple[tuple[float, ...], int], list[PressedContact]] = {}
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
         """Contacts at ascending forces; ends with ``ConvergenceError`` or ``CheckError`` where there are none."""
-        if self.apart:
-            for _, outcome in self.levels(forces, range(len(forces))):
-                if not isinstance(outcome, Solved):
-                    raise outcome
-                yield outcome
-        else:
-            paths = (zip(*(p.load_path(forces) for p in own), strict=True) for own in self.paths)
-            yield from map(self._solved, zip(*paths, strict=True))
+        for _, outcome in self.levels(forces, range(len(forces))):
+            if not isinstance(outcome, Solved):
+                raise outcome
+            yield outcome
 
     def levels(
         self, forces: Sequence[float], wanted: Iterable[int]
     ) -> Iterator[tuple[int, Solved | ConvergenceError | CheckError]]:
-        """Of the wanted forces each by itself, from the coarser mesh, which follows the load path: contacts or failure.
+        """Contacts or failure at the wanted forces, rising.
 
         Not a bit of one depends on which others are wanted.
         """
-        paths = [_CoarsePath(coarse, forces) for _, coarse in self.paths]
         for k in wanted:
             try:
-                yield k, self._level(forces[k], k, paths)
+                yield k, self.level(forces, k)
             except (ConvergenceError, CheckError) as error:
                 yield k, error
 
-    def _level(self, force: float, k: int, paths: Sequence[_CoarsePath]) -> Solved:
-        """Contacts at the ``k``-th force [N] from the coarser mesh's states."""
-        coarse = [path.state(k) for path in paths]
-        fine = [own[0].at(force, path.starts(k)) for own, path in zip(self.paths, paths, strict=True)]
+    def level(self, forces: Sequence[float], k: int) -> Solved:
+        """Contacts at the ``k``-th force.
+
+        From the coarser mesh's states where the forces are apart, else on the load path through the forces below it.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If there is no acceptable state.
+        """
+        if self.coarse is None:
+            return self._solved(self._states(forces, k))
+        paths = self.coarse.followed(forces)
+        if self.apart:
+            fine = [own.at(forces[k], path.starts(k)) for own, path in zip(self.paths, paths, strict=True)]
+        else:
+            fine = self._states(forces, k)
         # an error can be told only where all have a coarser state
-        if lacking := [path.ended for path, state in zip(paths, coarse, strict=True) if state is None]:
-            return replace(self._solved([(state,) for state in fine]), note=NO_ERROR.format(reason=lacking[0]))
-        return self._solved(list(zip(fine, coarse, strict=True)))
+        if lacking := [path.ended for path in paths if path.state(k) is None]:
+            return replace(self._solved(fine), note=NO_ERROR.format(reason=lacking[0]))
+        return self._solved(fine, [path.state(k) for path in paths], self.coarse.seen(forces, k))
+
+    def followed(self, forces: Sequence[float]) -> list[_Followed]:
+        """Load paths through these forces, of which no state is solved twice."""
+        key = tuple(forces)
+        if key not in self._followed:
+            self._followed[key] = [_Followed(path, forces) for path in self.paths]
+        return self._followed[key]
+
+    def seen(self, forces: Sequence[float], k: int) -> list[PressedContact] | None:
+        """Contacts of both fingers at the ``k``-th force of the load path; None where it has no state."""
+        states = [path.state(k) for path in self.followed(forces)]
+        if any(state is None for state in states):
+            return None
+        key = tuple(forces), k
+        if key not in self._seen:  # frames and limits take longer than to keep them
+            self._seen[key] = self.contacts(states)
+        return self._seen[key]
+
+    def _states(self, forces: Sequence[float], k: int) -> list[Any]:
+        """States at the ``k``-th force of the load path."""
+        found = [(path.state(k), path) for path in self.followed(forces)]
+        for state, path in found:
+            if state is None:
+                raise path.error(k)
+        return [state for state, _ in found]
+
+    def _solved(
+        self, fine: Sequence[Any], coarse: Sequence[Any] = (), seen: list[PressedContact] | None = None
+    ) -> Solved:
+        """Contacts of both fingers on each mesh from the states of what is pressed by itself; ``seen``: coarse ones."""
+        each = [self.contacts(fine), *([] if seen is None else [seen])]
+        states = [*fine, *coarse]
+        spent = [own.fingers[0] if isinstance(own, Gripped) else own for own in states]
+        return Solved([list(c) for c in zip(*each, strict=True)], spent, [s for s in states if isinstance(s, Gripped)])
 
     @abstractmethod
-    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
-        """Contacts of both fingers from the states of what is pressed by itself, on each mesh."""
+    def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
+        """Contacts of both fingers from the states of what is pressed by itself."""
 
     def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
         """What the wall bears at one force on a mesh, keyed as in ``study.quantities``; a rigid object has none."""
@@ -248,45 +297,55 @@ class Solver(ABC):
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
-        for path in (p for own in self.paths for p in own):
+        for path in self.paths:
             path.destroy()
+        if self.coarse is not None:
+            self.coarse.destroy()
 
 
 class OnRigid(Solver):
     """Fingers on a rigid object do not feel each other."""
 
-    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], level: WallLevel | None) -> None:
-        super().__init__(scene, fingers, level)
+    def __init__(
+        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any],
+        hasty: bool,
+    ) -> None:  # fmt: skip
+        super().__init__(scene, fingers, coarse)
         one, other = poses
         self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
         solved = fingers[:1] if self.shared else fingers
-        self.paths = [[press_of(scene, f, coarser) for coarser in self.meshes] for f in solved]
-        self.fingers_solved, self.planes = 2, min(sum(own[0].pad.symmetry) for own in self.paths)
+        self.paths = [press_of(scene, f, coarser, hasty) for f in solved]
+        self.fingers_solved, self.planes = 2, min(sum(own.pad.symmetry) for own in self.paths)
 
-    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
+    def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
         """See `Solver`."""
         # Of two fingers that are images only the first has states, so the lengths differ.
-        pairs = zip(self.fingers, states, strict=False)
-        contacts = [[PressedContact(self.scene, f, state) for state in own] for f, own in pairs]
-        if self.shared:  # an image finger has its partner's states; only its place differs
-            contacts.append([c.of(self.fingers[1]) for c in contacts[0]])
-        return Solved(contacts, [s for own in states for s in own], [])
+        found = [PressedContact(self.scene, f, state) for f, state in zip(self.fingers, states, strict=False)]
+        # an image finger has its partner's states; only its place differs
+        return [*found, found[0].of(self.fingers[1])] if self.shared else found
 
 
-class _CoarsePath:
-    """States on the coarser mesh, from the lowest force upward, as far as they are asked for."""
+class _Followed:
+    """States on a load path, from the lowest force upward, as far as they are asked for."""
 
     def __init__(self, press: Press | Grip, forces: Sequence[float]) -> None:
         self._path, self._states = followed(press.load_path, forces), list[Any]()
+        self._errors: dict[int, Exception] = {}
         self.ended = ""  # why there are no more
 
     def state(self, k: int) -> Pressed | Gripped | None:
         """State at the ``k``-th force; None where the path ends before."""
         while len(self._states) <= k and (found := next(self._path, None)) is not None:
             ends = isinstance(found, Exception)
+            if isinstance(found, Exception):
+                self._errors[len(self._states)] = found
             self._states.append(None if ends else found)
             self.ended = str(found) if ends else self.ended
         return self._states[k] if k < len(self._states) else None
+
+    def error(self, k: int) -> Exception:
+        """Why there is no state at the ``k``-th force."""
+        return self._errors[max(i for i in self._errors if i <= k)]
 
     def starts(self, k: int) -> list[Any]:
         """What the fine mesh starts from at the ``k``-th force: the states there and below, the nearest first."""
@@ -296,28 +355,17 @@ class _CoarsePath:
 class OnWall(Solver):
     """Fingers on a thin wall press against each other through it."""
 
-    def __init__(self, scene: Scene, fingers: list[Finger], level: WallLevel) -> None:
-        super().__init__(scene, fingers, level)
-        self.held = [_grasp(scene, fingers, coarser) for coarser in self.meshes]
-        grips = [_grip(scene, fingers, *own, level) for own in zip(self.held, self.meshes, strict=True)]
-        self.paths = [grips]
-        self.shells = [grip.problem.model.shell for grip in grips]
-        self.fingers_solved, self.planes = len(self.held[0].poses), sum(self.held[0].mirrors)
+    def __init__(self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool) -> None:
+        super().__init__(scene, fingers, coarse)
+        self.held = grasp_of(scene, fingers, coarser)
+        grip = _grip(scene, fingers, self.held, coarser)
+        self.paths, self.shell = [grip], grip.problem.model.shell
+        self.fingers_solved, self.planes = len(self.held.poses), sum(self.held.mirrors)
 
-    def _solved(self, states: Sequence[Sequence[Any]]) -> Solved:
+    def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
         """See `Solver`."""
-        [own] = states
-        # the coarser mesh may have no state
-        each = [self._contacts(held, state) for held, state in zip(self.held, own, strict=False)]
-        return Solved([list(c) for c in zip(*each, strict=True)], [state.fingers[0] for state in own], list(own))
-
-    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
-        """See `Solver`."""
-        return wall_values(self.scene, self.held[mesh], solved.grips[mesh], self.shells[mesh])
-
-    def _contacts(self, held: Grasp, state: Gripped) -> list[PressedContact]:
-        """Contacts of both fingers in their own frames."""
-        contacts = [
+        [state], held = states, self.held
+        found = [
             PressedContact(self.scene, f, own, half_turned if turned else None)
             for f, own, turned in zip(self.fingers, state.fingers, held.flipped, strict=False)
         ]
@@ -327,11 +375,17 @@ class OnWall(Solver):
             def image(patch: ContactPatch) -> ContactPatch:
                 return mirrored(own.pad, half_turned(patch) if held.flipped[0] else patch)
 
-            contacts.append(PressedContact(self.scene, self.fingers[1], own, image))
-        return contacts
+            found.append(PressedContact(self.scene, self.fingers[1], own, image))
+        return found
+
+    def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
+        """See `Solver`."""
+        own = self.coarse if mesh else self
+        assert isinstance(own, OnWall)
+        return wall_values(self.scene, own.held, solved.grips[mesh], own.shell)
 
 
-def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
+def refuse_along_axis(fingers: Sequence[Finger]) -> None:
     """Lids, bottoms and rims of a thin-walled object are not pressed."""
     steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
     if steepest > np.sin(STEEPEST):
@@ -342,7 +396,7 @@ def _refuse_along_axis(fingers: Sequence[Finger]) -> None:
         )
 
 
-def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
+def grasp_of(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     """Grasp frame and the planes of symmetry that meshes and scene allow."""
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
     wanted = scene.effects.model_size
@@ -361,11 +415,11 @@ def _grasp(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     return held
 
 
-def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool, level: WallLevel) -> Grip:
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size
-    body, linear = thin_body(scene.object), level.number == LINEAR
+    body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
     wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
     def problem(rule: str) -> GripProblem:

@@ -52,10 +52,10 @@ def by_formula(scene: Scene) -> tuple[str, ...]:
     mu. A pad on a rigid object and a rigid sheet is in a state that depends only on the force over its modulus, so a
     stiffer pad is a smaller force.
     """
-    from softjaw.study.case.effects import backing_plate_level  # loads PETSc, and most scenes ask for no uncertainty
+    from softjaw.study.case.effects import may_bend  # loads PETSc, and most scenes ask for no uncertainty
 
     wall = has_wall(scene.object) and scene.effects.object != "rigid"
-    alike = not wall and not backing_plate_level(scene).elastic and len(scene.load.normal_force) > 1
+    alike = not wall and not may_bend(scene) and len(scene.load.normal_force) > 1
     holds = {
         "mesh": scene.accuracy.meshes == 2,
         "mu": scene.effects.friction_pressure_coupling != "tangential",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -23,10 +22,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
-RIGID, LINEAR, NONLINEAR = range(3)  # levels of the effect "object", as study.quantities lists them
-STIFF = 0.02  # indentation over closing below which a wall is as good as rigid: e_n then changes by less than 0.1 %
 DEEP = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
-SMALL_INDENTATION = 0.6  # of the wall's thickness, up to which the linear shell's pressure is good to 1 %
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
@@ -48,38 +44,12 @@ def thin_body(shape: Walled) -> ThinWalled:
     )
 
 
-@dataclass(frozen=True)
-class WallLevel:
-    """How the object's compliance is simulated.
+def estimated_indentation(
+    body: ThinWalled, held: Grasp, scene: Scene, closing: float, force: float
+) -> tuple[float, float]:
+    """Indentation of the linear wall at a force [N], where undeformed pads would overlap it [m], and ratio.
 
-    ``indicator`` is the indentation that a linear wall would get at the largest force, over the wall's thickness;
-    ``share`` that indentation over the closing displacement of the pads on the rigid object.
-    """
-
-    number: int
-    indicator: float
-    share: float
-    forced: bool
-
-
-def choose_level(scene: Scene, held: Grasp, closing: float) -> WallLevel:
-    """WallLevel of one candidate, for all its forces: the cheapest whose error in e_n is below about 1 %.
-
-    ``closing`` is that of the pads on the rigid object at the largest force [m].
-    """
-    names = {"rigid": RIGID, "linear_shell": LINEAR, "nonlinear_shell": NONLINEAR}
-    body = thin_body(scene.object)
-    indentation, ratio = estimated_indentation(body, held, scene, closing)
-    if scene.effects.object != "auto":
-        return WallLevel(names[scene.effects.object], ratio, indentation / closing, forced=True)
-    # What is undecided takes the costlier level, which is right in both cases.
-    soft = NONLINEAR if not surely_below(ratio, SMALL_INDENTATION) else LINEAR
-    number = RIGID if surely_below(indentation, STIFF * closing) else soft
-    return WallLevel(number, ratio, indentation / closing, forced=False)
-
-
-def estimated_indentation(body: ThinWalled, held: Grasp, scene: Scene, closing: float) -> tuple[float, float]:
-    """Indentation of the linear wall at the largest force, where undeformed pads would overlap it [m], and ratio.
+    ``closing`` is that of the pads on the rigid object [m].
 
     The second is the largest ratio of an inward displacement to the wall's thickness there. One right-hand side with
     factors that all candidates share.
@@ -100,8 +70,8 @@ def estimated_indentation(body: ThinWalled, held: Grasp, scene: Scene, closing: 
         if not depth.sum() > 0:
             raise CheckError("a pad stands beside the wall of the object: move the candidate onto its wall")
         # Of a pad that a plane of symmetry cuts in half only half of the force counts.
-        force = scene.load.normal_force[-1] * (0.5 if held.mirrors[1] else 1.0)
-        load[:, :3] += (force * depth / depth.sum())[:, None] * pose.rotation[:, 2]
+        part = force * (0.5 if held.mirrors[1] else 1.0)
+        load[:, :3] += (part * depth / depth.sum())[:, None] * pose.rotation[:, 2]
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
     q = linear.solve(load.ravel()).reshape(-1, 6)

@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import EFFECTS, FIRST, MODELS
+from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, FIRST, MEASURED, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING, MESSAGE, STATE, SUMS
 from softjaw.study.result.guarded import GuardedFile
@@ -206,9 +206,11 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
             given.update({f"{q.key}/{model}": value for model, value in zip(MODELS, values, strict=True)})
     if layout.patches and result.patch is not None:
         given.update({f"patch/{name}": value for name, value in result.patch.items()})
-    for name, (level, indicator, reason) in result.effects.items():
+    for name, (level, indicator, reason, *changes) in result.effects.items():
         index = EFFECTS.get(name, ()).index(level) if isinstance(level, str) else level
         parts = {"level": index, "indicator": indicator, "reason": reason}
+        if EFFECT_TABLE[name].measured:
+            parts |= dict(zip(MEASURED, changes, strict=False))
         given.update({f"effects/{name}_{part}": value for part, value in parts.items()})
     return given
 

@@ -278,7 +278,7 @@ class Effects(SceneSection):
         "auto", description="form of the limit surface; auto is that of [limit_surface]"
     )
     friction_pressure_coupling: Literal["auto", "none", "tangential"] = Field(
-        "auto", description="whether friction acts back on the contact pressure; auto is none, as in the paper"
+        "auto", description="whether friction acts back on the contact pressure; auto: where it moves e_n"
     )
     wrench: Literal["auto", "3-D", "6-D"] = Field(
         "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"

@@ -208,6 +208,7 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     study = (
         "sweep.object.radius_mm=[5, 30]", 'effects.model_size="quarter"', "candidates.stations_mm=[0, 3]",
         "load.normal_force_n=[2, 20, 30]", "gripper.elements=[8, 4, 2]", "accuracy.meshes=1",
+        'effects.friction_pressure_coupling="none"',
     )  # fmt: skip
     code, output, errors = once(run, 2, folder, *[word for value in study for word in ("--set", value)])
     assert code == 6, errors

@@ -3,29 +3,45 @@
 import numpy as np
 import pytest
 
-from softjaw.study.quantities import REASONS
+from softjaw.study.case.effects import FORCED, LITTLE, MUCH, UNDECIDED
 from tests.study.test_pipeline import OVAL, cases, e_n, solved
 
+NAME = "friction_pressure_coupling"
+FREE = 'effects.friction_pressure_coupling="none"'
+AUTO = 'effects.friction_pressure_coupling="auto"'
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
+
+
+def levels(*overrides):
+    """Level and reason in every case."""
+    found = [result.effects[NAME] for _, path in solved(OVAL, *overrides) for result in path]
+    return [(own.level, own.reason) for own in found]
 
 
 def test_levels_and_what_they_change():
     """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
-    found = {result.effects["friction_pressure_coupling"][::2] for _, path in solved(OVAL) for result in path}
-    assert {(level, REASONS[reason]) for level, reason in found} == {
-        ("none", "left out, though the indicator is above the target")
-    }
-    found = {result.effects["friction_pressure_coupling"][::2] for _, own in solved(OVAL, COUPLED) for result in own}
-    assert {(level, REASONS[reason]) for level, reason in found} == {("tangential traction", "forced by the scene")}
-    off = e_n(OVAL, COUPLED) / e_n(OVAL) - 1.0
+    assert set(levels(FREE)) == {("none", FORCED)}
+    assert set(levels(COUPLED)) == {("tangential traction", FORCED)}
+    off = e_n(OVAL, COUPLED) / e_n(OVAL, FREE) - 1.0
     assert (np.abs(off) < 0.05).all()
     assert (np.abs(off) > 1e-3).all()
-    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL), strict=True):
+    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL, FREE), strict=True):
         assert one["maps/closing"] < other["maps/closing"]
         assert one["work/load_steps"][0] > other["work/load_steps"][0]
     smooth = ("friction.mu=0", COUPLED)
-    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0",))]
+    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0", FREE))]
     np.testing.assert_allclose(*closing, rtol=1e-9)
+
+
+def test_what_auto_takes_or_leaves_is_what_the_scene_could_ask_for():
+    """Bit by bit, at every force by itself; which cases take it follows from the measured change."""
+    auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (FREE,)))
+    found = [result.effects[NAME] for _, path in solved(OVAL, AUTO) for result in path]
+    with_it = np.array([own.level == "tangential traction" for own in found]).reshape(auto.shape)
+    np.testing.assert_array_equal(auto, np.where(with_it, taken, free))
+    for own, true in zip(found, (taken / free - 1.0).ravel(), strict=True):
+        assert own.reason in (LITTLE, MUCH, UNDECIDED)
+        assert own.change == pytest.approx(true, abs=0.01)
 
 
 @pytest.mark.long

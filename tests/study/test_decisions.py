@@ -141,26 +141,17 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
-    from softjaw.study.case import effects, wall
-    from softjaw.study.scene import parse_scene
+    """On the bound below which nothing is measured it is measured; on the target it is taken."""
+    from softjaw.study.case.choosing import Candidate
+    from softjaw.study.case.effects import ROWS, STIFF_PLATE
 
-    scene = parse_scene(SPHERE)
-    on = 1.0 + ulp
-    assert not effects.surely_below(on, 1.0)
-    monkeypatch.setattr(effects, "_compliance", lambda gripper: effects.STIFF_PLATE * on)
-    assert effects.backing_plate_level(scene).elastic
-    monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: effects.SMALL_TRACTION * on)
-    case = effects.Simulated(scene, [SimpleNamespace(state=None)], [], SimpleNamespace(level=None))
-    reason = effects.LEVELS["friction_pressure_coupling"](case)[2]
-    assert effects.REASONS[reason].startswith("left out")
-    monkeypatch.setattr(wall, "thin_body", lambda shape: None)
-    for indentation, ratio, level in (
-        (wall.STIFF * on, 0.1, wall.LINEAR),
-        (1.0, wall.SMALL_INDENTATION * on, wall.NONLINEAR),
-        (0.5 * wall.STIFF, 0.1, wall.RIGID),
-    ):
-        monkeypatch.setattr(wall, "estimated_indentation", lambda *_, found=(indentation, ratio): found)
-        assert wall.choose_level(scene, None, 1.0).number == level
+    on, row = 1.0 + ulp, ROWS["sheet"]
+    candidate = Candidate.__new__(Candidate)
+    candidate.target, candidate.forces, candidate.walled = 0.01, (1.0,), False
+    monkeypatch.setattr(Candidate, "plate_compliance", STIFF_PLATE * on)
+    for change, level in ((0.01 * on, "elastic plate"), (0.0099, "rigid")):
+        candidate._changes = {("sheet", "elastic", 0): (change, 0.0)}
+        assert candidate._step("sheet", row, row.steps[0], 0).level == level
 
 
 # --- flags ------------------------------------------------------------------------------------------------------------

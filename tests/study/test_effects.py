@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from softjaw.study import pipeline
-from softjaw.study.case import model
+from softjaw.study.case import choosing, effects, model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
-from softjaw.study.case.effects import LEVELS, Simulated, neglected_traction
+from softjaw.study.case.choosing import Candidate
+from softjaw.study.case.effects import ROWS, neglected_traction
 from softjaw.study.case.result import CaseFailure
+from softjaw.study.flags import Flag
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.test_pipeline import OVAL, PLATE, cases, solved
@@ -47,19 +49,63 @@ def test_neglected_traction_is_that_of_sheared_columns_until_they_slide():
     assert neglected_traction(pressed(np.array([0.0, 0.0, 3e-3]), 5e3), 0.8) == 0.0
 
 
-@pytest.mark.parametrize(("moved", "overrides", "walled", "level", "reason"), [
-    (1e-6, (), False, "none", "indicator below the target"),
-    (1e-3, (), False, "none", "left out, though the indicator is above the target"),
-    (1e-3, (COUPLED,), False, "tangential traction", "forced by the scene"),
-    (1e-3, (), True, "none", "the default level of this version"),
+FREE, TAKEN = "none", "tangential traction"
+
+
+def choice(indicator, changes, target=0.01, possible=True, payload=0.0):
+    """Levels of one effect at as many forces as there are changes, with bounds of 0.02 and 0.5 for a target of 1 %."""
+    step = effects.Step("none", "tangential", lambda c, k: indicator, 0.02, 0.5)
+    row = effects.Row((step,), each_force=True, possible=lambda c: possible)
+    candidate = Candidate.__new__(Candidate)
+    candidate.target, candidate.forces = target, tuple(range(1, len(changes) + 1))
+    name = "friction_pressure_coupling"
+    candidate._changes = {(name, "tangential", k): (change, payload) for k, change in enumerate(changes)}
+    return [candidate._at(name, row, k) for k in range(len(changes))]
+
+
+@pytest.mark.parametrize(("indicator", "change", "settings", "level", "reason"), [
+    (0.019, 0.5, {}, FREE, effects.BELOW),  # surely skipped: nothing is measured
+    (0.038, 0.5, {"target": 0.02}, FREE, effects.BELOW),  # the bound grows with the target
+    (0.51, 0.0, {}, TAKEN, effects.ABOVE),
+    (0.1, -0.009, {}, FREE, effects.LITTLE),
+    (0.1, -0.011, {}, TAKEN, effects.MUCH),
+    (0.1, 0.01, {}, TAKEN, effects.UNDECIDED),
+    (0.1, np.nan, {}, TAKEN, effects.UNDECIDED),  # no state on the coarse mesh
+    (0.1, 0.004, {"payload": -0.07}, TAKEN, effects.UNDECIDED),
+    (0.1, 0.011, {"possible": False}, FREE, effects.NOT_HERE),
+    (np.nan, 0.001, {}, FREE, effects.LITTLE),
 ])  # fmt: skip
-def test_friction_that_does_not_act_back_is_told_where_it_matters(moved, overrides, walled, level, reason):
-    contacts = [SimpleNamespace(state=pressed(np.array([d, 0.0, 0.0]), 2e3)) for d in (0.0, moved)]
-    solver = SimpleNamespace(level=SimpleNamespace(number=int(walled)))
-    case = Simulated(scene_of(*overrides), contacts, [], solver)
-    found, indicator, why = LEVELS["friction_pressure_coupling"](case)
-    assert (found, REASONS[why]) == (level, reason)
-    assert np.isnan(indicator) if walled else indicator == neglected_traction(contacts[1].state, 0.8)
+def test_an_effect_is_skipped_taken_or_measured(indicator, change, settings, level, reason):
+    [found] = choice(indicator, [change], **settings)
+    assert found[0] == level
+    assert found.reason == reason
+    measured = reason not in (effects.BELOW, effects.ABOVE)
+    np.testing.assert_equal(found.change, change if measured else np.nan)
+
+
+def test_a_change_that_passes_through_zero_between_two_forces_is_not_believed():
+    """As measured at 175 mm of the bottle: 8 %, -0.4 % and -29 %, where the fine mesh has -18 % in the middle."""
+    assert [own.reason for own in choice(0.1, [0.077, -0.0042, -0.292])] == [
+        effects.MUCH, effects.UNDECIDED, effects.MUCH,
+    ]  # fmt: skip
+    assert [own.reason for own in choice(0.1, [0.0042, 0.005, 0.006])] == [effects.LITTLE] * 3
+
+
+def test_every_effect_is_a_row_with_steps_or_settled():
+    assert ROWS.keys() == EFFECTS.keys()
+    for name, row in ROWS.items():
+        assert bool(row.steps) != (row.settled is not None)
+        assert not row.steps or len(row.names) == len(EFFECTS[name])
+        # a step begins where the one before it ends
+        assert all(one.high == two.low for one, two in zip(row.steps, row.steps[1:], strict=False))
+
+
+def test_a_flag_tells_what_is_left_out():
+    candidate = Candidate.__new__(Candidate)
+    level = choice(0.1, [0.02])[0]
+    for reason, flagged in ((effects.MUCH, False), (effects.NOT_HERE, True), (effects.FAILED, True)):
+        candidate.levels = {"friction_pressure_coupling": [level._replace(reason=reason)]}
+        assert bool(candidate.flags_at(0) & Flag.LEFT_OUT) == flagged
 
 
 def test_reasons_of_levels_that_no_target_chooses():
@@ -126,30 +172,16 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
         assert min(row[2] for row in own) <= job.PANELS[effect][0]
 
 
-CHOOSING = {
-    "softjaw.study.case.solving": ("choose_level",),
-    "softjaw.study.pipeline": ("effects_of",),
-}
-
-
 def cpu_share_of_choosing(file, overrides, monkeypatch):
-    """CPU time of everything that chooses or evaluates levels, over that of the candidates as a whole."""
-    spent = []
+    """CPU time of choosing levels over that of the candidates as a whole."""
+    spent, made = [], Candidate.__init__
 
-    def timed(work):
-        def measured(*arguments):
-            start = time.process_time()
-            try:
-                return work(*arguments)
-            finally:
-                spent.append(time.process_time() - start)
+    def measured(*arguments):
+        start = time.process_time()
+        made(*arguments)
+        spent.append(time.process_time() - start)
 
-        return measured
-
-    for module, names in CHOOSING.items():
-        owner = importlib.import_module(module)
-        for name in names:
-            monkeypatch.setattr(owner, name, timed(getattr(owner, name)))
+    monkeypatch.setattr(choosing.Candidate, "__init__", measured)
     scene, whole = load_scene(ROOT / file, overrides), 0.0
     for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
         start = time.process_time()
@@ -163,8 +195,8 @@ def cpu_share_of_choosing(file, overrides, monkeypatch):
     ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]")),
     ("jobs/bottle.toml", ("candidates.stations_mm=[60, 112]",)),
 ])  # fmt: skip
-def test_choosing_costs_at_most_five_per_cent(file, overrides, monkeypatch):
+def test_choosing_costs_at_most_a_fifth(file, overrides, monkeypatch):
     """Whatever the scene; the shares are printed with -s."""
     share = cpu_share_of_choosing(file, overrides, monkeypatch)
-    print(f"\n{file} {overrides[-1]}: {share:.2%} of the CPU time for choosing")
-    assert share <= 0.05
+    print(f"\n{file} {overrides[0]}: {share:.1%} of the CPU time for choosing")
+    assert share <= 0.2

@@ -59,7 +59,7 @@ def test_the_smoke_scene_runs_as_it_is(once, shared_path):
         e_n = {model: result.read(f"e_n/{model}") for model in ("ccm", "pcm")}
         # forces along the axis of angles: the cylinder's blunt and sharp side lose differently much
         assert (e_n["ccm"] < e_n["pcm"]).all()
-        assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=1e-8)
+        assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=0.02)
 
 
 def quick(names, *chosen):

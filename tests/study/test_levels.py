@@ -29,6 +29,8 @@ poses = [{point_mm = [0, 0, 75], approach = [1, 0, 0.02], long_side = [0, 0, 1]}
 normal_force_n = [1, 2, 5]
 [accuracy]
 meshes = 2
+[effects]
+friction_pressure_coupling = "none"
 """
 WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_around_mm=5",
         "accuracy.wall_along_mm=8", "accuracy.wall_coarse_mm=16", "load.normal_force_n=[1, 2, 3]",

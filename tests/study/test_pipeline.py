@@ -36,7 +36,7 @@ BOX = 'shape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4'
 
 @lru_cache(maxsize=64)
 def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", elements="[8, 4, 2]"):
-    """Units of a scene with the results of each."""
+    """Units of a scene with the results of each; friction that acts back is left to tests of its own."""
     text = f"""[object]
 {shape}
 [gripper]
@@ -48,6 +48,8 @@ angles_deg = {angles}
 normal_force_n = {forces}
 [accuracy]
 meshes = 1
+[effects]
+friction_pressure_coupling = "none"
 """
     scene = parse_scene(text, "scene.toml", overrides)
     made = units(scene, lambda point: build_object(point.object).axis_symmetry)
@@ -232,7 +234,7 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
 
 def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
     text = f"[object]\n{BOX}\n[gripper]\nelements = [8, 4, 2]\n[load]\nnormal_force_n = [2, 5]\n"
-    text += "[accuracy]\nmeshes = 1\n"
+    text += "[accuracy]\nmeshes = 1\n[effects]\nfriction_pressure_coupling = \"none\"\n"
     pose = "[[candidates.poses]]\npoint_mm = [7, 0, 10]\napproach = [-2, 0, 0]\nlong_side = [1, 0, 3]\n"
     [unit] = units(parse_scene(text + pose, "poses.toml"), lambda _: 2)
     for (_, result), expected in zip(pipeline.solve_unit(unit), cases(BOX, stations="[10]"), strict=True):

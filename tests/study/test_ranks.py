@@ -179,7 +179,10 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
 
 
 def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path, scene, alone):
-    """Bounds on the pressures instead of the active set: another algorithm, the same answer at one of the places."""
+    """Bounds on the pressures instead of the active set: another algorithm, the same answer at one of the places.
+
+    At 1 N; at 3 N friction acts back, for which the active set needs nodal gaps and bounds do not.
+    """
     path = shared_path / "bounds.hdf"
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "limit_surface.wrench_samples='none'")
     place = [word for change in changes for word in ("--set", change)]
@@ -190,6 +193,7 @@ def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path
         for name in ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max"):
             for model in ("ccm", "pcm", "pcm_projected"):
                 here, there = (of.read(f"{name}/{model}") for of in (found, expected))
-                assert here[0, 0] == pytest.approx(there[1, 1], rel=1e-8), name
-        pressure = expected.read("patch/pressure")[expected.row(1, 1, 0) : expected.row(1, 1, 1) + 1]
-        assert found.read("patch/pressure") == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())
+                assert here[0, 0, 0] == pytest.approx(there[1, 1, 0], rel=1e-8), name
+        pressure = expected.read("patch/pressure")[expected.row(1, 1, 0)]
+        own = found.read("patch/pressure")[found.row(0, 0, 0)]
+        assert own == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())

@@ -17,14 +17,14 @@ RIGID = 'effects.sheet="rigid"'
 
 def level(*overrides):
     """Level, indicator and reason, alike in every case."""
-    (found,) = {result.effects["sheet"] for _, path in solved(OVAL, *overrides) for result in path}
+    (found,) = {result.effects["sheet"][:3] for _, path in solved(OVAL, *overrides) for result in path}
     return found[0], found[1], REASONS[found[2]]
 
 
 def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
     name, compliance, reason = level(*STEEL)
     assert (name, reason) == ("rigid", "indicator below the target")
-    assert compliance < 0.1 * STIFF
+    assert compliance < 0.2 * STIFF
     name, compliance, reason = level(*PLASTIC)
     assert (name, reason) == ("elastic plate", "indicator above the target")
     assert compliance > STIFF

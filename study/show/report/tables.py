@@ -204,11 +204,19 @@ def effects(ds: xr.Dataset) -> list[Block]:
             continue
         low, high = (number(np.nan if indicator is None else f(indicator)) for f in (np.nanmin, np.nanmax))
         span = low if low == high else f"{low} to {high}"
-        rows.append([spoken(name), shown, span, "" if reason is None else _counted(reason, REASONS)])
+        change = field(ds, f"effect_{name}_change")
+        moved = "" if change is None or not np.isfinite(change).any() else _percent(change)
+        rows.append([spoken(name), shown, span, moved, "" if reason is None else _counted(reason, REASONS)])
     if not rows:
         return [text("No effects are stored.", "note")]
-    heads = ["effect", "level", "indicator", "reason"]
-    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3)), *_rule(ds)]
+    heads = ["effect", "level", "indicator", "e_n moves by", "reason"]
+    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3, 4)), *_rule(ds)]
+
+
+def _percent(change: np.ndarray) -> str:
+    """Range of relative changes, and how many there are."""
+    known = 100.0 * change[np.isfinite(change)]
+    return f"{known.min():+.2g} to {known.max():+.2g} % ({known.size} measured)"
 
 
 def _counted(codes: np.ndarray, meaning: tuple[str, ...]) -> str:

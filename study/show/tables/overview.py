@@ -103,7 +103,7 @@ def wall_text(shape: Any) -> str:
     return ", ".join(words)
 
 
-RULE = (  # as study.case.wall chooses
+RULE = (  # as study.case.effects has it for a target of 1 %
     "by the indentation that a linear wall would get at the largest force: rigid below 2 % of the pads' closing"
     " displacement, linear shell up to 0.6 of the wall's thickness, nonlinear shell beyond"
 )

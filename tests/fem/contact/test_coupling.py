@@ -104,6 +104,17 @@ def test_tangent_by_finite_differences(control):
     np.testing.assert_allclose(K @ d, found, atol=1e-5 * np.abs(found).max())
 
 
+def test_newton_steps_to_and_fro_are_damped_and_others_are_not():
+    problem = CoupledProblem(pad_of(), BALL, 0.4)
+    x, step = np.zeros(problem.size), np.full(problem.size, 1e-7)
+    assert problem.shorten(x, step) == 1.0
+    x = x - step
+    for factor, direction in ((0.5, -1.0), (0.25, 1.0), (0.125, -1.0), (0.125, 1.0), (0.25, 0.1)):
+        assert problem.shorten(x, direction * step) == factor
+        x = x - factor * direction * step
+    assert problem.shorten(x + 1.0, -step) == 1.0  # another solve has begun
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 def test_finer_steps_and_a_stiffer_stick_change_little(gap, monkeypatch):

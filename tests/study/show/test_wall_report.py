@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 
 from softjaw.study import pipeline
-from softjaw.study.case import model, wall
+from softjaw.study.case import effects, model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.solving import solver
+from softjaw.study.case.choosing import Candidate
 from softjaw.study.flags import Flag
 from softjaw.study.ranking import borne_level, judged, ranking
 from softjaw.study.result import derived
@@ -103,7 +103,7 @@ def test_check_reports_the_wall_and_the_numbers_its_level_is_chosen_by(solved):
     text = scene_text(solved[0], "can.toml")
     assert all(part in text for part in ("0.3 mm PP", "1.3 GPa", "31000 kPa", "1.5 mm"))
     assert RULE in text
-    assert re.findall(r"[\d.]+", RULE) == [f"{100 * wall.STIFF:g}", f"{wall.SMALL_INDENTATION:g}"]
+    assert re.findall(r"[\d.]+", RULE) == [f"{100 * effects.STIFF:g}", f"{effects.SMALL_INDENTATION:g}"]
     forced = solved[0].with_values({"effects.object": "rigid"})
     assert RULE not in scene_text(forced, "can.toml")
 
@@ -131,8 +131,8 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     size = wall_size(scene)
     unit = make_plan(scene).units[1]  # the middle station of an even number
     fingers = [model.approach(build_object(scene.object), p, scene.gripper) for p in unit.candidate.poses]
-    made = solver(scene, fingers, unit.candidate.poses)
-    assert size.shell == pytest.approx(6 * made.shells[0].nodes, rel=0.1)  # the axis is one node
+    made = Candidate(scene, fingers, unit.candidate.poses)
+    assert size.shell == pytest.approx(6 * made.solver.shell.nodes, rel=0.1)  # the axis is one node
     made.destroy()
     fine = wall_size(scene.with_values({"accuracy.wall_around_mm": 1.0, "accuracy.wall_along_mm": 1.5}))
     assert fine.shell > 4 * size.shell
