@@ -9,7 +9,7 @@ import pytest
 
 from softjaw.study.flags import Flag
 from tests.hard_cases.closed_forms import FORMULAS
-from tests.hard_cases.conftest import ROW, row, table_text
+from tests.hard_cases.conftest import ROW, row, rows_of, table_text
 from tests.hard_cases.hard_case import CASES, TOLERANCES, Bound, HardCase, Outcome, Source, outcome, scene_of
 from tests.hard_cases.sources import scaled, second
 from tests.hard_cases.verdict import FINITE, Verdict, judge
@@ -44,7 +44,7 @@ def test_there_are_cases_of_every_class_and_outcome():
 def test_a_scaled_scene_has_scaled_sizes_forces_and_moduli():
     one, two = scene_of(CASES["wall-1"]), scaled(scene_of(CASES["wall-1"]), length=2.0, force=8.0)
     assert two.gripper.pad_length_mm == 2 * one.gripper.pad_length_mm
-    assert two.object.profile_mm[2] == (8.0, 66.0)
+    assert two.object.profile_mm[3] == (8.0, 66.0)
     assert two.load.normal_force_n == tuple(8 * f for f in one.load.normal_force_n)
     assert (two.gripper.shear_modulus_kpa, two.object.young_modulus_gpa) == (80.0, pytest.approx(4.0))
     assert two.object.wall_poisson_ratio == 0.38
@@ -162,6 +162,7 @@ def test_the_table_counts_what_is_wrong():
         for name, wrong in (("round", ()), ("plane", ("no",)))
     }
     lines = table_text(rows).splitlines()
+    assert rows_of("\n".join(lines)) == rows
     assert "2 cases in 1 classes: 1 ok, 0 no number, 0 gap, 1 WRONG" in lines
     assert [line.split(" | ")[-1] for line in lines if "| round |" in line or "| plane |" in line] == [
         "ok |",
