@@ -7,7 +7,6 @@ from argparse import Namespace
 
 from mpi4py import MPI
 
-from softjaw.study.accuracy import cost as costing
 from softjaw.study.case.build import with_sampled_grasps
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.launch import solve_scene
@@ -28,4 +27,6 @@ def run(options: Namespace) -> int:
 
 def cost(options: Namespace) -> None:
     """Measure what accuracy costs in time."""
+    from softjaw.study.accuracy import cost as costing  # loads matplotlib, which every rank of a run would wait for
+
     costing.run(options, with_sampled_grasps(options.scene_read))

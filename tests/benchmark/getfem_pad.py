@@ -48,7 +48,6 @@ def solved(task):
     model.add_initialized_data("closing", [0.0, 0.0, 0.0])
     model.add_nonlinear_term(rule, "Def F:=Id(3)+Grad_u; Def J:=Det(F); " + FOAM)
     model.add_nonlinear_term(rule, f"{PLACE} {NORMAL} {CONTACT}", FACE)
-    stiff = 1e6 * G / thickness
     for region, term in ((BACK, "(u-closing).Test_u"), (ACROSS, "u(2)*Test_u(2)"), (ALONG, "u(1)*Test_u(1)")):
         model.add_nonlinear_term(rule, f"{1e6 * G / thickness}*({term})", region)
     depth = fem_u.basic_dof_nodes()[2] / -thickness

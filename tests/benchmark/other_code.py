@@ -1,4 +1,4 @@
-"""The same contact problem by GetFEM, a general finite element library: time on the same mesh, and at equal accuracy."""
+"""The same contact problem by GetFEM, a general finite element library: time on one mesh, and at equal accuracy."""
 
 from __future__ import annotations
 
