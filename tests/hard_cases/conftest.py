@@ -17,7 +17,8 @@ the run computes both. its., halvings: Newton iterations and shortened steps; sm
 the acoustic tensor over the shear modulus (not positive: the foam has lost ellipticity): the worst of all forces and
 both fingers. difference: the largest relative one of closing displacement, e_n and S (or of what the source names) at
 the forces that are solved, and the one that is allowed. verdict: `no number` and `gap` do not count as ok; a gap is a
-known fault, or a number that the second one does not confirm. Balance of forces, tension and penetration are checked for every solved force.
+known fault, or a number that the second one does not confirm. Balance of forces, tension and penetration are checked
+for every solved force.
 """
 ROW = "hard case"
 _rows: dict[str, list[str]] = {}
