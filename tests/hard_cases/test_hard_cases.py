@@ -34,7 +34,7 @@ def test_there_are_cases_of_every_class_and_outcome():
     assert {c.kind for c in CASES.values()} == kinds
     assert {c.expect for c in CASES.values()} == {"solved", "failed", "refused"}
     assert all((c.expect == "solved") != bool(c.reason) for c in CASES.values())
-    assert all((c.expect == "failed") == bool(c.because) for c in CASES.values())
+    assert all(bool(c.because or c.gap) for c in CASES.values() if c.expect == "failed")
     assert all(c.source.case in CASES for c in CASES.values() if c.source and c.source.case)
     assert all(c.hard and (c.source or c.gap) for c in CASES.values())
     used = {c.source.within for c in CASES.values() if c.source}
@@ -105,6 +105,10 @@ def test_what_is_right_is_ok():
 def test_a_gap_never_counts_as_ok_and_is_wrong_when_it_has_closed():
     assert judged(solved(0.02), source=source(), gap="known").word == "gap"
     assert judged(solved(), source=source(), gap="known").word == "WRONG"
+    failed = solved(messages=("", "the wall collapsed"), done=(True, False))
+    stated = {"expect": "failed", "reason": "collapsed", "gap": "known", "source": source()}
+    assert judged(failed, failed, **stated).word == "gap"
+    assert judged(solved(), **stated).word == "WRONG"
 
 
 @pytest.mark.parametrize(

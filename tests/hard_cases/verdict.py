@@ -37,7 +37,7 @@ class Verdict:
     def word(self) -> str:
         """The verdict in a column of a table."""
         if self.gap:
-            return "gap" if self.wrong else "WRONG"  # a gap that has closed is to be taken out
+            return "gap"
         return "WRONG" if self.wrong else "ok" if self.difference is not None else "no number"
 
 
@@ -60,7 +60,10 @@ def judge(case: HardCase, found: Outcome, other: Outcome | None = None) -> Verdi
     elif found.done.any():
         difference, within, text = _difference(case, found, other)
         wrong += [text] if text else []
-    return Verdict(tuple(wrong), difference, within, bool(case.gap))
+    # a failure that is a gap must be found as it is stated; any other gap that has closed is to be taken out
+    gap = bool(case.gap) and bool(wrong) == (case.expect == "solved")
+    closed = ("the gap that it states has closed",) if case.gap and not gap and not wrong else ()
+    return Verdict((*wrong, *closed), difference, within, gap)
 
 
 def _bound(case: HardCase) -> tuple[float, float, str]:
