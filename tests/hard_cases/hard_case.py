@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -28,33 +28,79 @@ WHOLE = {"object": ("shape",), "candidates": sum(ALTERNATIVES, ())}  # keys that
 CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
 
 
-@dataclass(frozen=True)
-class Same:
-    """Another case that must have the same answer ``within`` a relative difference.
+KINDS = (  # of a source of a second number
+    "closed form", "limit", "scaling law", "other formulation", "other element", "finer mesh", "full model",
+    "invariance", "independent code", "bound", "none",
+)  # fmt: skip
 
-    ``length`` and ``force`` are those of this case over those of the other.
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound of what is refused: a scene's dotted key, its value in closed form, one that is accepted, one refused."""
+
+    key: str
+    value: float
+    accepted: Any
+    refused: Any
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the second number of a case comes from.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    what : str
+        What is compared with, in the words of the table.
+    within : str
+        The tolerance, by its name in ``[tolerance]``.
+    quantities : tuple of str
+        Maps that are compared.
+    case : str
+        Another case of the table, or
+    change : dict
+        sections to change in the case itself, or
+    formula, stored : str
+        a function of `closed_forms`, or a file of an independent code's numbers, or
+    told : float
+        the number that the first group of ``reason`` finds in a refusal, or
+    bound : Bound
+        a value at which refusals begin.
+    length, force : float
+        Lengths and forces of the other over those of this case. Without another case this one is scaled itself, its
+        moduli by force / length^2.
     """
 
-    case: str
-    within: float
+    kind: str
+    what: str
+    within: str = "rounding"
     quantities: tuple[str, ...] = ("closing", "e_n", "S")
+    case: str = ""
+    change: dict[str, Any] = field(default_factory=dict)
+    formula: str = ""
+    stored: str = ""
+    told: float | None = None
+    bound: Bound | None = None
     length: float = 1.0
     force: float = 1.0
 
+    def __post_init__(self) -> None:
+        """Refuse kinds and tolerances that are not listed."""
+        if self.kind not in KINDS or self.within not in TOLERANCES:
+            raise ValueError(f"source: found kind '{self.kind}' and tolerance '{self.within}', expected listed ones")
+
+    @property
+    def tolerance(self) -> float:
+        """Largest relative difference."""
+        return TOLERANCES[self.within][0]
+
     def factor(self, name: str) -> float:
-        """Value of a quantity in this case over that in the other, by its unit."""
+        """Value of a quantity by the source over that of the case, by its unit."""
         powers = {"N": (0, 1), "m": (1, 0), "m^2": (2, 0), "N m": (1, 1), "Pa": (-2, 1), "": (0, 0)}
         of_length, of_force = powers[MAPS[name].unit]
         return self.length**of_length * self.force**of_force
-
-
-@dataclass(frozen=True)
-class Known:
-    """A map's value at the highest force that is known in closed form, in SI units."""
-
-    quantity: str
-    value: float
-    within: float
 
 
 @dataclass(frozen=True)
@@ -69,8 +115,10 @@ class HardCase:
     note: str = ""
     up_to_n: float = 0.0
     quick: bool = False
-    same_as: Same | None = None
-    known: Known | None = None
+    hard: str = ""
+    because: str = ""
+    gap: str = ""
+    source: Source | None = None
     sections: dict[str, Any] = field(default_factory=dict)
 
 
@@ -117,31 +165,47 @@ class Outcome:
         return f"failed, {self.done.sum()} of {self.done.size} solved" if some else self.found
 
 
-def _load() -> tuple[dict[str, Any], dict[str, HardCase]]:
-    data = tomllib.loads((FOLDER / "cases.toml").read_text())
+DATA = tomllib.loads((FOLDER / "cases.toml").read_text())
+BASES: dict[str, Any] = DATA["base"]
+TOLERANCES: dict[str, tuple[float, str]] = {name: (t["value"], t["because"]) for name, t in DATA["tolerance"].items()}
+
+
+def _source(given: dict[str, Any]) -> Source:
+    bound = {"bound": Bound(**given["bound"])} if "bound" in given else {}
+    return Source(**given | bound | {"quantities": tuple(given.get("quantities", Source.quantities))})
+
+
+def _load() -> dict[str, HardCase]:
     cases = {}
-    for given in data["case"]:
+    for given in DATA["case"]:
         own = {key: given[key] for key in HardCase.__dataclass_fields__ if key in given}
-        own |= {key: kind(**own[key]) for key, kind in (("same_as", Same), ("known", Known)) if key in own}
         sections = {key: value for key, value in given.items() if key not in own}
+        own |= {"source": _source(own["source"])} if "source" in own else {}
         assert given["name"] not in cases, given["name"]
         cases[given["name"]] = HardCase(**own, sections=sections)
-    return data["base"], cases
+    return cases
 
 
-BASES, CASES = _load()
+CASES = _load()
 
 
-def scene_of(case: HardCase) -> Scene:
-    """Scene of a case: sections over those of its base key by key, but another shape or place replaces the whole."""
+def tables_of(case: HardCase, change: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Tables of a case's scene, with further sections changed.
+
+    Sections over those of its base key by key, but another shape or place replaces the whole.
+    """
     base = BASES.get(case.base) or tomllib.loads((FOLDER / case.base).read_text())
     data: dict[str, Any] = {name: dict(table) for name, table in base.items()}
-    for name, table in case.sections.items():
+    for name, table in (*case.sections.items(), *(change or {}).items()):
         whole = any(key in table for key in WHOLE.get(name, ()))
         data[name] = table if whole else {**data.get(name, {}), **table}
     # what is right for a case does not hang on a second mesh, unless it asks for one
-    data["accuracy"] = {"meshes": 1} | data.get("accuracy", {})
-    return parse_scene(toml_text(data), FOLDER / f"{case.name}.toml")
+    return data | {"accuracy": {"meshes": 1} | data.get("accuracy", {})}
+
+
+def scene_of(case: HardCase, change: Mapping[str, Any] | None = None) -> Scene:
+    """Scene of a case, with further sections changed."""
+    return parse_scene(toml_text(tables_of(case, change)), FOLDER / f"{case.name}.toml")
 
 
 @cache
@@ -150,8 +214,8 @@ def outcome(name: str) -> Outcome:
     return outcome_of(lambda: scene_of(CASES[name]))
 
 
-def outcome_of(made_scene: Callable[[], Scene]) -> Outcome:
-    """Solve all cases of a scene; whatever it dies of is its outcome."""
+def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Outcome:
+    """Solve all cases of a scene, or only begin them; whatever it dies of is its outcome."""
     try:
         scene = made_scene()
         check_object(scene)
@@ -163,6 +227,8 @@ def outcome_of(made_scene: Callable[[], Scene]) -> Outcome:
         )
     except StudyError as error:
         return Outcome(error.message)
+    if begin_only:
+        return Outcome()
     return _outcome(*zip(*(row for unit in made for row in _rows(unit)), strict=True))
 
 
