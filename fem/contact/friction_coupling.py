@@ -139,7 +139,9 @@ class CoupledProblem(ContactProblem):
 
         They are those by the points' places ``(..., 3, 3)`` [Pa/m] and by the pressure ``(..., 3)`` [-].
         """
-        n, closed, most = self._normal, self._closed[..., None], self.mu * self._pressure(x)
+        # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
+        length = np.linalg.norm(self._normal, axis=-1)[..., None]
+        n, closed, most = self._normal / length, self._closed[..., None], self.mu * self._pressure(x)
         # a point that was open has stuck nowhere that its motion could be measured from
         d = np.where(closed, self._before - self.stick * (self._points - self._at), 0.0)
         across = np.einsum("fqi,fqi->fq", n, d)
@@ -154,9 +156,8 @@ class CoupledProblem(ContactProblem):
         share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
         P = np.eye(3) - n[..., :, None] * n[..., None, :]
         # the tangent plane turns as the point slides, wherever the object's surface is curved
-        bent = (
-            across[..., None, None] * self._hessian + n[..., :, None] * (self._hessian @ d[..., None])[..., None, :, 0]
-        )
+        turns = P @ self._hessian / length[..., None]
+        bent = across[..., None, None] * turns + n[..., :, None] * np.einsum("fqji,fqj->fqi", turns, d)[..., None, :]
         D = np.where(closed[..., None], -self.stick * P, 0.0) - bent
         # the length of a slipping point's traction is given, so only the change across it counts
         D = np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)

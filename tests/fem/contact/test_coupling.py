@@ -82,11 +82,28 @@ def test_coulombs_law_and_balance_hold(mu):
     assert state.checks.force_balance < 1e-8
 
 
+def steeper(x):
+    """Of the ball, with a gradient that is up to a fifth longer than a unit vector, as that of a sampled distance."""
+    g, n, H = BALL(x)
+    factor, along = 1 + 40.0 * g + 5.0 * x[:, 0], np.array([5.0, 0.0, 0.0])
+    slope = 40.0 * n + along
+    gradient = factor[:, None] * n + g[:, None] * slope
+    both = n[:, :, None] * slope[:, None, :]
+    hessian = factor[:, None, None] * H + both + both.transpose(0, 2, 1) + 40.0 * g[:, None, None] * H
+    return factor * g, gradient, hessian
+
+
+def test_a_gradient_that_is_no_unit_vector_balances_too():
+    (state,) = press(steeper, 0.4, pad_of((False, True))).load_path([2.0])
+    assert state.checks.force_balance < 1e-8
+
+
+@pytest.mark.parametrize("gap", [BALL, steeper])
 @pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.003)], ids=["force", "closing"])
-def test_tangent_by_finite_differences(control):
+def test_tangent_by_finite_differences(control, gap):
     """From a state with a history: some points stick, some slip, some are open."""
     pad = pad_of((True, False), (6, 4, 2))
-    problem = CoupledProblem(pad, BALL, 0.2)
+    problem = CoupledProblem(pad, gap, 0.2)
     problem.control = control
     bed = SpringBed(pad, BALL)
     rng = np.random.default_rng(3)
