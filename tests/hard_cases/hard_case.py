@@ -199,8 +199,9 @@ def tables_of(case: HardCase, change: Mapping[str, Any] | None = None) -> dict[s
     for name, table in (*case.sections.items(), *(change or {}).items()):
         whole = any(key in table for key in WHOLE.get(name, ()))
         data[name] = table if whole else {**data.get(name, {}), **table}
-    # what is right for a case does not hang on a second mesh, unless it asks for one
-    return data | {"accuracy": {"meshes": 1} | data.get("accuracy", {})}
+    # what is right for a case hangs neither on a second mesh nor on friction that acts back, unless it asks for them
+    usual = {"accuracy": {"meshes": 1}, "effects": {"friction_pressure_coupling": "none"}}
+    return data | {name: own | data.get(name, {}) for name, own in usual.items()}
 
 
 def scene_of(case: HardCase, change: Mapping[str, Any] | None = None) -> Scene:
