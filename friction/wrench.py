@@ -22,7 +22,7 @@ Jaws using a Curved Contact Area Friction Model".
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -68,6 +68,18 @@ class FrictionLimits:
     def e_n_projected(self) -> float:
         """Eccentricity parameter ``tau_z / (mu F_N)`` [m]; NaN if the normals cancel to `CANCEL` of S or less."""
         return self.e_n * self.S / self.F_N if self.F_N > CANCEL * self.S else math.nan
+
+    def less(self, used: ArrayLike) -> FrictionLimits:
+        """What is left for holding where pressing has used the friction wrench ``used (3,)``, f_x, f_y and tau_z.
+
+        Faces carry tractions ``q`` with ``|q| <= mu p``. With the tractions ``t`` of pressing a load can add what
+        keeps ``|t + q|`` below that, so the set of all wrenches is shifted by that of ``-t``, and along an axis it
+        reaches as far as before less ``|used|`` to the one side. What ``t`` balances among faces returns as all slip.
+        """
+        axes = (self.f_x, self.f_y, self.tau_z)
+        f_x, f_y, tau_z = (max(0.0, own - abs(float(u))) for own, u in zip(axes, np.asarray(used), strict=True))
+        share = tau_z / self.tau_z if self.tau_z > 0.0 else 1.0
+        return replace(self, f_x=f_x, f_y=f_y, tau_z=tau_z, e_n=share * self.e_n)
 
     @property
     def per_unit_force(self) -> tuple[float, float, float]:

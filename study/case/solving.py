@@ -21,6 +21,7 @@ from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
 from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import forces_apart, pad_shape
 from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
@@ -55,6 +56,7 @@ class PressedContact(Contact):
         seen: Callable[[ContactPatch], ContactPatch] | None = None,
     ) -> None:
         self.finger, self.state, self._seen = finger, state, seen or (lambda patch: patch)
+        self._reduced = scene.friction.used_by_pressing
         self._views: list[Contact] = []  # shared by all copies, so that the first one asked fills it for all
         super().__init__(self._seen(extract(state.pad, state)), scene.friction.mu, finger.pose, whole_face=True)
         self.nodal_instead = state.instead and state.pad.contact == "nodal"
@@ -66,6 +68,26 @@ class PressedContact(Contact):
         other = self.at(finger.pose)
         other.finger = finger
         return other
+
+    @cached_property
+    def used(self) -> np.ndarray:
+        """Friction wrench on the pad ``(f_x, f_y, tau_z)`` while it is pressed, in the contact frame [N, N, N m]."""
+        points, pad = self.state.points, self.state.pad
+        if points.friction is None:
+            return np.zeros(3)
+        # in a plane of symmetry the other half's forces across it and torques cancel
+        one = np.array([not mirrored for mirrored in pad.symmetry], float)
+        force = points.friction.sum(axis=(0, 1)) / pad.share * [*one, 1.0]
+        arm = points.position - self.frame.origin
+        torque = np.cross(arm, points.friction).sum(axis=(0, 1)) / pad.share
+        torque = torque * [one[1], one[0], one.prod()]
+        return np.array([*(self.frame.axes[:2] @ force), self.frame.axes[2] @ torque])
+
+    @cached_property
+    def limits(self) -> dict[str, FrictionLimits]:
+        """As of any contact; in the curved model less what pressing has used, where the scene says so."""
+        found = super().limits
+        return found | {"ccm": found["ccm"].less(self.used)} if self._reduced else found
 
     @cached_property
     def area(self) -> float:

@@ -37,6 +37,7 @@ WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only pr
 JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
     # what several sections must satisfy together: the rule, and its sections, the one at fault first
     (Effects.object_findings, ("effects", "object")),
+    (Friction.used_findings, ("friction", "effects")),
     (Effects.surface_findings, ("effects", "limit_surface")),
     (Gripper.symmetry_findings, ("gripper", "effects")),
     (Gripper.support_findings, ("gripper", "effects", "accuracy")),

@@ -187,6 +187,16 @@ class Friction(SceneSection):
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
     model: Literal["pcm", "pcm_projected"] = Field("pcm", description="planar variant that is shown first")
     cor_grid: int = Field(0, ge=0, le=1000, description="n of an n x n grid of centres of rotation; 0 is off")
+    used_by_pressing: bool = Field(
+        False, description="whether the friction that pressing has used is missing for holding (CCM)"
+    )
+
+    def used_findings(self, effects: Effects) -> Iterator[Finding]:
+        """What pressing uses is known only where friction acts back."""
+        if self.used_by_pressing and effects.friction_pressure_coupling != "tangential":
+            found = f'true with effects.friction_pressure_coupling = "{effects.friction_pressure_coupling}"'
+            remedy = 'write friction_pressure_coupling = "tangential" in [effects]'
+            yield Finding(("used_by_pressing",), found, '"tangential" there', remedy)
 
 
 class Load(SceneSection):

@@ -121,3 +121,15 @@ def test_the_kernel_is_fast():
         friction_wrench(patch, twist, 0.8)
         seconds.append(time.perf_counter() - start)
     assert 2400 * 441 / min(seconds) > 400e6
+
+
+@pytest.mark.parametrize(("alpha", "left"), [(0.0, 1.0), (0.2, 1.0 - np.tan(0.2) / 0.5), (0.6, 0.0)])
+def test_what_pressing_a_wedge_has_used_is_not_there_for_holding(alpha, left):
+    """Friction alone keeps a wedge of half angle alpha from sliding out of two fingers: it uses F_N tan(alpha)."""
+    patch = cylinder_grid(1e3, 1e-5, 0.02, 8, 4)  # as good as flat
+    limits = friction_limits(patch, 0.5)
+    held = limits.less([limits.F_N * np.tan(alpha), 0.0, 0.0])
+    assert held.f_x == pytest.approx(left * limits.f_x, rel=1e-9, abs=1e-12)
+    assert (held.f_y, held.tau_z, held.e_n) == pytest.approx((limits.f_y, limits.tau_z, limits.e_n), rel=1e-14)
+    turned = limits.less([0.0, 0.0, -0.25 * limits.tau_z])
+    assert (turned.tau_z, turned.e_n) == pytest.approx((0.75 * limits.tau_z, 0.75 * limits.e_n), rel=1e-14)

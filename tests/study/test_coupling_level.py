@@ -44,6 +44,29 @@ def test_what_auto_takes_or_leaves_is_what_the_scene_could_ask_for():
         assert own.change == pytest.approx(true, abs=0.01)
 
 
+CONE = 'shape = "revolution"\nprofile_mm = [[0, 21], [20, 23.7], [40, 26.3], [60, 29]]'  # 7.6 degrees
+
+
+def test_what_pressing_has_used_is_missing_for_holding():
+    """On a slope it is what slope and force ask for at most, for the plate bears a part; half and whole."""
+    small = {"forces": "[3]", "elements": "[8, 4, 3]"}
+    place = (COUPLED, "candidates.stations_mm=[30]")
+
+    def of(*more):
+        [values] = cases(CONE, *place, *more, **small)
+        return values
+
+    plain, left = of(), of("friction.used_by_pressing=true")
+    whole = of("friction.used_by_pressing=true", 'effects.model_size="full"')
+    used = plain["maps/f_x_max"] - left["maps/f_x_max"]
+    assert 0.3 < used[0] / (np.tan(8 / 60) * plain["maps/F_N"]) < 1.0
+    assert used[1:].tolist() == [0.0, 0.0]  # planar models know nothing of it
+    assert left["maps/f_y_max"][0] == pytest.approx(plain["maps/f_y_max"][0], rel=1e-12)
+    assert left["maps/f_x_max"][0] == pytest.approx(whole["maps/f_x_max"][0], rel=1e-6)
+    assert left["maps/e_n"][0] == pytest.approx(whole["maps/e_n"][0], rel=1e-6)
+    assert left["maps/quality"][0] < plain["maps/quality"][0]
+
+
 @pytest.mark.long
 def test_symmetry_does_not_matter_with_friction():
     small = {"forces": "[3]", "elements": "[8, 4, 3]"}

@@ -337,7 +337,8 @@ def test_nine_of_ten_mesh_errors_lie_within_the_interval_that_five_probes_give()
     from softjaw.study.scene import load_scene
 
     coarse = "gripper.elements=[12, 6, 4]", "candidates.stations=18", "candidates.angles_deg=[0]"
-    given = load_scene("jobs/bottle-rigid.toml", [*coarse, "uncertainty.mesh=true"])
+    coarse = (*coarse, 'effects.friction_pressure_coupling="none"')
+    given = load_scene("jobs/bottle-rigid.toml", [*coarse, "uncertainty.mesh=true", "accuracy.meshes=1"])
     both = load_scene("jobs/bottle-rigid.toml", [*coarse, "accuracy.meshes=2"])
     found, units = solved(both, ("e_n_error", "quality_error", "contact_area", "flags", "e_n"))
     error, area, flags = found[:2], found[2], np.nan_to_num(found[3]).astype(int)
@@ -346,7 +347,8 @@ def test_nine_of_ten_mesh_errors_lie_within_the_interval_that_five_probes_give()
     others = sound & ~np.isin(np.arange(len(area)), probes)[:, None]
     one = next(unit for unit in candidates.units(given, lambda point: point.axis_symmetry) if unit.index == probes[2])
     again = [e_n for e_n, _ in probing._path(one, variations(given)[0])]
-    assert np.allclose(np.abs(np.array(again) / found[4][probes[2]] - 1), error[0][probes[2]], rtol=1e-5)
+    # an estimate from two meshes is at least seven tenths of their difference
+    assert (0.7 * np.abs(np.array(again) / found[4][probes[2]] - 1) <= error[0][probes[2]] * (1 + 1e-5)).all()
     for own in error:
         change = np.where(sound[probes], own[probes], np.nan)
         width = interval.carried(change, area[probes], area)
