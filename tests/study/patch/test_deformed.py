@@ -31,6 +31,7 @@ meshes = 1
 mu = 0.6
 [effects]
 model_size = "full"
+friction_pressure_coupling = "none"
 """
 CYLINDER = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 25\nsemi_axis_b_mm = 25\nlength_mm = 160'
 BOTTLE = 'shape = "revolution"\nprofile_mm = [[0, 26], [30, 33], [70, 31], [105, 24], [130, 22], [150, 20], [200, 12]]'
