@@ -47,6 +47,7 @@ def solved(own, *settings):
     """Relative errors of e_n ``(forces,)`` and what is stored of each force."""
     place = [f"candidates.stations_mm=[{own['station_mm']}]", "candidates.angles_deg=[0]"]
     place.append(f"load.normal_force_n={own['force_n']}")
+    place.append('effects.friction_pressure_coupling="none"')  # as the references
     scene = parse_scene(SCENES[own["object"]], ROOT / "jobs" / "bottle-rigid.toml", [*place, *settings])
     [unit] = units(scene, lambda point: build_object(point.object).axis_symmetry)
     found = [result for _, result in pipeline.solve_unit(unit)]
