@@ -26,6 +26,8 @@ QUADRATIC = 10.0  # times as dear is a triquadratic element
 START = 0.3  # seconds until a rank has loaded what it solves with
 FIRST = 2.0  # times as long the first force takes, which begins with a coarse step
 REGION = 0.7  # seconds until the distance to a mesh is known round both pads
+# times as dear with friction that acts back, everywhere or where it is found to matter
+COUPLED = {"none": 1.0, "auto": 2.7, "tangential": 5.0}
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
 
 
@@ -44,7 +46,7 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> flo
     planes = _planes(scene, low, high, doubt(points))
     kind = QUADRATIC if gripper.element == "hex27" else 1.0
     elements = kind * fingers * math.prod(gripper.elements) / 2**planes
-    each = CASE + ELEMENT * elements * meshes_cost(scene)
+    each = CASE + ELEMENT * elements * meshes_cost(scene) * COUPLED[scene.effects.friction_pressure_coupling]
     jaws, cell = jaws_of(scene), math.prod(gripper.pad_size[:2]) / math.prod(GRID)
     forces = scene.load.normal_force
     times = [FIRST, *[1.0] * (len(forces) - 1)]
