@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Collection, Generator, Iterator, Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ from softjaw.study.case.build import build_object, own_frame, pad_shape
 from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.effects import Simulated, settled
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
+from softjaw.study.case.finer import stored
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, state_flags
@@ -57,11 +59,11 @@ def solve_unit(
 def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome: Solved) -> CaseResult:
     """Values, checks, work, effects and patches of one case."""
     scene, solving = candidate.asked, candidate.solver
-    # of two meshes the finer one is the result, the coarser one tells its error
+    # of the two finest meshes the finer one is the result, the coarser one tells its error
     start = time.perf_counter()
     fine = [c for c, *_ in outcome.contacts]
     values, fits = evaluate(fine, settings)
-    values |= _state_values(fine) | of_fingers(fine, pad_shape(scene.gripper).patch_faces)
+    values |= _state_values(fine) | of_fingers(fine, fine[0].state.pad.shape.patch_faces)
     values["maps/flags"] |= state_flags(fine) | candidate.flags_at(k)
     values |= solving.wall_values(outcome)
     if outcome.grips:
@@ -75,8 +77,10 @@ def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome:
         if scene.accuracy.e_n is not None:
             values["maps/flags"] |= Flag.COARSE * bool(misses(values["maps/e_n_error"], scene.accuracy.e_n))
     values |= _work(fine, outcome, time.perf_counter() - start)
-    fields = ("pressure", "area", "centroid", "normal")
-    patch = {name: np.stack([getattr(c.patch, name) for c in fine]) for name in fields}
+    if scene.accuracy.meshes > 2:
+        values["maps/pad_elements"] = math.prod(fine[0].state.pad.shape.elements)
+    patches = [stored(c, pad_shape(scene.gripper)) for c in fine]
+    patch = {name: np.stack([own[name] for own in patches]) for name in patches[0]}
     message = _notes(values["maps/flags"], fine, outcome.note)
     case = Simulated(scene, fine, fits, solving.planes, solving.fingers_solved)
     effects = candidate.effects_at(k, fine) | settled(case)

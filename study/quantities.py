@@ -26,7 +26,7 @@ ON_TARGET = 1e-6  # of the target: an error that is no further above it meets it
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit")
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "finer meshes")
 HELD = ("cor grid", "samples", "probes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
@@ -277,6 +277,9 @@ ROWS = (
              " planar model with that force claims too little"),
         )
     ),
+    Quantity("pad_elements", (), "", "elements of a pad",
+             "Elements of each pad's mesh, of the finest one that the case was solved on. Errors are from the two"
+             " finest; pressures on faces are joined to the faces of the scene's own mesh.", needs=("finer meshes",)),
     Quantity("indentation", (), "m", "indentation of the wall",
              "Largest inward displacement of the wall, less the motion of the wall as a whole.",
              needs=("wall",), rank=5, error="relative"),

@@ -223,7 +223,7 @@ def forces_apart(scene: Scene) -> bool:
 
     Not with friction that acts back everywhere: its state depends on the load path, which is that of the fine mesh.
     """
-    return scene.accuracy.meshes == 2 and scene.effects.friction_pressure_coupling != "tangential"
+    return scene.accuracy.meshes > 1 and scene.effects.friction_pressure_coupling != "tangential"
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

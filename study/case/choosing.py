@@ -24,6 +24,7 @@ from softjaw.study.case import effects
 from softjaw.study.case.build import build_object, forces_apart, has_wall
 from softjaw.study.case.effects import ROWS, Level, Row, Step, level_named, neglected_traction
 from softjaw.study.case.evaluate import settings_of
+from softjaw.study.case.finer import Finer
 from softjaw.study.case.model import Finger, contact_rules, pad_of, plate_compliance
 from softjaw.study.case.result import surely_below
 from softjaw.study.case.solving import PressedContact, Solved, Solver, grasp_of, refuse_along_axis, solver
@@ -82,6 +83,7 @@ class Candidate:
             refuse_along_axis(fingers)
         self.target = scene.accuracy.e_n or E_N_TARGET
         self._coarse: dict[tuple[Any, ...], Solver] = {}
+        self._finer: dict[Solver, Finer] = {}
         self._changes: dict[tuple[str, str, int], tuple[float, float]] = {}
         cheapest = {name: row.names[0] for name, row in ROWS.items() if row.steps}
         own = {name: getattr(scene.effects, name) for name in cheapest}
@@ -233,6 +235,15 @@ class Candidate:
         """The same with friction that acts back."""
         return self._solver(at_levels(self.scene, **{COUPLING: "tangential"}))
 
+    def _solved(self, own: Solver, k: int) -> Solved:
+        """Contacts at one force, on a finer mesh where e_n asks for it and the object is rigid."""
+        found = own.level(self.forces, k)
+        if self.asked.accuracy.meshes < 3 or not self.rigid:
+            return found
+        if own not in self._finer:
+            self._finer[own] = Finer(own.scene, self.fingers, self.poses, self.target)
+        return self._finer[own].known_to_target(found, self.forces[k])
+
     def _solver(self, scene: Scene) -> Solver:
         """On the scene's meshes; what has been solved on the coarse one already is not solved again."""
         if self.asked.accuracy.meshes == 1:
@@ -263,13 +274,13 @@ class Candidate:
         """Contacts at one force, with friction that acts back where it was chosen and can be solved."""
         level = self.levels[COUPLING][k]
         if level.reason == effects.FORCED or level.level != level_named(COUPLING, "tangential"):
-            return self.solver.level(self.forces, k)
+            return self._solved(self.solver, k)
         try:
-            return self.coupled.level(self.forces, k)
+            return self._solved(self.coupled, k)
         except (ConvergenceError, CheckError) as error:
             without = level_named(COUPLING, "none")
             self.levels[COUPLING][k] = level._replace(level=without, reason=effects.FAILED)
-            found = self.solver.level(self.forces, k)
+            found = self._solved(self.solver, k)
             note = "; ".join(text for text in (LEFT_OUT.format(reason=error), found.note) if text)
             return replace(found, note=note)
 
@@ -291,6 +302,6 @@ class Candidate:
         """Give the factors' memory back."""
         # a solver that was never needed is not made to be given back
         made = (vars(self).get(name) for name in ("solver", "coupled"))
-        for own in (*made, *self._coarse.values()):
+        for own in (*made, *self._coarse.values(), *self._finer.values()):
             if own is not None:
                 own.destroy()

@@ -222,6 +222,12 @@ def mesh_errors(
     }
 
 
+def e_n_error(fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]]) -> float:
+    """Relative error of e_n alone, as `mesh_errors` has it."""
+    own, other, *seen = ([c.limits["ccm"].e_n for c in contacts] for contacts in (fine, coarse, *views))
+    return estimate(own, other, seen, "relative")
+
+
 def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
     """Error of a number, or the largest of those of the fingers, from its values on two meshes.
 

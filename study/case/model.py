@@ -61,7 +61,7 @@ def plate_compliance(gripper: Gripper) -> float:
     return relative_compliance(x, y, halves, backing_plate(gripper), foam)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bool, elastic_plate: bool) -> Pad:
     """Discrete pad with its backing plate; the same for all candidates, so it is made once."""
     behind = backing_plate(gripper) if elastic_plate else tilting_mount(gripper)

@@ -57,7 +57,7 @@ def by_formula(scene: Scene) -> tuple[str, ...]:
     wall = has_wall(scene.object) and scene.effects.object != "rigid"
     alike = not wall and not may_bend(scene) and len(scene.load.normal_force) > 1
     holds = {
-        "mesh": scene.accuracy.meshes == 2,
+        "mesh": scene.accuracy.meshes > 1,
         "mu": scene.effects.friction_pressure_coupling != "tangential",
         "modulus": alike,
     }

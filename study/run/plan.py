@@ -126,6 +126,7 @@ def has(scene: Any) -> tuple[str, ...]:
     asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
+    asked["finer meshes"] = scene.accuracy.meshes > 2
     return tuple(name for name, wanted in asked.items() if wanted)
 
 
@@ -252,7 +253,7 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
         repeats = 1 + len(plan.layout.variations)
         seconds = [t * (repeats if u.probe else 1) for t, u in zip(estimated(plan.tried), plan.tried, strict=True)]
         return f"about {duration(START + makespan(plan.in_parts(seconds), ranks))} {on}, estimated on a bed of springs"
-    paths = [plan.layout.shape[-1] * (1 + (scene.accuracy.meshes - 1) / 4)] * len(plan.tried)
+    paths = [plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)] * len(plan.tried)
     low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
     if low == high:
         return f"about {duration(START + low)} {on} ({scene.effects.object.replace('_', ' ')})"

@@ -44,7 +44,7 @@ angles_deg = [0, 5, 185]
 normal_force_n = [1, 3]
 
 [accuracy]
-meshes = 2
+meshes = 3
 
 [uncertainty]
 probes = ["30 mm, 5 deg"]

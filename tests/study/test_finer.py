@@ -1,0 +1,123 @@
+"""A third mesh for the cases whose e_n two do not tell to the target: which ones, what they store, what a failure does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from softjaw.fem.contact.press import Press
+from softjaw.fem.errors import ConvergenceError
+from softjaw.friction.patch import ContactPatch
+from softjaw.study import pipeline
+from softjaw.study.case.finer import joined
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import misses
+from tests.study.test_levels import bits, unit_of, whole
+
+OWN, FINER = (8, 4, 2), (12, 6, 3)
+HERE = "accuracy.meshes=3"
+
+
+def cases(*overrides, wanted=None):
+    return dict(pipeline.solve_unit(unit_of(*overrides), wanted))
+
+
+def without_count(result):
+    values, patch, message, effects = bits(result)
+    return {k: v for k, v in values.items() if k != "maps/pad_elements"}, patch, message, effects
+
+
+@pytest.fixture(scope="module")
+def split():
+    """Errors of the three forces on two meshes, rising, and the cases on up to three for the middle one as target."""
+    errors = {k: found.values["maps/e_n_error"] for k, found in whole(()).items()}
+    target = sorted(errors.values())[1]
+    return errors, target, cases(HERE, f"accuracy.e_n={target!r}")
+
+
+def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target(split):
+    errors, target, found = split
+    count = {k: result.values["maps/pad_elements"] for k, result in found.items()}
+    # the error that is the target is undecided
+    assert count == {k: math.prod(FINER if error >= target else OWN) for k, error in errors.items()}
+    assert sorted(count.values()) == [64, 216, 216]
+
+
+def test_a_case_that_meets_the_target_is_the_one_of_two_meshes(split):
+    errors, target, found = split
+    k = min(errors, key=errors.__getitem__)
+    assert without_count(found[k]) == without_count(cases(f"accuracy.e_n={target!r}", wanted=[k])[k])
+
+
+def test_a_refined_case_has_the_error_of_its_two_finest_meshes_and_the_work_of_all(split):
+    errors, target, found = split
+    twice = cases("gripper.elements=[12, 6, 3]")
+    for k in (k for k, error in errors.items() if error >= target):
+        values = found[k].values
+        # the same state as that of a scene with this mesh, from another coarse one
+        for name in ("maps/e_n", "maps/quality", "maps/p_max", "fingers/S"):
+            assert values[name] == pytest.approx(twice[k].values[name], rel=1e-8)
+        own, before = values["maps/e_n"][0], whole(())[k].values["maps/e_n"][0]
+        assert 0.7 * abs(own - before) / own <= values["maps/e_n_error"] * (1 + 1e-9)
+        flagged = bool(values["maps/flags"] & Flag.COARSE)
+        assert flagged or not misses(values["maps/e_n_error"], target)
+
+
+def test_a_refined_patch_has_the_faces_of_the_scene_and_the_sums_of_the_finer_mesh(split):
+    errors, target, found = split
+    for k, result in found.items():
+        patch, case = result.patch, result.contacts
+        assert patch["pressure"].shape == whole(())[k].patch["pressure"].shape == (2, 16 * 8)
+        S = (patch["pressure"] * patch["area"]).sum(axis=1)
+        assert S == pytest.approx([c.limits["ccm"].S for c in case], rel=1e-12)
+        arm = np.einsum("fn,fni->fi", patch["pressure"] * patch["area"], patch["centroid"]) / S[:, None]
+        whole_arm = [(c.patch.pressure * c.patch.area) @ c.patch.centroid / s for c, s in zip(case, S, strict=True)]
+        assert arm == pytest.approx(np.array(whole_arm), abs=1e-12)
+        assert np.linalg.norm(patch["normal"], axis=2) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_faces_are_joined_by_load_else_by_area():
+    # three faces along and two across on two by one, so that those in the middle are cut in halves
+    centroid = np.array([[x, y, 0.0] for x in (1.0, 3.0, 5.0) for y in (0.5, 1.5)])
+    up, pressure = np.tile([0.0, 0.0, 1.0], (6, 1)), np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    shares = np.array([[1.0, 0.5, 0.0], [0.0, 0.5, 1.0]]), np.ones((1, 2))
+    found = joined(ContactPatch(centroid, np.full(6, 2.0), up, pressure), *shares)
+    assert found["area"].tolist() == [6.0, 6.0]
+    assert found["pressure"].tolist() == [pytest.approx(2.0 / 3.0), 0.0]
+    assert found["centroid"] == pytest.approx(np.array([[1.0, 1.5, 0.0], [13.0 / 3.0, 1.0, 0.0]]))
+    assert found["normal"].tolist() == [[0.0, 0.0, 1.0]] * 2
+
+
+def test_not_a_bit_depends_on_which_forces_are_asked_for(split):
+    errors, target, found = split
+    again = cases(HERE, f"accuracy.e_n={target!r}", wanted=[2])
+    assert list(again) == [2]
+    assert bits(again[2]) == bits(found[2])
+
+
+def test_a_finer_mesh_without_a_state_loses_nothing(monkeypatch, split):
+    at = Press.at
+
+    def fails(press, force, starts):
+        if press.pad.shape.elements == FINER:
+            raise ConvergenceError("the pad is compressed too far")
+        return at(press, force, starts)
+
+    monkeypatch.setattr(Press, "at", fails)
+    found = cases(HERE, "accuracy.e_n=1e-3")
+    for k, result in found.items():
+        values, patch, message, effects = without_count(result)
+        expected = without_count(cases("accuracy.e_n=1e-3", wanted=[k])[k])
+        assert (values, patch, effects) == (expected[0], expected[1], expected[3])
+        assert "the pad is compressed too far" in message
+        assert result.values["maps/pad_elements"] == 64
+
+
+def test_friction_that_acts_back_has_a_third_mesh_too():
+    changes = ("effects.friction_pressure_coupling='tangential'", "load.normal_force_n=[2]", "accuracy.e_n=1e-3")
+    two, three = (cases(*changes, *more)[0].values for more in ((), (HERE,)))
+    assert three["maps/pad_elements"] == 216
+    assert three["maps/e_n_error"] != two["maps/e_n_error"]
+    assert three["maps/e_n"][0] == pytest.approx(two["maps/e_n"][0], rel=2 * two["maps/e_n_error"])
