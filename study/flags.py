@@ -45,7 +45,8 @@ class Flag(IntFlag):
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, use more elements before trusting it", (
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
-        " only one along its length or its width does, trilinear elements are too stiff for foam with a Poisson's"
+        " only one along its length or its width does, the object's normal turns by more than 120 deg between loaded"
+        " faces that lie beside each other, trilinear elements are too stiff for foam with a Poisson's"
         " ratio above 0.45, or two meshes put the error of e_n above accuracy.e_n, where the scene names it"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (

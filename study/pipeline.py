@@ -18,7 +18,7 @@ from softjaw.study.case.build import build_object, own_frame, pad_shape
 from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.effects import Simulated, settled
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
-from softjaw.study.case.finer import stored
+from softjaw.study.case.finer import stored, weight_of
 from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, state_flags
@@ -72,7 +72,7 @@ def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome:
     if len(coarse) == len(fine):
         views = list(zip(*(c.views for c in coarse), strict=True))
         other = _state_values(coarse) | solving.wall_values(outcome, 1)
-        values |= mesh_errors(fine, coarse, values, other, settings, views)
+        values |= mesh_errors(fine, coarse, values, other, settings, views, weight_of(fine, scene))
         # only where the scene asks for a target: without one the sums at the end say how many cases miss the usual one
         if scene.accuracy.e_n is not None:
             values["maps/flags"] |= Flag.COARSE * bool(misses(values["maps/e_n_error"], scene.accuracy.e_n))

@@ -200,12 +200,13 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
 
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
-    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
+    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (), weight: float = OF_MESHES,
 ) -> dict[str, float]:  # fmt: skip
-    """Errors of all quantities that have one, from the contacts on the mesh and on the one half as fine.
+    """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
-    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes.
+    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``weight`` that of the
+    difference: `OF_MESHES` where the coarser mesh is half as fine.
     """
     # of one value for each friction model the curved one's, which comes first; fits would double the time
     fine_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in values.items()} | _judged(fine)
@@ -215,20 +216,24 @@ def mesh_errors(
     fine_mesh, coarse_mesh = fine_mesh | _of_faces(fine), coarse_mesh | _of_faces(coarse)
     return {
         q.of_error.key: estimate(
-            fine_mesh[q.key], coarse_mesh[q.key], [own[q.key] for own in seen if q.key in own], q.error
+            fine_mesh[q.key], coarse_mesh[q.key], [own[q.key] for own in seen if q.key in own], q.error, weight
         )
         for q in TABLE
         if q.error and q.key in coarse_mesh
     }
 
 
-def e_n_error(fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]]) -> float:
+def e_n_error(
+    fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]], weight: float = OF_MESHES
+) -> float:
     """Relative error of e_n alone, as `mesh_errors` has it."""
     own, other, *seen = ([c.limits["ccm"].e_n for c in contacts] for contacts in (fine, coarse, *views))
-    return estimate(own, other, seen, "relative")
+    return estimate(own, other, seen, "relative", weight)
 
 
-def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
+def estimate(
+    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, weight: float = OF_MESHES
+) -> float:
     """Error of a number, or the largest of those of the fingers, from its values on two meshes.
 
     The difference alone passes through zero where the contact's edge lies alike on both meshes; that of the ``views``
@@ -239,7 +244,7 @@ def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kin
     error = np.abs(c - f)
     if views:
         one, two = (np.asarray(view, float) for view in views)
-        error = np.maximum(OF_MESHES * error, OF_VIEWS * np.abs(one - two))
+        error = np.maximum(weight * error, OF_VIEWS * np.abs(one - two))
     if kind == "relative":
         error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
     return float(error.max())

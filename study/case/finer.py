@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.patch import ContactPatch
-from softjaw.study.case.evaluate import e_n_error
+from softjaw.study.case.evaluate import OF_MESHES, e_n_error
 from softjaw.study.case.model import Finger
 from softjaw.study.case.result import surely_below
 from softjaw.study.case.solving import PressedContact, Solved, Solver, solver
@@ -26,6 +26,7 @@ from softjaw.study.scene.sections import MOST_ELEMENTS
 
 FloatArray = NDArray[np.float64]
 TIMES = 1.4  # as many elements in every direction: on the bottle nearer to the limit than twice as many along the sides
+OF_FINER = 1.0  # weight of the difference of e_n between two meshes so near each other
 NOT_SOLVED = "on a finer mesh, which the error of e_n asks for, it was not solved ({reason})"
 
 
@@ -45,10 +46,17 @@ def on_finer(scene: Scene, mesh: int) -> Scene:
     return scene.model_copy(update={"gripper": scene.gripper.model_copy(update={"elements": elements(scene, mesh)})})
 
 
-def error_of(found: Solved) -> float:
+def weight_of(fine: Sequence[PressedContact], scene: Scene) -> float:
+    """Weight of the difference between the two finest meshes of a case."""
+    return OF_MESHES if fine[0].state.pad.shape.elements == scene.gripper.elements else OF_FINER
+
+
+def error_of(found: Solved, scene: Scene) -> float:
     """Error of e_n from the two finest meshes of a case, relative; NaN where there is one alone."""
     fine, coarse = ([c[mesh] for c in found.contacts if len(c) > mesh] for mesh in (0, 1))
-    return e_n_error(fine, coarse, list(zip(*(c.views for c in coarse), strict=True))) if coarse else math.nan
+    if not coarse:
+        return math.nan
+    return e_n_error(fine, coarse, list(zip(*(c.views for c in coarse), strict=True)), weight_of(fine, scene))
 
 
 class Finer:
@@ -76,7 +84,8 @@ class Finer:
         """
         for mesh in range(3, self._scene.accuracy.meshes + 1):
             # undecided, and unknown, is refined, which is right in both cases
-            if surely_below(error_of(found), self._target) or math.prod(elements(self._scene, mesh)) > MOST_ELEMENTS:
+            error = error_of(found, self._scene)
+            if surely_below(error, self._target) or math.prod(elements(self._scene, mesh)) > MOST_ELEMENTS:
                 break
             try:
                 found = self._again(mesh, found, force)

@@ -34,6 +34,7 @@ from softjaw.study.scene import Scene
 EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
 OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
 FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
+BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
 STARTS = 3  # states of the coarser mesh that a force on the fine one is started from, before it starts from nothing
@@ -129,14 +130,23 @@ class PressedContact(Contact):
         # a single line of nodes loads the elements on both sides of it
         shared = self.state.pad.contact == "nodal"
         few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) - shared < NARROW
+        normals = self.patch.normal.reshape(n * k, m * k, 3)
+        # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
+        pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)
+        bent = any((np.einsum("ijc,ijc->ij", a, b)[p & q] < np.cos(BENT)).any() for (a, b), (p, q) in pairs)
         overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
         # Trilinear elements alone lock when the foam is nearly incompressible.
-        return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
+        return bool(overlaps or few or bent or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
 
     @property
     def free_face(self) -> float:
         """How far the unloaded part of the contact face has come beyond first touch [m]."""
         return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
+
+
+def _neighbours(grid: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Values on a grid of faces beside those of their neighbours, along the one side and the other."""
+    return [(grid[:-1], grid[1:]), (grid[:, :-1], grid[:, 1:])]
 
 
 def state_flags(contacts: Sequence[PressedContact]) -> int:
