@@ -29,7 +29,8 @@ LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, w
 SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-LONGEST_SOLVE = 12  # Newton iterations of a step from one state to the next; good ones take 3 to 8
+# Newton iterations of a step from one state to the next: good ones take 3 to 8, with friction 4 to 14.
+LONGEST_SOLVE, WITH_FRICTION = 12, 24
 MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
@@ -111,6 +112,8 @@ class Grip(LoadPath):
     fallback : callable, optional
         Makes the same problem with nodal gaps, for forces at which this one has no solution; its unknowns must be
         numbered alike.
+    load_steps : callable
+        From one force [N] (0: no contact yet) to the next: the forces to go through, the last of them the next.
     """
 
     problem: GripProblem
@@ -119,6 +122,7 @@ class Grip(LoadPath):
     options: dict[str, Any] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
     fallback: Callable[[], GripProblem] | None = None
+    load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
 
     def __post_init__(self) -> None:
         """Set up the solver."""
@@ -135,11 +139,12 @@ class Grip(LoadPath):
     def _steps(self) -> Stepping:
         """Steps of the problem as it is now."""
         fingers = self.problem.fingers
+        most = LONGEST_SOLVE if self.problem.memory is None else WITH_FRICTION
         return Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda closing: min(bed.force_scale(closing) for bed in self._beds),
             ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
-            None if "contact_snes_max_it" in self.options else LONGEST_SOLVE, self._watch,
+            None if "contact_snes_max_it" in self.options else most, self._watch,
         )  # fmt: skip
 
     def _guess(self, closing: float) -> FloatArray:
@@ -158,6 +163,7 @@ class Grip(LoadPath):
             At the first force without an acceptable state.
         """
         here = None
+        self.problem.begin()
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
             here = self._next(here, force, work)
@@ -226,6 +232,9 @@ class Grip(LoadPath):
         last, self.problem, self.fallback = self.opening.last, self.fallback(), None
         self._start_again()
         self.opening.last = last
+        # what friction remembers belongs to the other problem, so with friction the path begins anew
+        if self.problem.memory is not None:
+            here = None
         try:
             return self._level(here, force, work)
         except ConvergenceError as again:
@@ -265,9 +274,13 @@ class Grip(LoadPath):
 
     def _level(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact."""
-        self.solver.left, self._peak = MOST_ITERATIONS, 0.0 if here is None else here.force
+        self._peak = 0.0 if here is None else here.force
         try:
-            return self._climb(here, force, work)
+            for goal in self.load_steps(self._peak, force):
+                self.solver.left = MOST_ITERATIONS
+                here = self._climb(here, goal, work)
+            assert here is not None
+            return here
         except SpentError as error:
             spent = f"given up after {MOST_ITERATIONS} Newton iterations"
             raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
@@ -277,6 +290,7 @@ class Grip(LoadPath):
         if here is None:
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
+            self.problem.accept(x)
             # foam gets stiffer, so this is more than what comes
             here = _OnPath(x, reached, self.problem.closing(x) / reached, False, False)
         x, reached = here.x, here.force
@@ -297,6 +311,7 @@ class Grip(LoadPath):
         """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
         # twice what the slope so far foretells; a snap goes much further
         expected = max(JUMP, 2.0 * compliance * (force - reached))
+        before = self.problem.memory
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
@@ -305,10 +320,12 @@ class Grip(LoadPath):
             pass
         # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
+        self.problem.memory = before
         ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces, SHORTEST_STEP)
         return ahead, falls([reached, *forces])
 
     def _watch(self, x: FloatArray, force: float) -> None:
+        self.problem.accept(x)
         self.opening.watch(self.problem.wall_state(x), force)
         self._peak = max(self._peak, force)
 

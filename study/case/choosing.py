@@ -95,16 +95,6 @@ class Candidate:
 
     # --- what the table asks for --------------------------------------------------------------------------------------
 
-    @property
-    def rigid(self) -> bool:
-        """Whether the object is simulated as rigid."""
-        return not self.walled or self.scene.effects.object == "rigid"
-
-    @property
-    def on_rigid(self) -> Scene:
-        """The scene so far, on the rigid object."""
-        return self.scene if self.rigid else at_levels(self.scene, object="rigid")
-
     @cached_property
     def plate_compliance(self) -> float:
         """Of the backing plate over that of the pad."""
@@ -176,8 +166,6 @@ class Candidate:
         doubt = self._doubt(name, step, k)
         if surely_below(abs(change) + doubt, self.target):
             return Level(low, indicator, effects.LITTLE, change, payload)
-        if not row.possible(self):
-            return Level(low, indicator, effects.NOT_HERE, change, payload)
         # undecided takes the dearer level, which is right in both cases
         above = abs(change) > self.target
         return Level(high, indicator, effects.MUCH if above else effects.UNDECIDED, change, payload)
@@ -199,13 +187,13 @@ class Candidate:
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float]:
         """As `change`; of effects that all forces share the change at the force where e_n changes most."""
         if ROWS[name].each_force:
-            return self._compared_at(self.on_rigid, name, step, k)
-        each = [self._compared_at(self.scene, name, step, i) for i in range(len(self.forces))]
+            return self._compared_at(name, step, k)
+        each = [self._compared_at(name, step, i) for i in range(len(self.forces))]
         # what is not known at some force may be the largest
         return max(each, key=lambda found: np.inf if np.isnan(found[0]) else abs(found[0]))
 
-    def _compared_at(self, base: Scene, name: str, step: Step, k: int) -> tuple[float, float]:
-        low, high = (self.seen(at_levels(base, **{name: level}), self.forces, k) for level in (step.low, step.high))
+    def _compared_at(self, name: str, step: Step, k: int) -> tuple[float, float]:
+        low, high = (self.seen(at_levels(self.scene, **{name: own}), self.forces, k) for own in (step.low, step.high))
         if low is None or high is None:
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
@@ -277,14 +265,14 @@ class Candidate:
         """Levels of the effects that are chosen at the ``k``-th force, whose contacts are solved."""
         found = {name: levels[k] for name, levels in self.levels.items()}
         own = found[COUPLING]
-        if own.reason == effects.FORCED and self.rigid:
+        if own.reason == effects.FORCED:
             indicator = max(neglected_traction(c.state, c.mu) for c in contacts)
             found[COUPLING] = own._replace(indicator=indicator)
         return found
 
     def flags_at(self, k: int) -> Flag:
         """Flag of a case that lacks an effect that moves its e_n by more than the target."""
-        left_out = self.levels[COUPLING][k].reason in (effects.NOT_HERE, effects.FAILED)
+        left_out = self.levels[COUPLING][k].reason == effects.FAILED
         return Flag.LEFT_OUT if left_out else Flag(0)
 
     def destroy(self) -> None:

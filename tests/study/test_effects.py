@@ -52,10 +52,10 @@ def test_neglected_traction_is_that_of_sheared_columns_until_they_slide():
 FREE, TAKEN = "none", "tangential traction"
 
 
-def choice(indicator, changes, target=0.01, possible=True, payload=0.0):
+def choice(indicator, changes, target=0.01, payload=0.0):
     """Levels of one effect at as many forces as there are changes, with bounds of 0.02 and 0.5 for a target of 1 %."""
     step = effects.Step("none", "tangential", lambda c, k: indicator, 0.02, 0.5)
-    row = effects.Row((step,), each_force=True, possible=lambda c: possible)
+    row = effects.Row((step,), each_force=True)
     candidate = Candidate.__new__(Candidate)
     candidate.target, candidate.forces = target, tuple(range(1, len(changes) + 1))
     name = "friction_pressure_coupling"
@@ -72,7 +72,6 @@ def choice(indicator, changes, target=0.01, possible=True, payload=0.0):
     (0.1, 0.01, {}, TAKEN, effects.UNDECIDED),
     (0.1, np.nan, {}, TAKEN, effects.UNDECIDED),  # no state on the coarse mesh
     (0.1, 0.004, {"payload": -0.07}, TAKEN, effects.UNDECIDED),
-    (0.1, 0.011, {"possible": False}, FREE, effects.NOT_HERE),
     (np.nan, 0.001, {}, FREE, effects.LITTLE),
 ])  # fmt: skip
 def test_an_effect_is_skipped_taken_or_measured(indicator, change, settings, level, reason):
@@ -103,7 +102,7 @@ def test_every_effect_is_a_row_with_steps_or_settled():
 def test_a_flag_tells_what_is_left_out():
     candidate = Candidate.__new__(Candidate)
     level = choice(0.1, [0.02])[0]
-    for reason, flagged in ((effects.MUCH, False), (effects.NOT_HERE, True), (effects.FAILED, True)):
+    for reason, flagged in ((effects.MUCH, False), (effects.FAILED, True)):
         candidate.levels = {"friction_pressure_coupling": [level._replace(reason=reason)]}
         assert bool(candidate.flags_at(0) & Flag.LEFT_OUT) == flagged
 

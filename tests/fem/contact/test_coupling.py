@@ -61,7 +61,7 @@ def test_a_rough_plane_holds_the_front():
     (smooth,) = Press(pad_of(), reference.plane).load_path([5.0])
     home = pad_of().nodes[pad_of().contact_nodes][:, :2]
     spread = [np.abs(state.contact_face[:, :2] - home).max() for state in (rough, smooth)]
-    assert spread[0] < 0.05 * spread[1]
+    assert spread[0] < 0.08 * spread[1]
     assert rough.closing < 0.98 * smooth.closing  # a held pad is stiffer
 
 
