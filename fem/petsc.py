@@ -185,6 +185,7 @@ class NonlinearSolver:
         self._pattern = self.problem.pattern
         self._stored = self._pattern.start
         self._condensed: SymmetricProblem | None = None
+        self._right_side: Callable[[FloatArray], FloatArray] | None = None
         self._norms: list[float] = []  # of the residual, at every step of this solve
         self._end: FloatArray | None = None  # solution of the solve before
         self._matrix = PETSc.Mat().createAIJ(
@@ -210,9 +211,13 @@ class NonlinearSolver:
         """Ask for the symmetric form of the tangent if there is one and the solver is one that gets on with it."""
         kind = (PETSc.Options().getAll() | self.options).get(f"{self.prefix}snes_type", "newtonls")
         # others use residual and tangent for more than a step, so these have to belong together
-        if kind == "newtonls" and getattr(self.problem, "symmetric", False):
+        if kind != "newtonls":
+            return
+        if getattr(self.problem, "guesses", False):
+            self._right_side = cast(SymmetricProblem, self.problem).right_side
+        if getattr(self.problem, "symmetric", False):
             self._condensed = cast(SymmetricProblem, self.problem)
-            self._condensed.condensed = True
+            self._condensed.condensed, self._right_side = True, self._condensed.right_side
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     @contextmanager
@@ -368,9 +373,9 @@ class NonlinearSolver:
         # a matrix that nobody touches is not factorised again
         if not self._keeps(x.array_r):
             self._timed(lambda: self._fill(x.array_r, matrix))
-        if self._condensed:
+        if self._right_side is not None:
             # between the norm of the residual and the linear system with it: nobody asks for it again
-            self._f.array[:] = self._condensed.right_side(self._f.array_r)
+            self._f.array[:] = self._right_side(self._f.array_r)
 
     def _fill(self, x: FloatArray, matrix: PETSc.Mat) -> None:
         self.problem.tangent(x)

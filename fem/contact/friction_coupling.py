@@ -24,36 +24,27 @@ from softjaw.fem.pad.mesh import Pad
 FloatArray = NDArray[np.float64]
 STICK = 100.0  # stiffness of stick in units of E / thickness; three times as much moves e_n by less than 0.1 %
 GROWTH, START = 1.5, 0.02  # of the force from step to step, and of the first force at the first step
-FEW = 2.0, 0.1  # the same where e_n need only be good to a third of what friction changes in it
 BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
 MOST_DAMPED = 0.125  # of a step of Newton's method
 
 
-def load_steps(reached: float, force: float, growth: float = 0.0, start: float = 0.0) -> list[float]:
-    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most ``growth`` times the last.
-
-    ``start`` is the share of the first force that is gone to first; 0 takes `GROWTH` and `START`.
+def load_steps(reached: float, force: float) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
 
     >>> load_steps(2.0, 4.0)
     [2.8284271247461903, 4.0]
     """
-    growth, start = growth or GROWTH, start or START
-    low = reached or start * force
+    low = reached or START * force
     # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
-    steps = max(1, math.ceil(math.log(force / low) / math.log(growth) - 1e-9))
+    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
     between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
     return [*([] if reached else [low]), *between, force]
-
-
-def few_load_steps(reached: float, force: float) -> list[float]:
-    """As `load_steps`, to find out what friction does rather than to have the result."""
-    return load_steps(reached, force, *FEW)
 
 
 class CoupledProblem(ContactProblem):
     """A pad pressed on an object with friction coefficient ``mu``; for the rest a `ContactProblem`."""
 
-    symmetric = False  # slip grows with the pressure, but no pressure with slip
+    symmetric, guesses = False, True  # slip grows with the pressure, but no pressure with slip
 
     def __init__(self, pad: Pad, gap: Gap, mu: float) -> None:
         super().__init__(pad, gap)
@@ -65,8 +56,12 @@ class CoupledProblem(ContactProblem):
         shape = self.pad.face_area.shape
         self._at, self._before = np.zeros((*shape, 3)), np.zeros((*shape, 3))
         self._closed = np.zeros(shape, dtype=bool)
+        self._path: list[FloatArray] = []
         # the last step of Newton's method and where it led to: nowhere yet
         self._step, self._reached, self._damping = np.zeros(self.size), np.full(self.size, np.nan), 1.0
+        self._along = np.zeros((*shape, 3))  # directions of slip at the last tangent; zero: none
+        self._stuck: FloatArray | None = None
+        self._guessed = False
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
@@ -76,6 +71,12 @@ class CoupledProblem(ContactProblem):
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
         self._reached = np.full(self.size, np.nan)
+        self._path.append(x.copy())
+
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that were accepted before ``x``: what its tractions depend on."""
+        # a state is accepted as the end of one step, and again as the start of the next
+        return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""
@@ -83,14 +84,27 @@ class CoupledProblem(ContactProblem):
         # the contact face was not evaluated for a refused step: tractions would be those of another state
         if np.isnan(R[0]):
             return R
+        return R - self._forces(self._traction(x)[0])
+
+    def _forces(self, traction: FloatArray) -> FloatArray:
+        """Nodal forces ``(size,)`` [N] of tractions at the points ``(faces, points, 3)`` [Pa]."""
         pad = self.pad
-        force = np.einsum("fq,qa,fqi->fia", pad.face_area, pad.face_N, self._traction(x)[0])
-        return R - gather(self.dofs, force, self.size)
+        return gather(self.dofs, np.einsum("fq,qa,fqi->fia", pad.face_area, pad.face_N, traction), self.size)
+
+    def right_side(self, R: FloatArray) -> FloatArray:
+        """Residual ``(size,)`` with points that slip back taken as stuck, as in the tangent."""
+        stuck, self._stuck = self._stuck, None  # a step with older factors is made with the residual itself
+        self._guessed = stuck is not None
+        return R if stuck is None else R - stuck
 
     def _evaluate_entries(self, x: FloatArray) -> None:
         super()._evaluate_entries(x)
+        if not np.array_equal(x, self._reached):  # another solve has begun
+            self._along[:] = 0.0
         N, weight = self.pad.face_N, self.pad.face_area
-        _, by_place, by_pressure = self._traction(x, derivatives=True)
+        t, by_place, by_pressure = self._traction(x, derivatives=True)
+        beyond = t - self._traction(x)[0]
+        self._stuck = self._forces(beyond) if beyond.any() else None
         # products of shape functions times what each point adds: two matrices, of which one is the same for all facets
         (m, points), k = weight.shape, N.shape[1]
         NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
@@ -114,7 +128,7 @@ class CoupledProblem(ContactProblem):
         factor = super().shorten(x, step)
         moved = slice(0, self.pad.closing_dof + 1)
         before, now = self._step[moved], step[moved]
-        if not np.array_equal(x, self._reached):  # another solve has begun
+        if self._guessed or not np.array_equal(x, self._reached):  # the guess is left as it is; another solve has begun
             self._damping = 1.0
         elif before @ now < -BACKWARDS * (before @ before):
             self._damping = max(0.5 * self._damping, MOST_DAMPED)
@@ -150,6 +164,10 @@ class CoupledProblem(ContactProblem):
         # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
         slips = (size > most)[..., None]
         along = trial / np.where(size > 0.0, size, 1.0)[..., None]
+        if derivatives:
+            back = slips & (np.einsum("fqi,fqi->fq", along, self._along)[..., None] < 0.0)
+            self._along = np.where(slips, along, 0.0)
+            slips &= ~back
         t = np.where(slips, most[..., None] * along, trial)
         if not derivatives:
             return (t,)

@@ -167,23 +167,22 @@ class Solved:
 
 
 def solver(
-    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False,
-    hasty: bool = False,
-) -> Solver:  # fmt: skip
+    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False
+) -> Solver:
     """Solver for both fingers at first touch at the levels that the scene names; an ``auto`` is the cheapest one.
 
     Parameters
     ----------
     coarse : Solver, optional
         Of the same candidate on the coarser mesh.
-    coarser, hasty : bool
-        Whether this is that one, and whether friction that acts back takes few load steps.
+    coarser : bool
+        Whether this is that one.
     """
     if getattr(scene.object, "wall", None) is not None:
         refuse_along_axis(fingers)
         if scene.effects.object.endswith("shell"):
             return OnWall(scene, fingers, coarse, coarser)
-    return OnRigid(scene, fingers, coarse, coarser, poses, hasty)
+    return OnRigid(scene, fingers, coarse, coarser, poses)
 
 
 def followed(
@@ -329,14 +328,13 @@ class OnRigid(Solver):
     """Fingers on a rigid object do not feel each other."""
 
     def __init__(
-        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any],
-        hasty: bool,
-    ) -> None:  # fmt: skip
+        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any]
+    ) -> None:
         super().__init__(scene, fingers, coarse)
         one, other = poses
         self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
         solved = fingers[:1] if self.shared else fingers
-        self.paths = [press_of(scene, f, coarser, hasty) for f in solved]
+        self.paths = [press_of(scene, f, coarser) for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own.pad.symmetry) for own in self.paths)
 
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
