@@ -28,30 +28,21 @@ STICK = 30.0
 # Of the force from step to step, and of the first force at the first step: steps of 1.25 from 0.01 move e_n by up to
 # 0.3 %. Growth by 3 moves it by 1 %, a start at 0.1 by 0.3 %, both at the lowest force.
 GROWTH, START = 2.0, 0.02
-FEW = 2.0, 0.1  # the same where e_n need only be good to a third of what friction changes in it
 BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
 MOST_DAMPED = 0.125  # of a step of Newton's method
 
 
-def load_steps(reached: float, force: float, growth: float = 0.0, start: float = 0.0) -> list[float]:
-    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most ``growth`` times the last.
-
-    ``start`` is the share of the first force that is gone to first; 0 takes `GROWTH` and `START`.
+def load_steps(reached: float, force: float) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
 
     >>> load_steps(2.0, 4.0)
     [2.8284271247461903, 4.0]
     """
-    growth, start = growth or GROWTH, start or START
-    low = reached or start * force
+    low = reached or START * force
     # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
-    steps = max(1, math.ceil(math.log(force / low) / math.log(growth) - 1e-9))
+    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
     between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
     return [*([] if reached else [low]), *between, force]
-
-
-def few_load_steps(reached: float, force: float) -> list[float]:
-    """As `load_steps`, to find out what friction does rather than to have the result."""
-    return load_steps(reached, force, *FEW)
 
 
 def stick_or_slip(
@@ -151,6 +142,7 @@ class CoupledProblem(ContactProblem):
         self._at, self._before = np.zeros((*shape, 3)), np.zeros((*shape, 3))
         self._closed = np.zeros(shape, dtype=bool)
         self._damping = Damping(slice(0, self.pad.closing_dof + 1))
+        self._path: list[FloatArray] = []
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
@@ -160,6 +152,12 @@ class CoupledProblem(ContactProblem):
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
         self._damping.forget()
+        self._path.append(x.copy())
+
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that were accepted before ``x``: what its tractions depend on."""
+        # a state is accepted as the end of one step, and again as the start of the next
+        return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""

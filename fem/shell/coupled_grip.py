@@ -71,6 +71,7 @@ class CoupledGripProblem(GripProblem):
             _Anchor(*np.zeros((3, n, 3)), np.zeros((n, 4), np.int32), np.zeros((n, 4)), np.zeros(n, dtype=bool))
             for n in (f.pad.face_area.size for f in self.fingers)
         )
+        self._path: list[FloatArray] = []
         moved = np.concatenate([np.arange(self.model.size), *(np.r_[f.offset : f.closing_dof] for f in self.fingers)])
         self._damping = Damping(moved)
 
@@ -84,7 +85,12 @@ class CoupledGripProblem(GripProblem):
             moved = np.einsum("na,nai->ni", wall.N, v[wall.nodes])
             anchors.append(_Anchor(f.object_points(x), moved, self._traction(k, x, c)[0], wall.nodes, wall.N, closed))
         self.memory = tuple(anchors)
+        self._path.append(x.copy())
         self._damping.forget()
+
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that were accepted before ``x``: what its tractions depend on."""
+        return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[Evaluated]:
         """As that of the frictionless problem, with the tractions' forces."""

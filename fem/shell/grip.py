@@ -67,14 +67,21 @@ class WallState:
     opening: float
 
 
+Parts = tuple[FloatArray, tuple[FloatArray, ...]]  # of a state: that of the shell, and unknowns of the pads
+
+
 @dataclass(frozen=True)
 class Gripped:
-    """Both fingers, or the one that symmetry leaves, where they stand, and the wall in equilibrium at one force."""
+    """Both fingers, or the one that symmetry leaves, where they stand, and the wall in equilibrium at one force.
+
+    ``history`` are the states before it that it depends on; none without friction.
+    """
 
     force: float
     fingers: tuple[Pressed, ...]
     poses: tuple[Pose, ...]
     wall: WallState
+    history: tuple[Parts, ...] = ()
 
     @property
     def path_dependent(self) -> bool:
@@ -163,7 +170,6 @@ class Grip(LoadPath):
             At the first force without an acceptable state.
         """
         here = None
-        self.problem.begin()
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
             here = self._next(here, force, work)
@@ -193,7 +199,11 @@ class Grip(LoadPath):
 
     def _from(self, start: Gripped, work: Work) -> _OnPath:
         """State at the force of a coarser mesh's, by one Newton solve."""
-        x0, force, thickness = self._interpolated(start), start.force, self._stepping.thickness
+        self.problem.begin()
+        for before in start.history:
+            self.problem.accept(self._interpolated(start, before))
+        x0 = self._interpolated(start, (start.wall.q, tuple(own.unknowns for own in start.fingers)))
+        force, thickness = start.force, self._stepping.thickness
         x = self._stepping.solve(x0, Control(force=force), work, self._stepping.most)
         moved = np.delete(x - x0, np.concatenate([np.r_[f.pressures] for f in self.problem.fingers]))
         compliance = self._compliance()
@@ -206,17 +216,17 @@ class Grip(LoadPath):
         self._gripped(here, work, Seconds())
         return here
 
-    def _interpolated(self, start: Gripped) -> FloatArray:
-        """Unknowns of a coarser mesh's state."""
-        x, model = np.zeros(self.problem.size), self.problem.model
-        x[: model.size] = wall_interpolation.interpolated(start.wall.mesh, start.wall.q, model.shell.mesh)[model.free]
+    def _interpolated(self, start: Gripped, parts: Parts) -> FloatArray:
+        """Unknowns of a coarser mesh's state, or of one in its history."""
+        x, model, (q, pads) = np.zeros(self.problem.size), self.problem.model, parts
+        x[: model.size] = wall_interpolation.interpolated(start.wall.mesh, q, model.shell.mesh)[model.free]
         for k, f in enumerate(self.problem.fingers):
             # where the coarser mesh has one finger, the other one is its image in x = 0
             image = np.array([-1.0 if k >= len(start.fingers) else 1.0, 1.0, 1.0])
             other = min(k, len(start.fingers) - 1)
             own = start.fingers[other]
             turn = np.einsum("ji,j,ji->i", start.poses[other].rotation, image, f.pose.rotation).round()
-            x[f.own] = interpolated(own.pad, own.unknowns, f.pad, turn)
+            x[f.own] = interpolated(own.pad, pads[other], f.pad, turn)
         return x
 
     def _next(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
@@ -288,6 +298,7 @@ class Grip(LoadPath):
     def _climb(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
         if here is None:
+            self.problem.begin()
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
             self.problem.accept(x)
@@ -366,7 +377,8 @@ class Grip(LoadPath):
         self._check_balance(fingers, load, force)
         mesh, poses = problem.model.shell.mesh, tuple(f.pose for f in problem.fingers)
         wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
-        return Gripped(force, tuple(fingers), poses, wall)
+        before = tuple((problem.wall_state(y), tuple(y[f.own] for f in problem.fingers)) for y in problem.history(x))
+        return Gripped(force, tuple(fingers), poses, wall, before)
 
     def _check_balance(self, fingers: Sequence[Pressed], load: FloatArray, force: float) -> None:
         """Refuse a state in which the wall does not bear what the pads press with."""

@@ -288,6 +288,10 @@ class GripProblem:
     def accept(self, x: FloatArray) -> None:
         """Note a state that the next one starts from; without friction the load path does not matter."""
 
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that ``x`` depends on, the first one first."""
+        return ()
+
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
         f = self.fingers[number]

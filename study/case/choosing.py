@@ -114,12 +114,12 @@ class Candidate:
         return indentation / closing, ratio
 
     def coarse(self, scene: Scene, forces: Sequence[float]) -> Solver:
-        """The candidate on the coarse mesh at the levels of a scene, for these forces; friction in few load steps."""
+        """The candidate on the coarse mesh at the levels of a scene, for these forces."""
         # each load path has a solver of its own, or what one needed would change the other
         levels = (getattr(scene.effects, name) for name, row in ROWS.items() if row.steps)
         key = (*levels, scene.accuracy.contact, *forces)
         if key not in self._coarse:
-            self._coarse[key] = solver(scene, self.fingers, self.poses, coarser=True, hasty=True)
+            self._coarse[key] = solver(scene, self.fingers, self.poses, coarser=True)
         return self._coarse[key]
 
     def seen(self, scene: Scene, forces: Sequence[float], k: int) -> list[PressedContact] | None:
@@ -196,6 +196,9 @@ class Candidate:
         low, high = (self.seen(at_levels(self.scene, **{name: own}), self.forces, k) for own in (step.low, step.high))
         if low is None or high is None:
             return nan, nan
+        # what other gaps change is no measure of the effect
+        if any(a.nodal_instead != b.nodal_instead for a, b in zip(low, high, strict=True)):
+            return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
         return other / e_n - 1.0 if e_n > 0 else nan, other_held / held - 1.0 if held > 0 else nan
 
@@ -223,12 +226,7 @@ class Candidate:
 
     def _solver(self, scene: Scene) -> Solver:
         """On the scene's meshes; what has been solved on the coarse one already is not solved again."""
-        if self.asked.accuracy.meshes == 1:
-            coarse = None
-        elif getattr(scene.effects, COUPLING) == "none":
-            coarse = self.coarse(scene, self.forces)
-        else:
-            coarse = solver(scene, self.fingers, self.poses, coarser=True)
+        coarse = None if self.asked.accuracy.meshes == 1 else self.coarse(scene, self.forces)
         return solver(scene, self.fingers, self.poses, coarse)
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:

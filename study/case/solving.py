@@ -15,7 +15,7 @@ import numpy as np
 
 from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, turned
-from softjaw.fem.contact.friction_coupling import few_load_steps, load_steps
+from softjaw.fem.contact.friction_coupling import load_steps
 from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.shell.coupled_grip import CoupledGripProblem
@@ -176,23 +176,22 @@ class Solved:
 
 
 def solver(
-    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False,
-    hasty: bool = False,
-) -> Solver:  # fmt: skip
+    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False
+) -> Solver:
     """Solver for both fingers at first touch at the levels that the scene names; an ``auto`` is the cheapest one.
 
     Parameters
     ----------
     coarse : Solver, optional
         Of the same candidate on the coarser mesh.
-    coarser, hasty : bool
-        Whether this is that one, and whether friction that acts back takes few load steps.
+    coarser : bool
+        Whether this is that one.
     """
     if getattr(scene.object, "wall", None) is not None:
         refuse_along_axis(fingers)
         if scene.effects.object.endswith("shell"):
-            return OnWall(scene, fingers, coarse, coarser, hasty)
-    return OnRigid(scene, fingers, coarse, coarser, poses, hasty)
+            return OnWall(scene, fingers, coarse, coarser)
+    return OnRigid(scene, fingers, coarse, coarser, poses)
 
 
 def followed(
@@ -338,14 +337,13 @@ class OnRigid(Solver):
     """Fingers on a rigid object do not feel each other."""
 
     def __init__(
-        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any],
-        hasty: bool,
-    ) -> None:  # fmt: skip
+        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any]
+    ) -> None:
         super().__init__(scene, fingers, coarse)
         one, other = poses
         self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
         solved = fingers[:1] if self.shared else fingers
-        self.paths = [press_of(scene, f, coarser, hasty) for f in solved]
+        self.paths = [press_of(scene, f, coarser) for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own.pad.symmetry) for own in self.paths)
 
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
@@ -386,10 +384,10 @@ class _Followed:
 class OnWall(Solver):
     """Fingers on a thin wall press against each other through it."""
 
-    def __init__(self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, hasty: bool) -> None:
+    def __init__(self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool) -> None:
         super().__init__(scene, fingers, coarse)
         self.held = grasp_of(scene, fingers, coarser)
-        grip = _grip(scene, fingers, self.held, coarser, hasty)
+        grip = _grip(scene, fingers, self.held, coarser)
         self.paths, self.shell = [grip], grip.problem.model.shell
         self.fingers_solved, self.planes = len(self.held.poses), sum(self.held.mirrors)
 
@@ -443,8 +441,8 @@ def grasp_of(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
     return held
 
 
-def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool, hasty: bool) -> Grip:
-    """Both fingers on the wall; parameters as for `solver`."""
+def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Grip:
+    """Both fingers on the wall."""
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size
     body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
@@ -458,11 +456,10 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool, hasty
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
     first, *others = contact_rules(scene, walled=True)
-    # what is measured only is not compared with other gaps, which would change e_n, too
-    fallback = (lambda: problem(others[0])) if others and not (coupled and hasty) else None
+    fallback = (lambda: problem(others[0])) if others else None
     grip = Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
     if coupled:
-        grip.load_steps = few_load_steps if hasty else load_steps
+        grip.load_steps = load_steps
     return grip
 
 
