@@ -68,8 +68,8 @@ class CoupledGripProblem(GripProblem):
     def begin(self) -> None:
         """Begin another load path: nothing has touched yet."""
         self.memory: tuple[_Anchor, ...] = tuple(
-            _Anchor(*np.zeros((3, n, 3)), np.zeros((n, 4), np.int32), np.zeros((n, 4)), np.zeros(n, dtype=bool))
-            for n in (f.pad.face_area.size for f in self.fingers)
+            _Anchor(nowhere, nowhere, nowhere, np.zeros((n, 4), np.int32), np.zeros((n, 4)), np.zeros(n, dtype=bool))
+            for n, nowhere in ((f.pad.face_area.size, np.zeros((f.pad.face_area.size, 3))) for f in self.fingers)
         )
         self._path: list[FloatArray] = []
         moved = np.concatenate([np.arange(self.model.size), *(np.r_[f.offset : f.closing_dof] for f in self.fingers)])
