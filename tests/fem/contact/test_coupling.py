@@ -121,6 +121,43 @@ def test_tangent_by_finite_differences(control, gap):
     np.testing.assert_allclose(K @ d, found, atol=1e-5 * np.abs(found).max())
 
 
+def test_points_that_slip_back_in_a_solve_are_taken_as_stuck():
+    """Residual and tangent of the step are then those without a limit of friction; the residual itself stays."""
+    pad = pad_of((False, False), (6, 4, 2))
+    limited, stuck = (CoupledProblem(pad, reference.plane, mu) for mu in (0.2, 1e9))
+    at = SpringBed(pad, reference.plane).guess(0.002)
+    aside = np.zeros(pad.size)
+    sideways = pad.dofs[pad.contact_nodes, 1]
+    aside[sideways[sideways >= 0]] = 1e-5
+    for problem in (limited, stuck):
+        problem.control = Control(force=3.0)
+        problem.accept(at)
+    for sign, same in ((1.0, False), (-1.0, True)):
+        x = at + sign * aside
+        K, found = [reference.dense(problem, x) for problem in (limited, stuck)], limited.right_side(limited.residual(x))
+        assert (np.abs(K[0] - K[1]).max() < 1e-9 * np.abs(K[1]).max()) == same
+        assert np.allclose(found, stuck.residual(x), rtol=0, atol=1e-9) == same
+        assert not np.allclose(limited.residual(x), stuck.residual(x), rtol=0, atol=1e-3)
+        assert limited.shorten(x, 2.0 * aside) == 1.0  # goes back to the other side of where the points stuck
+
+
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+def test_a_force_by_itself_remembers_the_load_path_of_a_coarser_mesh(gap):
+    """One step leads to the state of the load path: the same from its own mesh, nearly so from a coarser one."""
+    forces, fine, coarse = [1.0, 8.0], pad_of(elements=(8, 6, 2)), pad_of((True, False), (4, 3, 1))
+    path, starts = (list(press(gap, 0.4, pad).load_path(forces)) for pad in (fine, coarse))
+    one = press(gap, 0.4, fine)
+    for k in (1, 0):
+        again, found = one.at(forces[k], [path[k]]), one.at(forces[k], [starts[k]])
+        assert again.unknowns.tobytes() == press(gap, 0.4, fine).at(forces[k], [path[k]]).unknowns.tobytes()
+        assert (again.steps, found.steps) == (1, 1)
+        np.testing.assert_allclose(again.pressure, path[k].pressure, atol=1e-7 * path[k].pressure.max())
+        assert found.closing == pytest.approx(path[k].closing, rel=2e-2)
+        size = np.linalg.norm(found.points.friction, axis=-1)
+        assert (size <= 0.4 * found.points.load * (1 + 1e-9)).all()
+        assert found.checks.force_balance < 1e-8
+
+
 def test_newton_steps_to_and_fro_are_damped_and_others_are_not():
     problem = CoupledProblem(pad_of(), BALL, 0.4)
     x, step = np.zeros(problem.size), np.full(problem.size, 1e-7)
