@@ -7,7 +7,12 @@ At every quadrature point of the contact face a traction ``t`` resists what the 
     t = mu p P d / |P d|   elsewhere                              (slip)
 
 A point that was open at the last state starts without traction. So the result depends on the load path, as friction
-does; `load_steps` divides the forces finely enough. The tangent is exact.
+does; `load_steps` divides the forces finely enough. What it depends on are the states on the way: accepted again, those
+of a coarser mesh, interpolated, let a finer one start at any force.
+
+The tangent is exact. A point that is past the place where it sticks, and slips back, would slip beyond it in the next
+step of Newton's method, too; so where a point slips against the way it slipped in the step before, the step is made as
+if it stuck: with the tangent and the residual (`CoupledProblem.right_side`) of sticking.
 """
 
 from __future__ import annotations
@@ -71,11 +76,12 @@ class CoupledProblem(ContactProblem):
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
         self._reached = np.full(self.size, np.nan)
-        self._path.append(x.copy())
+        # a state is accepted as the end of one step, and again as the start of the next
+        if not (self._path and np.array_equal(x, self._path[-1])):
+            self._path.append(x.copy())
 
     def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """States that were accepted before ``x``: what its tractions depend on."""
-        # a state is accepted as the end of one step, and again as the start of the next
         return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def residual(self, x: FloatArray) -> FloatArray:
@@ -102,9 +108,7 @@ class CoupledProblem(ContactProblem):
         if not np.array_equal(x, self._reached):  # another solve has begun
             self._along[:] = 0.0
         N, weight = self.pad.face_N, self.pad.face_area
-        t, by_place, by_pressure = self._traction(x, derivatives=True)
-        beyond = t - self._traction(x)[0]
-        self._stuck = self._forces(beyond) if beyond.any() else None
+        _, by_place, by_pressure = self._traction(x, derivatives=True)
         # products of shape functions times what each point adds: two matrices, of which one is the same for all facets
         (m, points), k = weight.shape, N.shape[1]
         NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
@@ -165,7 +169,10 @@ class CoupledProblem(ContactProblem):
         slips = (size > most)[..., None]
         along = trial / np.where(size > 0.0, size, 1.0)[..., None]
         if derivatives:
+            # back the way it came: the last step took the point beyond where it sticks
             back = slips & (np.einsum("fqi,fqi->fq", along, self._along)[..., None] < 0.0)
+            beyond = np.where(back, trial - most[..., None] * along, 0.0)
+            self._stuck = self._forces(beyond) if back.any() else None
             self._along = np.where(slips, along, 0.0)
             slips &= ~back
         t = np.where(slips, most[..., None] * along, trial)
