@@ -14,7 +14,7 @@ import argparse
 import csv
 import time
 from collections.abc import Iterator
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 
 import numpy as np
@@ -293,7 +293,7 @@ def table(file: Path, parts: list[str]) -> None:
     with file.open("w", newline="") as stream:
         out = csv.writer(stream)
         out.writerow(("effect", "case", "indicator", "change", "taken", "error"))
-        for row in (*kept, *(row for part in parts for row in PARTS[part][0]())):
+        for row in chain(kept, *(PARTS[part][0]() for part in parts)):
             out.writerow((*row[:2], f"{row[2]:.4g}", f"{row[3]:.4g}", row[4], f"{row[5]:.3g}"))
             stream.flush()
 
