@@ -211,5 +211,7 @@ def test_choosing_costs_at_most_a_fifth(file, overrides, monkeypatch):
     """Beyond what the levels that are taken need anyway, as the coarse load path; the shares are printed with -s."""
     whole, spent, known = cpu_times(file, overrides, monkeypatch)
     share, all_of_it = 1.0 - known / whole, spent / whole
-    print(f"\n{file} {overrides[0]}: {share:.1%} of {whole:.1f} s for choosing, {all_of_it:.1%} with what is used again")
+    print(
+        f"\n{file} {overrides[0]}: {share:.1%} of {whole:.1f} s for choosing, {all_of_it:.1%} with what is used again"
+    )
     assert share <= 0.2

@@ -134,7 +134,10 @@ def test_points_that_slip_back_in_a_solve_are_taken_as_stuck():
         problem.accept(at)
     for sign, same in ((1.0, False), (-1.0, True)):
         x = at + sign * aside
-        K, found = [reference.dense(problem, x) for problem in (limited, stuck)], limited.right_side(limited.residual(x))
+        K, found = (
+            [reference.dense(problem, x) for problem in (limited, stuck)],
+            limited.right_side(limited.residual(x)),
+        )
         assert (np.abs(K[0] - K[1]).max() < 1e-9 * np.abs(K[1]).max()) == same
         assert np.allclose(found, stuck.residual(x), rtol=0, atol=1e-9) == same
         assert not np.allclose(limited.residual(x), stuck.residual(x), rtol=0, atol=1e-3)
