@@ -152,11 +152,12 @@ class CoupledProblem(ContactProblem):
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
         self._damping.forget()
-        self._path.append(x.copy())
+        # a state is accepted as the end of one step, and again as the start of the next
+        if not (self._path and np.array_equal(x, self._path[-1])):
+            self._path.append(x.copy())
 
     def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """States that were accepted before ``x``: what its tractions depend on."""
-        # a state is accepted as the end of one step, and again as the start of the next
         return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def residual(self, x: FloatArray) -> FloatArray:

@@ -85,7 +85,9 @@ class CoupledGripProblem(GripProblem):
             moved = np.einsum("na,nai->ni", wall.N, v[wall.nodes])
             anchors.append(_Anchor(f.object_points(x), moved, self._traction(k, x, c)[0], wall.nodes, wall.N, closed))
         self.memory = tuple(anchors)
-        self._path.append(x.copy())
+        # a state is accepted as the end of one step, and again as the start of the next
+        if not (self._path and np.array_equal(x, self._path[-1])):
+            self._path.append(x.copy())
         self._damping.forget()
 
     def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
