@@ -137,8 +137,11 @@ def job():
     return module
 
 
-def wrong_skips(job, rows):
-    return [row for row in rows if row[2] <= job.PANELS[row[0]][0] and row[3] > job.TARGET]
+def judged(job, rows, effect):
+    """Errors of the cases of an effect where it was skipped and where it was taken; no skip is wrong."""
+    _, taken, error = job.of_effect(rows, effect)
+    assert (error[~taken] <= job.WRONG).all(), effect
+    return error[~taken], error[taken]
 
 
 @pytest.mark.long
@@ -148,16 +151,12 @@ def test_no_effect_of_rigid_objects_is_skipped_wrongly(job, monkeypatch):
     kept = ("bottle", "cylinder 8 x 8 mm", "plane")
     monkeypatch.setattr(job, "RIGID", {name: job.RIGID[name] for name in kept})
     monkeypatch.setitem(job.RIGID, "bottle", ("jobs/bottle-rigid.toml", "[60, 85]"))
-    rows = list(job.rigid_rows())
-    exact = [row[3] for row in rows if row[0] == job.EXACT]
-    assert max(exact) < 1e-6
-    judged = [row for row in rows if row[0] in job.PANELS]
-    assert wrong_skips(job, judged) == []
-    for effect in ("friction-pressure coupling", "friction"):
-        own = [row for row in judged if row[0] == effect]
-        assert len(wrong_skips(job, own)) == 0
-        assert max(row[3] for row in own) > job.TARGET  # something to be wrong about
-        assert min(row[2] for row in own) <= job.PANELS[effect][0]
+    rows = [*job.friction_rows(), *job.patch_rows()]
+    assert job.of_effect(rows, job.EXACT)[2].max() < 1e-6
+    skipped, taken = judged(job, rows, job.COUPLING)
+    assert len(skipped)
+    assert taken.max() > job.WRONG  # something to be wrong about
+    assert judged(job, rows, "friction")[1].max() > job.WRONG
 
 
 @pytest.mark.long
@@ -165,11 +164,10 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(job, "WALLS", {name: own for name, own in job.WALLS.items() if name.startswith("cup")})
     rows = list(job.wall_rows())
-    assert wrong_skips(job, rows) == []
-    for effect in {row[0] for row in rows}:
-        own = [row for row in rows if row[0] == effect]
-        assert max(row[3] for row in own) > job.TARGET
-        assert min(row[2] for row in own) <= job.PANELS[effect][0]
+    for effect in (job.SHELL, job.SHELLS):
+        skipped, taken = judged(job, rows, effect)
+        assert len(skipped)
+        assert taken.max() > job.WRONG
 
 
 def cpu_share_of_choosing(file, overrides, monkeypatch):
