@@ -8,7 +8,7 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.store import open_result
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT, softjaw
 
 JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}
 COARSE = ("--set", "gripper.elements=[8, 4, 2]")
@@ -45,7 +45,7 @@ def test_every_shipped_scene_passes_check(name, capsys):
 
 
 def run(name, path, *words):
-    return launch(0, "-m", "softjaw", "run", JOBS[name], "-o", path, *words)
+    return softjaw(0, "run", JOBS[name], "-o", path, *words)
 
 
 @pytest.mark.launches

@@ -15,7 +15,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
 from softjaw.study.scene import parse_scene
-from tests.study.launching import ROOT, contents, differing, launch, wait_for
+from tests.study.launching import ROOT, contents, differing, softjaw, wait_for
 
 pytestmark = pytest.mark.launches
 
@@ -103,7 +103,7 @@ def alone(tmp_path_factory, scene, comm):
 
 
 def run(ranks, scene, path, *words):
-    return launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
+    return softjaw(ranks, "run", scene, "-o", path, *words)
 
 
 def done(path):
