@@ -297,6 +297,8 @@ def test_every_force_on_a_hollow_bowl_is_solved(tmp_path):
         angles_deg = [4]
         [load]
         normal_force_n = [1, 3]
+        [effects]
+        friction_pressure_coupling = "none"
     """)
     (unit,) = units(load_scene(tmp_path / "bowl.toml"), lambda _: 1)
     found = [result for _, result in pipeline.solve_unit(unit)]

@@ -155,7 +155,7 @@ def without_trial(monkeypatch):
     monkeypatch.setattr(guarded, "trouble", lambda attempt: "")
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(300, marks=MANY)])
+@pytest.mark.parametrize("count", [3, pytest.param(300, marks=MANY)])
 @pytest.mark.usefixtures("without_trial")
 def test_a_flipped_bit_in_any_dataset_is_refused_or_changes_no_number(copy, answers, count):
     expected, sound = dict(answers(copy)), copy.read_bytes()
@@ -166,7 +166,7 @@ def test_a_flipped_bit_in_any_dataset_is_refused_or_changes_no_number(copy, answ
         flip(copy, offset + int(random.integers(length)), int(random.integers(8)))
         refused += judge(answers(copy), expected, copy)
         copy.write_bytes(sound)
-    assert refused > count  # most of them hit what somebody reads
+    assert refused >= count  # most of them hit what somebody reads
     assert dict(answers(copy)) == expected
 
 
