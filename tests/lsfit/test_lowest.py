@@ -73,7 +73,9 @@ def random_form(rng, d, kind):
     return coefficients(lambda w: (monomials(w, exponents(d, 2)) @ a) ** 2 + 1e-3 * (w**4).sum(axis=1), d)
 
 
-@pytest.mark.parametrize(("d", "count"), [(1, 3), (2, 12), (3, 12), pytest.param(3, 60, marks=pytest.mark.long), (4, 3), (6, 2)])
+@pytest.mark.parametrize(
+    ("d", "count"), [(1, 3), (2, 12), (3, 12), pytest.param(3, 60, marks=pytest.mark.long), (4, 3), (6, 2)]
+)
 def test_no_direction_has_a_smaller_value(d, count):
     rng, E = np.random.default_rng(d), exponents(d, 4)
     for k in range(count):
