@@ -20,6 +20,8 @@ SOME_FAILED = 6
 
 # One thread per rank: the ranks share the cores, and sums must not depend on how many threads there are.
 export OMP_NUM_THREADS := 1
+# Containers often set it; pytest then rewrites the assertions of every file again in each of its processes.
+unexport PYTHONDONTWRITEBYTECODE
 # Open MPI refuses to run as root (the usual user in a container) unless told twice.
 ifeq ($(shell id -u),0)
 export OMPI_ALLOW_RUN_AS_ROOT := 1
@@ -30,6 +32,8 @@ AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
 # Two files of tests at a time; leave it out where pytest-xdist is missing.
 TWO = -n 2 --dist loadfile
+# Tests in random positions, of which the long run takes more.
+DECISIONS = $(wildcard tests/*/test_*decisions.py)
 # Tests whose numbers could depend on the kernel of the BLAS.
 NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/test_*friction*.py \
     tests/test_*decision*.py) tests/test_blas.py
@@ -89,6 +93,7 @@ test-blas: setup
 
 test-long: setup
 	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10
+	TURNS=200 $(BIN)/python -m pytest -q $(TWO) $(DECISIONS)
 	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
 
 test-slurm: setup

@@ -14,7 +14,7 @@ import argparse
 import csv
 import time
 from collections.abc import Iterator
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 
 import numpy as np
@@ -43,8 +43,10 @@ TURNED = 'shape = "revolution"\nprofile_mm = {}'
 RIGID = {  # object, or the file of a scene, and stations
     **{f"ball {r} mm": (f'shape = "sphere"\nradius_mm = {r}', "[0]") for r in (15, 25, 40, 80)},
     **{f"cylinder {a} x {b} mm": (ROUND.format(a, b), "[0]")
-       for a, b in ((8, 8), (14, 14), (25, 20), (20, 40), (60, 60))},
+       for a, b in ((8, 8), (14, 14), (25, 20), (20, 40), (60, 60), (30, 15))},
     "box": ('shape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4', "[0]"),
+    "rounded box": ('shape = "box"\nsize_mm = [40, 30, 100]\nedge_radius_mm = 12', "[0, 30]"),
+    "flask": ("jobs/flask-mesh.toml", "[40, 70, 90]"),
     "plane": ('shape = "plane"\nthickness_mm = 40', "[0]"),
     "cone": (TURNED.format("[[0, 30], [50, 30], [100, 20], [150, 12]]"), "[60, 80, 110]"),
     "bottle": ("jobs/bottle-rigid.toml", "[45, 60, 85, 130, 140, 150, 160]"),
@@ -291,7 +293,7 @@ def table(file: Path, parts: list[str]) -> None:
     with file.open("w", newline="") as stream:
         out = csv.writer(stream)
         out.writerow(("effect", "case", "indicator", "change", "taken", "error"))
-        for row in (*kept, *(row for part in parts for row in PARTS[part][0]())):
+        for row in chain(kept, *(PARTS[part][0]() for part in parts)):
             out.writerow((*row[:2], f"{row[2]:.4g}", f"{row[3]:.4g}", row[4], f"{row[5]:.3g}"))
             stream.flush()
 

@@ -90,7 +90,6 @@ REASONS = (
     "measured change of e_n below the target",
     "measured change of e_n above the target",
     "measured change of e_n not surely below the target",
-    "left out, though e_n may change by more than the target: thin walls cannot have it",
     "left out, though e_n may change by more than the target: it was not solved",
 )
 MEASURED = {  # parts of an effect that the coarse mesh decides

@@ -7,7 +7,7 @@ the integrals of the solution: the loads add up to ``S``, their components along
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,29 +47,22 @@ def extract(pad: Pad, pressed: Pressed, rule: str = "") -> ContactPatch:
     )
 
 
-def half_turned(patch: ContactPatch) -> ContactPatch:
-    """Patch of a pad that was solved turned by half a turn about its approach, in the pad's own frame."""
-    # half a turn reverses the order of the faces along both sides of the grid
-    return _moved(patch, lambda values: values[::-1], (-1.0, -1.0, 1.0), [2, 3, 0, 1])
+def turned(pad: Pad, patch: ContactPatch, signs: Sequence[float]) -> ContactPatch:
+    """Patch of a pad in a frame whose axes have the other sign where ``signs (3,)`` has.
 
+    So ``(-1, -1, 1)`` is a pad that was solved turned by half a turn about its approach, and ``(1, -1, 1)`` the other
+    finger's where a plane of symmetry lies between them.
+    """
+    faces, back = pad.shape.patch_faces, [axis for axis in range(2) if signs[axis] < 0]
 
-def mirrored(pad: Pad, patch: ContactPatch) -> ContactPatch:
-    """Patch of the other finger where a plane of symmetry lies between them: the image in the pad's plane y = 0."""
+    def ordered(values: FloatArray) -> FloatArray:
+        return np.flip(values.reshape(*faces, *values.shape[1:]), back).reshape(values.shape)
 
-    def flipped(values: FloatArray) -> FloatArray:
-        return np.flip(values.reshape(*pad.shape.patch_faces, *values.shape[1:]), 1).reshape(values.shape)
-
-    # a mirror image turns the sense of every face, so its corners run backwards to keep their normal
-    return _moved(patch, flipped, (1.0, -1.0, 1.0), [3, 2, 1, 0])
-
-
-def _moved(
-    patch: ContactPatch, ordered: Callable[[FloatArray], FloatArray], sign: Sequence[float], corners: list[int]
-) -> ContactPatch:
-    """Patch with its faces in another order, vectors with these signs, and every face's corners in another order."""
+    # corners run round each face from the lowest x and y
+    corners = np.flip([[0, 3], [1, 2]], back)[[0, 1, 1, 0], [0, 0, 1, 1]]
     return ContactPatch(
-        ordered(patch.centroid) * sign, ordered(patch.area), ordered(patch.normal) * sign, ordered(patch.pressure),
-        None if patch.corners is None else ordered(patch.corners)[:, corners] * sign,
+        ordered(patch.centroid) * signs, ordered(patch.area), ordered(patch.normal) * signs, ordered(patch.pressure),
+        None if patch.corners is None else ordered(patch.corners)[:, corners] * signs,
     )  # fmt: skip
 
 

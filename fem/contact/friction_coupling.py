@@ -22,32 +22,108 @@ from softjaw.fem.contact.problem import IDLE, ContactPoints, ContactProblem, Gap
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
-STICK = 100.0  # stiffness of stick in units of E / thickness; three times as much moves e_n by less than 0.1 %
-GROWTH, START = 1.5, 0.02  # of the force from step to step, and of the first force at the first step
-FEW = 2.0, 0.1  # the same where e_n need only be good to a third of what friction changes in it
+# Stiffness of stick in units of E / thickness: three times as much moves e_n by up to 0.05 % and takes a third more
+# Newton iterations.
+STICK = 30.0
+# Of the force from step to step, and of the first force at the first step: steps of 1.25 from 0.01 move e_n by up to
+# 0.3 %. Growth by 3 moves it by 1 %, a start at 0.1 by 0.3 %, both at the lowest force.
+GROWTH, START = 2.0, 0.02
 BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
 MOST_DAMPED = 0.125  # of a step of Newton's method
 
 
-def load_steps(reached: float, force: float, growth: float = 0.0, start: float = 0.0) -> list[float]:
-    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most ``growth`` times the last.
-
-    ``start`` is the share of the first force that is gone to first; 0 takes `GROWTH` and `START`.
+def load_steps(reached: float, force: float) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
 
     >>> load_steps(2.0, 4.0)
     [2.8284271247461903, 4.0]
     """
-    growth, start = growth or GROWTH, start or START
-    low = reached or start * force
+    low = reached or START * force
     # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
-    steps = max(1, math.ceil(math.log(force / low) / math.log(growth) - 1e-9))
+    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
     between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
     return [*([] if reached else [low]), *between, force]
 
 
-def few_load_steps(reached: float, force: float) -> list[float]:
-    """As `load_steps`, to find out what friction does rather than to have the result."""
-    return load_steps(reached, force, *FEW)
+def stick_or_slip(
+    normal: FloatArray, d: FloatArray, mu: float, pressure: FloatArray, derivatives: bool
+) -> tuple[FloatArray, ...]:
+    """Traction of points and, if wanted, its derivatives; see the module's formulas.
+
+    Parameters
+    ----------
+    normal, d : (..., 3) arrays
+        Unit normals, and tractions that would stick [Pa].
+    mu : float
+    pressure : (...) array
+        Nominal pressures, none negative [Pa].
+
+    Returns
+    -------
+    t : (..., 3) array
+        Traction [Pa].
+    by_d, by_normal : (..., 3, 3) arrays
+        Its derivatives [-], [Pa].
+    by_pressure : (..., 3) array
+        [-]
+    """
+    most = mu * pressure
+    across = np.einsum("...i,...i->...", normal, d)[..., None]
+    trial = d - across * normal
+    size = np.linalg.norm(trial, axis=-1)
+    # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
+    slips = (size > most)[..., None]
+    along = trial / np.where(size > 0.0, size, 1.0)[..., None]
+    t = np.where(slips, most[..., None] * along, trial)
+    if not derivatives:
+        return (t,)
+    share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
+    eye = np.eye(3)
+
+    def kept(D: FloatArray) -> FloatArray:
+        # the length of a slipping point's traction is given, so only the change across it counts
+        return share * np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
+
+    by_d = kept(eye - normal[..., :, None] * normal[..., None, :])
+    # the tangent plane turns as the point slides, wherever the surface is curved
+    by_normal = kept(-across[..., None] * eye - normal[..., :, None] * d[..., None, :])
+    return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
+
+
+class Damping:
+    """Shortens steps of Newton's method that take most of the last one back.
+
+    A point that slips to and fro beyond its place would make the method alternate for ever, with the same nodes in
+    contact and the same points slipping.
+
+    Parameters
+    ----------
+    moved : index
+        The unknowns that are displacements.
+    """
+
+    def __init__(self, moved: slice | NDArray[np.int64]) -> None:
+        self.moved = moved
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin another solve."""
+        # the last step and where it led to: nowhere yet
+        self._step: FloatArray = np.zeros(0)
+        self._reached: FloatArray | None = None
+        self._damping = 1.0
+
+    def shortened(self, x: FloatArray, step: FloatArray, factor: float) -> float:
+        """Factor of the step from ``x``, at most the one given."""
+        if self._reached is None or not np.array_equal(x, self._reached):  # another solve has begun
+            self._damping = 1.0
+        else:
+            before, now = self._step, step[self.moved]
+            back = before @ now < -BACKWARDS * (before @ before)
+            self._damping = max(0.5 * self._damping, MOST_DAMPED) if back else min(2.0 * self._damping, 1.0)
+        factor = min(factor, self._damping)
+        self._step, self._reached = factor * step[self.moved], x - factor * step
+        return factor
 
 
 class CoupledProblem(ContactProblem):
@@ -65,8 +141,8 @@ class CoupledProblem(ContactProblem):
         shape = self.pad.face_area.shape
         self._at, self._before = np.zeros((*shape, 3)), np.zeros((*shape, 3))
         self._closed = np.zeros(shape, dtype=bool)
-        # the last step of Newton's method and where it led to: nowhere yet
-        self._step, self._reached, self._damping = np.zeros(self.size), np.full(self.size, np.nan), 1.0
+        self._damping = Damping(slice(0, self.pad.closing_dof + 1))
+        self._path: list[FloatArray] = []
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
@@ -75,7 +151,14 @@ class CoupledProblem(ContactProblem):
         self._before = self._traction(x)[0]
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
-        self._reached = np.full(self.size, np.nan)
+        self._damping.forget()
+        # a state is accepted as the end of one step, and again as the start of the next
+        if not (self._path and np.array_equal(x, self._path[-1])):
+            self._path.append(x.copy())
+
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that were accepted before ``x``: what its tractions depend on."""
+        return tuple(state for state in self._path if not np.array_equal(state, x))
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""
@@ -106,23 +189,8 @@ class CoupledProblem(ContactProblem):
         return not first and super().keep(x, first)
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
-        """As that of the frictionless problem; steps that take most of the last one back are damped.
-
-        A point that slips to and fro beyond its place would make Newton's method alternate for ever, with the same
-        nodes in contact and the same points slipping.
-        """
-        factor = super().shorten(x, step)
-        moved = slice(0, self.pad.closing_dof + 1)
-        before, now = self._step[moved], step[moved]
-        if not np.array_equal(x, self._reached):  # another solve has begun
-            self._damping = 1.0
-        elif before @ now < -BACKWARDS * (before @ before):
-            self._damping = max(0.5 * self._damping, MOST_DAMPED)
-        else:
-            self._damping = min(2.0 * self._damping, 1.0)
-        factor = min(factor, self._damping)
-        self._step, self._reached = factor * step, x - factor * step
-        return factor
+        """As that of the frictionless problem, and as `Damping` has it."""
+        return self._damping.shortened(x, step, super().shorten(x, step))
 
     def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """As that of the frictionless problem, with the friction forces of the points."""
@@ -141,24 +209,12 @@ class CoupledProblem(ContactProblem):
         """
         # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
         length = np.linalg.norm(self._normal, axis=-1)[..., None]
-        n, closed, most = self._normal / length, self._closed[..., None], self.mu * self._pressure(x)
+        n, closed = self._normal / length, self._closed[..., None]
         # a point that was open has stuck nowhere that its motion could be measured from
         d = np.where(closed, self._before - self.stick * (self._points - self._at), 0.0)
-        across = np.einsum("fqi,fqi->fq", n, d)
-        trial = d - across[..., None] * n
-        size = np.linalg.norm(trial, axis=-1)
-        # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
-        slips = (size > most)[..., None]
-        along = trial / np.where(size > 0.0, size, 1.0)[..., None]
-        t = np.where(slips, most[..., None] * along, trial)
+        t, *changes = stick_or_slip(n, d, self.mu, self._pressure(x), derivatives)
         if not derivatives:
             return (t,)
-        share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
-        P = np.eye(3) - n[..., :, None] * n[..., None, :]
-        # the tangent plane turns as the point slides, wherever the object's surface is curved
-        turns = P @ self._hessian / length[..., None]
-        bent = across[..., None, None] * turns + n[..., :, None] * np.einsum("fqji,fqj->fqi", turns, d)[..., None, :]
-        D = np.where(closed[..., None], -self.stick * P, 0.0) - bent
-        # the length of a slipping point's traction is given, so only the change across it counts
-        D = np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
-        return t, share * D, np.where(slips & (most > 0.0)[..., None], self.mu * along, 0.0)
+        by_d, by_normal, by_pressure = changes
+        turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ self._hessian / length[..., None]
+        return t, np.where(closed[..., None], -self.stick * by_d, 0.0) + by_normal @ turns, by_pressure

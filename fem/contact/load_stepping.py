@@ -55,6 +55,7 @@ FOLD = 0.25  # growth of the largest strain in one step; good steps of practice 
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
 FIRST = 0.25  # closing displacement at which the first contact is looked for, at most
 MOST_NEAR = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
+ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
@@ -249,6 +250,16 @@ class Stepping:
             done = goal
         return x
 
+    def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
+        """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
+
+        Raises
+        ------
+        ConvergenceError
+            Where there is none near it.
+        """
+        return self.solve(start, Control(force=force), work, self.most)
+
     def displacement_control(
         self,
         x: FloatArray,
@@ -407,21 +418,14 @@ class Following(Stepping):
         return here.x
 
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
-        """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
-
-        Raises
-        ------
-        ConvergenceError
-            Where there is none near it, or one that a path from first contact need not lead to.
-        """
+        """As `Stepping.from_near`; refused where a path from first contact need not lead to the state."""
         x = self.solve(start, Control(force=force), work, self.most or MOST_NEAR)
-        strays = np.abs((x - start)[: self.problem.closing_dof + 1]).max() > STRAY * self.thickness
         folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
         # with a part of the tangent alone nothing tells whether the state is stable
         here = None if self.problem.complementarity else self._place(x, force, None)
-        if strays or folds or (here is not None and not here.stable):
+        if folds or (here is not None and not here.stable):
             work.halvings += 1
-            raise ConvergenceError(f"the state at {force:.4g} N differs from the state on the coarser mesh")
+            raise ConvergenceError(ASTRAY.format(force=force))
         self._last = here
         return x
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import NEAR, Checks, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import Following, LoadPath, Settings, State, Stepping, Work
+from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, Following, LoadPath, Settings, State, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
@@ -57,6 +57,8 @@ class Pressed:
         Whether the fallback pad was taken.
     notes : tuple of str
         Which means beside Newton's method on steps of the force it took.
+    history : tuple of (n,) arrays
+        States before it that it depends on; none without friction.
     """
 
     force: float
@@ -74,12 +76,13 @@ class Pressed:
     path_dependent: bool = False
     instead: bool = False
     notes: tuple[str, ...] = ()
+    history: tuple[FloatArray, ...] = ()
 
 
 def pressed(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
     settings: Settings, work: Work, seconds: Seconds, path_dependent: bool = False, instead: bool = False,
-    notes: tuple[str, ...] = (), slack: float = 0.0,
+    notes: tuple[str, ...] = (), slack: float = 0.0, history: tuple[FloatArray, ...] = (),
 ) -> Pressed:  # fmt: skip
     """State of one pad that has passed its checks; parameters as in ``fem.contact.checks.check``."""
     pad, (pressure, _, points) = foam.pad, state
@@ -87,7 +90,7 @@ def pressed(
     contact_face = (pad.nodes + pad.displacement(x))[pad.contact_nodes]
     return Pressed(
         force, float(x[pad.closing_dof]), x, pad, pressure, contact_face, points, checks, work.iterations, work.steps,
-        work.halvings, seconds, path_dependent, instead, notes,
+        work.halvings, seconds, path_dependent, instead, notes, history,
     )  # fmt: skip
 
 
@@ -180,7 +183,6 @@ class Press(LoadPath):
             At the first force without an acceptable state.
         """
         x, reached = None, 0.0
-        self.problem.forget()
         for force in forces:
             work, elapsed, below = Work(), self._stopwatch(), x
             self.solver.left = MOST_ITERATIONS
@@ -203,9 +205,7 @@ class Press(LoadPath):
         """
         work, elapsed = Work(), self._stopwatch()
         self._begin_afresh()
-        # without following the path nothing would tell a state that lies off it
-        starts = coarse if isinstance(self._stepping, Following) else ()
-        x, reached = self._near(starts, lambda start: self._from(start, work)) or (None, 0.0)
+        x, reached = self._near(coarse, lambda start: self._from(start, work)) or (None, 0.0)
         if x is None or reached < force:
             below, x = x, self._within_budget(x, reached, force, work)
             self._refuse_fall(below, reached, x, force)
@@ -258,9 +258,15 @@ class Press(LoadPath):
         return x
 
     def _from(self, start: Pressed, work: Work) -> State:
-        """State at the force of a coarser mesh's, checked."""
-        assert isinstance(self._stepping, Following)
-        x = self._stepping.from_near(interpolated(start.pad, start.unknowns, self.pad), start.force, work)
+        """State at the force of a coarser mesh's, with the load path that led there, checked."""
+        self.problem.forget()
+        for before in start.history:
+            self.problem.accept(interpolated(start.pad, before, self.pad))
+        near = interpolated(start.pad, start.unknowns, self.pad)
+        x = self._stepping.from_near(near, start.force, work)
+        if np.abs((x - near)[: self.pad.closing_dof + 1]).max() > STRAY * self.pad.shape.size[2]:
+            work.halvings += 1
+            raise ConvergenceError(ASTRAY.format(force=start.force))
         self._pressed(x, start.force, work, Seconds())
         return x, start.force
 
@@ -297,6 +303,7 @@ class Press(LoadPath):
         return pressed(
             self.problem.foam, x.copy(), state, self._left_over(x), force, self.settings, work, seconds,
             steps.jumped, self.pad is not self._wanted, self._notes(), NEAR if steps.off else 0.0,
+            self.problem.history(x),
         )  # fmt: skip
 
     def _notes(self) -> tuple[str, ...]:
@@ -371,6 +378,7 @@ class Press(LoadPath):
         """State at ``force`` from the one at ``reached`` [N], or from scratch."""
         steps = self.load_steps(reached, force)
         if x is None:
+            self.problem.forget()
             x, reached = self._stepping.first(self._bed.closing(steps[0]), steps[0], work)
         # friction is measured from this state, and a failure on the way is explained by it
         self._remember(x, reached)

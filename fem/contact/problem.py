@@ -342,6 +342,10 @@ class ContactProblem(PressedPad):
     def accept(self, x: FloatArray) -> None:
         """Note a state that the next one starts from; without friction the load path does not matter."""
 
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that ``x`` depends on, the first one first."""
+        return ()
+
     def normal_force(self, x: FloatArray) -> float:
         """Normal force on the whole pad that the backing plate must exert at ``x`` [N]."""
         return self.foam.normal_force(x)

@@ -29,7 +29,8 @@ LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, w
 SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-LONGEST_SOLVE = 12  # Newton iterations of a step from one state to the next; good ones take 3 to 8
+# Newton iterations of a step from one state to the next: good ones take 3 to 8, with friction 4 to 14.
+LONGEST_SOLVE, WITH_FRICTION = 12, 24
 MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
@@ -66,14 +67,21 @@ class WallState:
     opening: float
 
 
+Parts = tuple[FloatArray, tuple[FloatArray, ...]]  # of a state: that of the shell, and unknowns of the pads
+
+
 @dataclass(frozen=True)
 class Gripped:
-    """Both fingers, or the one that symmetry leaves, where they stand, and the wall in equilibrium at one force."""
+    """Both fingers, or the one that symmetry leaves, where they stand, and the wall in equilibrium at one force.
+
+    ``history`` are the states before it that it depends on; none without friction.
+    """
 
     force: float
     fingers: tuple[Pressed, ...]
     poses: tuple[Pose, ...]
     wall: WallState
+    history: tuple[Parts, ...] = ()
 
     @property
     def path_dependent(self) -> bool:
@@ -111,6 +119,8 @@ class Grip(LoadPath):
     fallback : callable, optional
         Makes the same problem with nodal gaps, for forces at which this one has no solution; its unknowns must be
         numbered alike.
+    load_steps : callable
+        From one force [N] (0: no contact yet) to the next: the forces to go through, the last of them the next.
     """
 
     problem: GripProblem
@@ -119,6 +129,7 @@ class Grip(LoadPath):
     options: dict[str, Any] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
     fallback: Callable[[], GripProblem] | None = None
+    load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
 
     def __post_init__(self) -> None:
         """Set up the solver."""
@@ -135,11 +146,12 @@ class Grip(LoadPath):
     def _steps(self) -> Stepping:
         """Steps of the problem as it is now."""
         fingers = self.problem.fingers
+        most = LONGEST_SOLVE if self.problem.memory is None else WITH_FRICTION
         return Stepping(
             self.problem, self.solver, self.settings, fingers[0].pad.shape.size[2], min(f.pad.share for f in fingers),
             self._guess, lambda closing: min(bed.force_scale(closing) for bed in self._beds),
             ROUNDING * self.problem.model.shell.young_modulus + sum(f.pad.rounding for f in fingers),
-            None if "contact_snes_max_it" in self.options else LONGEST_SOLVE, self._watch,
+            None if "contact_snes_max_it" in self.options else most, self._watch,
         )  # fmt: skip
 
     def _guess(self, closing: float) -> FloatArray:
@@ -187,7 +199,11 @@ class Grip(LoadPath):
 
     def _from(self, start: Gripped, work: Work) -> _OnPath:
         """State at the force of a coarser mesh's, by one Newton solve."""
-        x0, force, thickness = self._interpolated(start), start.force, self._stepping.thickness
+        self.problem.begin()
+        for before in start.history:
+            self.problem.accept(self._interpolated(start, before))
+        x0 = self._interpolated(start, (start.wall.q, tuple(own.unknowns for own in start.fingers)))
+        force, thickness = start.force, self._stepping.thickness
         x = self._stepping.solve(x0, Control(force=force), work, self._stepping.most)
         moved = np.delete(x - x0, np.concatenate([np.r_[f.pressures] for f in self.problem.fingers]))
         compliance = self._compliance()
@@ -200,17 +216,17 @@ class Grip(LoadPath):
         self._gripped(here, work, Seconds())
         return here
 
-    def _interpolated(self, start: Gripped) -> FloatArray:
-        """Unknowns of a coarser mesh's state."""
-        x, model = np.zeros(self.problem.size), self.problem.model
-        x[: model.size] = wall_interpolation.interpolated(start.wall.mesh, start.wall.q, model.shell.mesh)[model.free]
+    def _interpolated(self, start: Gripped, parts: Parts) -> FloatArray:
+        """Unknowns of a coarser mesh's state, or of one in its history."""
+        x, model, (q, pads) = np.zeros(self.problem.size), self.problem.model, parts
+        x[: model.size] = wall_interpolation.interpolated(start.wall.mesh, q, model.shell.mesh)[model.free]
         for k, f in enumerate(self.problem.fingers):
             # where the coarser mesh has one finger, the other one is its image in x = 0
             image = np.array([-1.0 if k >= len(start.fingers) else 1.0, 1.0, 1.0])
             other = min(k, len(start.fingers) - 1)
             own = start.fingers[other]
             turn = np.einsum("ji,j,ji->i", start.poses[other].rotation, image, f.pose.rotation).round()
-            x[f.own] = interpolated(own.pad, own.unknowns, f.pad, turn)
+            x[f.own] = interpolated(own.pad, pads[other], f.pad, turn)
         return x
 
     def _next(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
@@ -226,6 +242,9 @@ class Grip(LoadPath):
         last, self.problem, self.fallback = self.opening.last, self.fallback(), None
         self._start_again()
         self.opening.last = last
+        # what friction remembers belongs to the other problem, so with friction the path begins anew
+        if self.problem.memory is not None:
+            here = None
         try:
             return self._level(here, force, work)
         except ConvergenceError as again:
@@ -265,9 +284,13 @@ class Grip(LoadPath):
 
     def _level(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact."""
-        self.solver.left, self._peak = MOST_ITERATIONS, 0.0 if here is None else here.force
+        self._peak = 0.0 if here is None else here.force
         try:
-            return self._climb(here, force, work)
+            for goal in self.load_steps(self._peak, force):
+                self.solver.left = MOST_ITERATIONS
+                here = self._climb(here, goal, work)
+            assert here is not None
+            return here
         except SpentError as error:
             spent = f"given up after {MOST_ITERATIONS} Newton iterations"
             raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
@@ -275,8 +298,10 @@ class Grip(LoadPath):
     def _climb(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
         if here is None:
+            self.problem.begin()
             closing = float(np.mean([bed.closing(force) for bed in self._beds]))
             x, reached = self._stepping.first(closing, force, work)
+            self.problem.accept(x)
             # foam gets stiffer, so this is more than what comes
             here = _OnPath(x, reached, self.problem.closing(x) / reached, False, False)
         x, reached = here.x, here.force
@@ -297,6 +322,7 @@ class Grip(LoadPath):
         """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
         # twice what the slope so far foretells; a snap goes much further
         expected = max(JUMP, 2.0 * compliance * (force - reached))
+        before = self.problem.memory
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
@@ -305,10 +331,12 @@ class Grip(LoadPath):
             pass
         # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
+        self.problem.memory = before
         ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces, SHORTEST_STEP)
         return ahead, falls([reached, *forces])
 
     def _watch(self, x: FloatArray, force: float) -> None:
+        self.problem.accept(x)
         self.opening.watch(self.problem.wall_state(x), force)
         self._peak = max(self._peak, force)
 
@@ -349,7 +377,8 @@ class Grip(LoadPath):
         self._check_balance(fingers, load, force)
         mesh, poses = problem.model.shell.mesh, tuple(f.pose for f in problem.fingers)
         wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
-        return Gripped(force, tuple(fingers), poses, wall)
+        before = tuple((problem.wall_state(y), tuple(y[f.own] for f in problem.fingers)) for y in problem.history(x))
+        return Gripped(force, tuple(fingers), poses, wall, before)
 
     def _check_balance(self, fingers: Sequence[Pressed], load: FloatArray, force: float) -> None:
         """Refuse a state in which the wall does not bear what the pads press with."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class Finger(PressedPad):
 
 
 @dataclass
-class _Evaluated:
+class Evaluated:
     """What the contact of one finger came to."""
 
     facing: Facing
@@ -83,6 +84,7 @@ class GripProblem:
     """
 
     complementarity, non_negative = False, slice(0)  # the active set is part of the residual, whatever the solver
+    memory: Any = None  # what friction knows of the last accepted state
 
     def __init__(self, model: NonlinearWall, pads: Sequence[tuple[Pad, Pose, Wall]]) -> None:
         self.model = model
@@ -137,7 +139,7 @@ class GripProblem:
             columns += [back, np.array([f.closing_dof], np.int32)]
         return np.concatenate(rows), np.concatenate(columns)
 
-    def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[_Evaluated]:
+    def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[Evaluated]:
         """Evaluate the contact of all fingers; adds to the forces on the wall's nodes."""
         v, w = self.model.outer(x[: self.model.size])
         contacts = []
@@ -151,7 +153,7 @@ class GripProblem:
             )  # fmt: skip
             # a node that hangs over the rim with most of its area would put all of its pressure on the rest
             gaps = np.where(f.nodal(part) > CARRIED * f.area, f.nodal(weighted), FAR * f.area)
-            contacts.append(_Evaluated(facing, lam, gaps, f.active(x[f.pressures], gaps), force))
+            contacts.append(Evaluated(facing, lam, gaps, f.active(x[f.pressures], gaps), force))
         return contacts
 
     def residual(self, x: FloatArray) -> FloatArray:
@@ -200,7 +202,7 @@ class GripProblem:
         # adding the contact may find entries without a place; the pattern grows and all is filled once more
         while True:
             self._fill(wall, contacts)
-            if all([self._add_contact(f, c) for f, c in zip(self.fingers, contacts, strict=True)]):
+            if all([self._add_contact(k, x, c) for k, c in enumerate(contacts)]):
                 return
             self._grow(contacts)
 
@@ -213,7 +215,7 @@ class GripProblem:
             self._before = x[: self.model.size].copy()  # the wall's next tangent counts its step from here
         return True
 
-    def _fill(self, wall: FloatArray, contacts: list[_Evaluated]) -> None:
+    def _fill(self, wall: FloatArray, contacts: list[Evaluated]) -> None:
         """Entries of wall, foam, idle pressures and control."""
         values = self.pattern.values
         values[:] = 0.0
@@ -237,30 +239,20 @@ class GripProblem:
         closings = np.array([f.closing_dof for f in self.fingers])
         values[self.pattern.slots(np.full_like(closings, one.closing_dof), closings)] = self.stiffness / len(closings)
 
-    def _add_contact(self, f: Finger, c: _Evaluated) -> bool:
-        pad, facing, pattern = f.pad, c.facing, self.pattern
+    def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
+        """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
+        f, facing, pattern = self.fingers[k], c.facing, self.pattern
+        pad = f.pad
         return contact_tangent(
             pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
             facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressure_dofs, self.model.first,
             self.model.second, pattern.start, pattern.column, pattern.values,
         )  # fmt: skip
 
-    def _grow(self, contacts: list[_Evaluated]) -> None:
+    def _grow(self, contacts: list[Evaluated]) -> None:
         """Couple the faces that press with the wall's nodes that they face."""
-        rows, columns = [], []
-        for f, c in zip(self.fingers, contacts, strict=True):
-            points = f.pad.face_N.shape[0]
-            # facets that already press, or that the next iteration may close
-            near = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
-            faces = np.repeat(np.arange(len(f.nodes)), points)
-            pick = near[faces] & (c.facing.gap < FAR)
-            own = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[faces[pick]]
-            nodes = c.facing.nodes[pick]
-            other = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2).reshape(len(nodes), -1)
-            pair = pairs(own[:, :, None], other[:, None, :])
-            among = pairs(other[:, :, None], other[:, None, :])
-            rows += [*pair, among[0]]
-            columns += [*pair[::-1], among[1]]
+        each = [self._couplings(k, f, c) for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True))]
+        rows, columns = zip(*(part for own in each for part in own), strict=True)
         moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
         if moved is None:
             raise AssertionError("the contact has entries that its pattern cannot hold; this is a bug")
@@ -271,9 +263,34 @@ class GripProblem:
         self._wall_slots, self._foam_slots = move(self._wall_slots), [move(slots) for slots in self._foam_slots]
         self._balance_slots = move(self._balance_slots)
 
+    def _couplings(self, k: int, f: Finger, c: Evaluated) -> list[tuple[IntArray, IntArray]]:
+        """Rows and columns of the entries that the contact of the ``k``-th finger may have."""
+        faces = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0])
+        # facets that already press, or that the next iteration may close
+        pick = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)[faces] & (c.facing.gap < FAR)
+        own = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[faces[pick]]
+        other = self.wall_dofs(c.facing.nodes[pick])
+        pair = pairs(own[:, :, None], other[:, None, :])
+        return [pair, (pair[1], pair[0]), pairs(other[:, :, None], other[:, None, :])]
+
+    def wall_dofs(self, nodes: IntArray) -> IntArray:
+        """Unknowns ``(n, 24)`` that move the outer face at nodes ``(n, 4)`` of the wall, -1 where fixed."""
+        both = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2)
+        return both.reshape(len(nodes), 24)
+
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of closing displacements and the compression of every element within reason."""
         return min(f.foam.shorten(x[f.own], step[f.own], LONGEST_CLOSING) for f in self.fingers)
+
+    def begin(self) -> None:
+        """Begin another load path; without friction it does not matter."""
+
+    def accept(self, x: FloatArray) -> None:
+        """Note a state that the next one starts from; without friction the load path does not matter."""
+
+    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """States that ``x`` depends on, the first one first."""
+        return ()
 
     def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
         """Of one finger, in the pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""

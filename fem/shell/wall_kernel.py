@@ -99,7 +99,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
             p = 0.0
             for i in range(k):
                 p += N[q, i] * lam[f, i]
-            _changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
+            changes(N[q], gap[m], wall_nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
             w = area[f, q]
             for j in range(t + 24):
                 for c in range(3):
@@ -151,7 +151,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
 
 
 @njit(cache=True)
-def _changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
+def changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
     """Changes with every local unknown: relative position ``D``, normal ``dn`` and nodal shares ``dA = d(N_a n)``."""
     k = N.size
     t = 3 * k

@@ -219,11 +219,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
 
 def forces_apart(scene: Scene) -> bool:
-    """Whether every force is solved by itself, on a fine mesh that starts from a coarse one.
-
-    Not with friction that acts back everywhere: its state depends on the load path, which is that of the fine mesh.
-    """
-    return scene.accuracy.meshes > 1 and scene.effects.friction_pressure_coupling != "tangential"
+    """Whether every force is solved by itself, on a fine mesh that starts from a coarse one and its load path."""
+    return scene.accuracy.meshes > 1
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

@@ -97,16 +97,6 @@ class Candidate:
 
     # --- what the table asks for --------------------------------------------------------------------------------------
 
-    @property
-    def rigid(self) -> bool:
-        """Whether the object is simulated as rigid."""
-        return not self.walled or self.scene.effects.object == "rigid"
-
-    @property
-    def on_rigid(self) -> Scene:
-        """The scene so far, on the rigid object."""
-        return self.scene if self.rigid else at_levels(self.scene, object="rigid")
-
     @cached_property
     def plate_compliance(self) -> float:
         """Of the backing plate over that of the pad."""
@@ -126,12 +116,12 @@ class Candidate:
         return indentation / closing, ratio
 
     def coarse(self, scene: Scene, forces: Sequence[float]) -> Solver:
-        """The candidate on the coarse mesh at the levels of a scene, for these forces; friction in few load steps."""
+        """The candidate on the coarse mesh at the levels of a scene, for these forces."""
         # each load path has a solver of its own, or what one needed would change the other
         levels = (getattr(scene.effects, name) for name, row in ROWS.items() if row.steps)
         key = (*levels, scene.accuracy.contact, *forces)
         if key not in self._coarse:
-            self._coarse[key] = solver(scene, self.fingers, self.poses, coarser=True, hasty=True)
+            self._coarse[key] = solver(scene, self.fingers, self.poses, coarser=True)
         return self._coarse[key]
 
     def seen(self, scene: Scene, forces: Sequence[float], k: int) -> list[PressedContact] | None:
@@ -178,8 +168,6 @@ class Candidate:
         doubt = self._doubt(name, step, k)
         if surely_below(abs(change) + doubt, self.target):
             return Level(low, indicator, effects.LITTLE, change, payload)
-        if not row.possible(self):
-            return Level(low, indicator, effects.NOT_HERE, change, payload)
         # undecided takes the dearer level, which is right in both cases
         above = abs(change) > self.target
         return Level(high, indicator, effects.MUCH if above else effects.UNDECIDED, change, payload)
@@ -201,14 +189,17 @@ class Candidate:
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float]:
         """As `change`; of effects that all forces share the change at the force where e_n changes most."""
         if ROWS[name].each_force:
-            return self._compared_at(self.on_rigid, name, step, k)
-        each = [self._compared_at(self.scene, name, step, i) for i in range(len(self.forces))]
+            return self._compared_at(name, step, k)
+        each = [self._compared_at(name, step, i) for i in range(len(self.forces))]
         # what is not known at some force may be the largest
         return max(each, key=lambda found: np.inf if np.isnan(found[0]) else abs(found[0]))
 
-    def _compared_at(self, base: Scene, name: str, step: Step, k: int) -> tuple[float, float]:
-        low, high = (self.seen(at_levels(base, **{name: level}), self.forces, k) for level in (step.low, step.high))
+    def _compared_at(self, name: str, step: Step, k: int) -> tuple[float, float]:
+        low, high = (self.seen(at_levels(self.scene, **{name: own}), self.forces, k) for own in (step.low, step.high))
         if low is None or high is None:
+            return nan, nan
+        # what other gaps change is no measure of the effect
+        if any(a.nodal_instead != b.nodal_instead for a, b in zip(low, high, strict=True)):
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
         return other / e_n - 1.0 if e_n > 0 else nan, other_held / held - 1.0 if held > 0 else nan
@@ -246,12 +237,7 @@ class Candidate:
 
     def _solver(self, scene: Scene) -> Solver:
         """On the scene's meshes; what has been solved on the coarse one already is not solved again."""
-        if self.asked.accuracy.meshes == 1:
-            coarse = None
-        elif getattr(scene.effects, COUPLING) == "none":
-            coarse = self.coarse(scene, self.forces)
-        else:
-            coarse = solver(scene, self.fingers, self.poses, coarser=True)
+        coarse = None if self.asked.accuracy.meshes == 1 else self.coarse(scene, self.forces)
         return solver(scene, self.fingers, self.poses, coarse)
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Solved]:
@@ -288,14 +274,14 @@ class Candidate:
         """Levels of the effects that are chosen at the ``k``-th force, whose contacts are solved."""
         found = {name: levels[k] for name, levels in self.levels.items()}
         own = found[COUPLING]
-        if own.reason == effects.FORCED and self.rigid:
+        if own.reason == effects.FORCED:
             indicator = max(neglected_traction(c.state, c.mu) for c in contacts)
             found[COUPLING] = own._replace(indicator=indicator)
         return found
 
     def flags_at(self, k: int) -> Flag:
         """Flag of a case that lacks an effect that moves its e_n by more than the target."""
-        left_out = self.levels[COUPLING][k].reason in (effects.NOT_HERE, effects.FAILED)
+        left_out = self.levels[COUPLING][k].reason == effects.FAILED
         return Flag.LEFT_OUT if left_out else Flag(0)
 
     def destroy(self) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from softjaw.study.scene import Scene
 
 (
-    ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, NOT_HERE, FAILED,
+    ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, FAILED,
 ) = range(len(REASONS))  # fmt: skip
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid plate put e_n off by at most 3.5 times the relative
 # compliance of the plate that it stood for (where a pad just reaches the middle of a waist).
@@ -111,15 +111,12 @@ class Row:
         From the cheapest level on.
     each_force : bool
         Whether every force has a level of its own; else all have that which the highest one needs.
-    possible : callable
-        Whether a candidate, with what is chosen of the effects before this one, can be simulated with it.
     settled : callable, optional
         Level of a solved case, for effects whose choice costs nothing.
     """
 
     steps: Sequence[Step] = ()
     each_force: bool = False
-    possible: Callable[[Candidate], bool] = lambda candidate: True
     settled: Callable[[Simulated], Level] | None = None
 
     @property
@@ -149,7 +146,7 @@ def neglected_traction(state: Any, mu: float) -> float:
 
 def _traction(candidate: Candidate, k: int) -> float:
     """`neglected_traction` on the coarse mesh, of the finger where it is larger."""
-    seen = candidate.seen(candidate.on_rigid, candidate.forces, k)
+    seen = candidate.seen(candidate.scene, candidate.forces, k)
     return nan if seen is None else max(neglected_traction(c.state, c.mu) for c in seen)
 
 
@@ -215,12 +212,10 @@ ROWS: dict[str, Row] = {
             Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF, 0.0),
             Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
         ),
-        possible=lambda candidate: candidate.walled,
     ),
     "friction_pressure_coupling": Row(
         (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
         each_force=True,
-        possible=lambda candidate: candidate.rigid,
     ),
     "model_size": Row(settled=_model_size),
     "fingers": Row(settled=_fingers),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.friction_coupling import CoupledProblem, few_load_steps, load_steps
+from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
 from softjaw.fem.contact.load_stepping import Settings, Stepping
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
@@ -193,16 +193,13 @@ def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 
 
-def press_of(scene: Scene, finger: Finger, coarser: bool, hasty: bool = False) -> Press:
-    """Pad on its object, with friction where the scene wants it to act back; ``hasty`` is in few load steps."""
+def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
+    """Pad on its object, with friction where the scene wants it to act back."""
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
     if scene.effects.friction_pressure_coupling == "tangential":
         problem = partial(CoupledProblem, mu=scene.friction.mu)
-        steps = few_load_steps if hasty else load_steps
-        # what is measured only is not compared with other gaps, which would change e_n, too
-        instead = () if hasty else others
-        return Press(wanted, finger.gap, dict(scene.petsc), instead, settings(scene), problem, steps, Stepping)
+        return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene), problem, load_steps, Stepping)
     return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene))
 
 

@@ -14,9 +14,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softjaw.fem.contact.edge import contact_area, largest_pressure
-from softjaw.fem.contact.extract import extract, half_turned, mirrored
+from softjaw.fem.contact.extract import extract, turned
+from softjaw.fem.contact.friction_coupling import load_steps
 from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.shell.coupled_grip import CoupledGripProblem
 from softjaw.fem.shell.grip import Grip, Gripped
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
@@ -40,13 +42,14 @@ HARDLY = 1e-3  # of the largest force: where such a force is not reached, those 
 STARTS = 3  # states of the coarser mesh that a force on the fine one is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
 State = TypeVar("State")
 
 
 class PressedContact(Contact):
     """A contact that was solved: one finger at one force, its patch in the pad's frame.
 
-    ``seen`` brings the patch of the state into the finger's own frame where another one was solved.
+    ``signs`` are those of the axes of the frame that the state was solved in, in the finger's own one.
     """
 
     def __init__(
@@ -54,13 +57,18 @@ class PressedContact(Contact):
         scene: Scene,
         finger: Finger,
         state: Pressed,
-        seen: Callable[[ContactPatch], ContactPatch] | None = None,
+        signs: tuple[float, float, float] = UPRIGHT,
     ) -> None:
-        self.finger, self.state, self._seen = finger, state, seen or (lambda patch: patch)
+        self.finger, self.state, self._signs = finger, state, signs
         self._reduced = scene.friction.used_by_pressing
         self._views: list[Contact] = []  # shared by all copies, so that the first one asked fills it for all
-        super().__init__(self._seen(extract(state.pad, state)), scene.friction.mu, finger.pose, whole_face=True)
+        super().__init__(self._extracted(), scene.friction.mu, finger.pose, whole_face=True)
         self.nodal_instead = state.instead and state.pad.contact == "nodal"
+
+    def _extracted(self, rule: str = "") -> ContactPatch:
+        """Patch in the finger's own frame, from the pressures at the points of a rule."""
+        patch = extract(self.state.pad, self.state, rule)
+        return patch if self._signs == UPRIGHT else turned(self.state.pad, patch, self._signs)
 
     def of(self, finger: Finger) -> PressedContact:
         """The same contact of another finger, which stands where the object looks the same."""
@@ -78,9 +86,10 @@ class PressedContact(Contact):
             return np.zeros(3)
         # in a plane of symmetry the other half's forces across it and torques cancel
         one = np.array([not mirrored for mirrored in pad.symmetry], float)
-        force = points.friction.sum(axis=(0, 1)) / pad.share * [*one, 1.0]
-        arm = points.position - self.frame.origin
-        torque = np.cross(arm, points.friction).sum(axis=(0, 1)) / pad.share
+        friction = points.friction * self._signs
+        force = friction.sum(axis=(0, 1)) / pad.share * [*one, 1.0]
+        arm = points.position * self._signs - self.frame.origin
+        torque = np.cross(arm, friction).sum(axis=(0, 1)) / pad.share
         torque = torque * [one[1], one[0], one.prod()]
         return np.array([*(self.frame.axes[:2] @ force), self.frame.axes[2] @ torque])
 
@@ -105,7 +114,7 @@ class PressedContact(Contact):
     def views(self) -> list[Contact]:
         """The contact of the same pressures at Gauss points and at nodes; a finer mesh would make them alike."""
         if not self._views:
-            patches = (self._seen(extract(self.state.pad, self.state, rule)) for rule in ("weighted", "nodal"))
+            patches = (self._extracted(rule) for rule in ("weighted", "nodal"))
             self._views += [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
             _ = [view.ellipsoids for view in self._views]  # computed once for both fingers, as in `of`
         return [view.at(self.pose) for view in self._views]
@@ -177,23 +186,22 @@ class Solved:
 
 
 def solver(
-    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False,
-    hasty: bool = False,
-) -> Solver:  # fmt: skip
+    scene: Scene, fingers: list[Finger], poses: Sequence[Any], coarse: Solver | None = None, *, coarser: bool = False
+) -> Solver:
     """Solver for both fingers at first touch at the levels that the scene names; an ``auto`` is the cheapest one.
 
     Parameters
     ----------
     coarse : Solver, optional
         Of the same candidate on the coarser mesh.
-    coarser, hasty : bool
-        Whether this is that one, and whether friction that acts back takes few load steps.
+    coarser : bool
+        Whether this is that one.
     """
     if getattr(scene.object, "wall", None) is not None:
         refuse_along_axis(fingers)
         if scene.effects.object.endswith("shell"):
             return OnWall(scene, fingers, coarse, coarser)
-    return OnRigid(scene, fingers, coarse, coarser, poses, hasty)
+    return OnRigid(scene, fingers, coarse, coarser, poses)
 
 
 def followed(
@@ -339,14 +347,13 @@ class OnRigid(Solver):
     """Fingers on a rigid object do not feel each other."""
 
     def __init__(
-        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any],
-        hasty: bool,
-    ) -> None:  # fmt: skip
+        self, scene: Scene, fingers: list[Finger], coarse: Solver | None, coarser: bool, poses: Sequence[Any]
+    ) -> None:
         super().__init__(scene, fingers, coarse)
         one, other = poses
         self.shared = turn_of_pose(one, other, scene.object.axis_symmetry) is not None
         solved = fingers[:1] if self.shared else fingers
-        self.paths = [press_of(scene, f, coarser, hasty) for f in solved]
+        self.paths = [press_of(scene, f, coarser) for f in solved]
         self.fingers_solved, self.planes = 2, min(sum(own.pad.symmetry) for own in self.paths)
 
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
@@ -398,16 +405,13 @@ class OnWall(Solver):
         """See `Solver`."""
         [state], held = states, self.held
         found = [
-            PressedContact(self.scene, f, own, half_turned if turned else None)
-            for f, own, turned in zip(self.fingers, state.fingers, held.flipped, strict=False)
+            PressedContact(self.scene, f, own, HALF_TURN if flipped else UPRIGHT)
+            for f, own, flipped in zip(self.fingers, state.fingers, held.flipped, strict=False)
         ]
         if len(state.fingers) == 1:
-            own = state.fingers[0]
-
-            def image(patch: ContactPatch) -> ContactPatch:
-                return mirrored(own.pad, half_turned(patch) if held.flipped[0] else patch)
-
-            found.append(PressedContact(self.scene, self.fingers[1], own, image))
+            # a plane of symmetry lies between the fingers, in which y of the pad changes its sign
+            signs = (-1.0, 1.0, 1.0) if held.flipped[0] else (1.0, -1.0, 1.0)
+            found.append(PressedContact(self.scene, self.fingers[1], state.fingers[0], signs))
         return found
 
     def wall_values(self, solved: Solved, mesh: int = 0) -> dict[str, Any]:
@@ -452,16 +456,21 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Gr
     size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
     mesh = size.halved() if coarser else size
     body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
+    coupled = scene.effects.friction_pressure_coupling == "tangential"
     wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
     def problem(rule: str) -> GripProblem:
         pad = pad_of(scene, held.pad_symmetry, rule, coarser)
-        return GripProblem(wall, [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)])
+        pads = [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)]
+        return CoupledGripProblem(wall, pads, scene.friction.mu) if coupled else GripProblem(wall, pads)
 
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
     first, *others = contact_rules(scene, walled=True)
     fallback = (lambda: problem(others[0])) if others else None
-    return Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
+    grip = Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
+    if coupled:
+        grip.load_steps = load_steps
+    return grip
 
 
 def _gap(finger: Finger, turned: bool):

@@ -33,7 +33,7 @@ from softjaw.study.result.datasets import CLOSING, Column, Dataset, columns_of, 
 from softjaw.study.result.datasets import ROOT as ROOT
 from softjaw.study.result.vtkhdf import grid_datasets
 
-PROGRAM, VERSION = "softjaw", 6
+PROGRAM, VERSION = "softjaw", 7
 LABEL, SESSIONS, REPORT = 80, 256, 8192
 # Fixed lengths: a run writes to space that is there already, and text of any length would need more.
 SESSION = np.dtype(

@@ -295,14 +295,11 @@ class Effects(SceneSection):
     )
 
     def object_findings(self, shape: Shape) -> Iterator[Finding]:
-        """A shell needs a wall; friction acts back on pads that press on rigid objects."""
+        """A shell needs a wall."""
         hollow = isinstance(shape, Walled) and shape.wall is not None
         if self.object.endswith("shell") and not hollow:
             remedy = 'add wall_mm to [object], for example `wall_mm = 0.4`, or write "auto"'
             yield Finding(("object",), f'"{self.object}" without a wall', "an object with a wall", remedy)
-        if self.friction_pressure_coupling == "tangential" and hollow and self.object != "rigid":
-            found, remedy = '"tangential" with a thin wall', 'write object = "rigid" in [effects], or "none" here'
-            yield Finding(("friction_pressure_coupling",), found, "a rigid object", remedy)
 
     def surface_findings(self, surface: LimitSurfaceKeys) -> Iterator[Finding]:
         """A forced level is that of the model."""

@@ -5,12 +5,14 @@ from functools import cache
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
+from softjaw.fem.contact.friction_coupling import load_steps
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.shell.coupled_grip import CoupledGripProblem
 from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
@@ -54,14 +56,18 @@ def grip(
     mesh: WallMesh = COARSE,
     theta: float = 0.0,
     radius: float = 0.035,
+    mu: float | None = None,
 ) -> Grip:
-    """Both fingers on the can at this height."""
+    """Both fingers on the can at this height; friction acts back where ``mu`` is given."""
     poses = pose(theta, z, radius), pose(theta + np.pi, z, radius)
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
     pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)
-    problem = GripProblem(model, [(pad, p, wall) for p, wall in zip(held.poses, walls, strict=True)])
-    return Grip(problem, [_gap(p) for p in held.poses], held.mirrors)
+    pads = [(pad, p, wall) for p, wall in zip(held.poses, walls, strict=True)]
+    gaps = [_gap(p) for p in held.poses]
+    if mu is None:
+        return Grip(GripProblem(model, pads), gaps, held.mirrors)
+    return Grip(CoupledGripProblem(model, pads, mu), gaps, held.mirrors, load_steps=load_steps)
 
 
 def _gap(at: Pose):

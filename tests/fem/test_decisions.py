@@ -1,6 +1,6 @@
 """Outcomes of the finite element package that rounding does not decide: meshes, touch, profiles, symmetry, grids.
 
-Each decision is put where it is hardest, on its limit, then turned, scaled and moved by a few ulp: 200 times the same.
+Each decision is put where it is hardest, on its limit, then turned, scaled and moved by a few ulp: the same each time.
 """
 
 from __future__ import annotations
@@ -35,11 +35,12 @@ from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.facing import FAR, Wall, face
 from softjaw.fem.shell.thin_walled import ThinWalled, _clamped, grasp
 from softjaw.fem.shell.wall_mesh import MeshSize, _planes, _steps, _wall, along, divided
+from tests.turns import TURNS
 
 EPS = np.finfo(float).eps
 ULPS = EPS * np.arange(-8, 9)
 # the same examples on every rank and every day, and no folder of past failures beside the project; no seed is simpler
-tries = settings(max_examples=200, deadline=None, derandomize=True, database=None, phases=[Phase.generate])
+tries = settings(max_examples=TURNS, deadline=None, derandomize=True, database=None, phases=[Phase.generate])
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -61,7 +61,8 @@ def spheroid(x, a=0.025, c=0.04):
     return g, np.stack([n[:, 0] * x[:, 0] / r, n[:, 0] * x[:, 1] / r, n[:, 1]], axis=1)
 
 
-def test_region_of_flat_facets_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_refined():
+@pytest.mark.parametrize("levels", [2, pytest.param(3, marks=pytest.mark.long)])
+def test_region_of_flat_facets_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_refined(levels):
     """Halving triangles and grid: the facets' sagitta, edge^2 / (8 R), bounds the distance, and falls to a quarter.
 
     Smooth triangles are ten times as close at once, and then as close as flat pieces follow them: a part of the step.
@@ -71,15 +72,15 @@ def test_region_of_flat_facets_converges_to_the_sphere_and_the_spheroid_when_mes
         pose = Pose(TILT, np.array([radii[0], 0, 0]))
         errors = [
             [region_error(MeshObject(*ball(level, radii), step, (), angle), exact, pose, lower, upper)
-             for level, step in ((3, 1.6e-3), (4, 0.8e-3), (5, 0.4e-3))]
+             for level, step in ((3, 1.6e-3), (4, 0.8e-3), (5, 0.4e-3))[:levels]]
             for angle in (0.0, 30.0)
         ]  # fmt: skip
         (gap, normal), (smooth, _) = np.array(errors).transpose(0, 2, 1)
         assert smooth[0] < 0.15 * gap[0]
-        assert (smooth < np.array([1.6e-5, 8e-6, 5e-6])).all(), smooth
+        assert (smooth < np.array([1.6e-5, 8e-6, 5e-6])[:levels]).all(), smooth
         assert (np.log2(gap[:-1] / gap[1:]) > 1.6).all(), gap
         assert (normal[:-1] / normal[1:] > 1.5).all(), normal
-        assert gap[-1] < 3e-5
+        assert gap[-1] < (4e-5, 3e-5)[levels - 2]
 
 
 def test_spline_alone_is_of_fourth_order():

@@ -19,11 +19,12 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from tests.generators import cap_polar, cyl_mesh, cylinder_grid, grid_mesh, mesh_patch, points_patch
+from tests.turns import TURNS
 
 X = np.array([1.0, 0.0, 0.0])
 EPS = np.finfo(float).eps
 # The same examples on every rank and every day, and no folder of past failures beside the project.
-REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=200)
+REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=TURNS)
 seeds = st.integers(0, 2**32 - 1)
 
 

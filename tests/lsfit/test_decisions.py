@@ -30,8 +30,8 @@ from softjaw.lsfit.span import convex_span_quartic, span_samples
 from softjaw.lsfit.surface import FitError, FitFlag, Image, OpenBodyError, UndecidedError
 from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
+from tests.turns import TURNS
 
-TURNS = 200
 ULP = np.finfo(float).eps
 
 

@@ -51,7 +51,7 @@ def dense_eigenvalue(v, d, rng, starts=60, turns=300):
     return values[:, 0].min()
 
 
-@pytest.mark.parametrize(("d", "count"), [(2, 20), (3, 50), pytest.param(3, 2000, marks=pytest.mark.long), (4, 4)])
+@pytest.mark.parametrize(("d", "count"), [(2, 10), (3, 20), pytest.param(3, 2000, marks=pytest.mark.long), (4, 2)])
 def test_no_direction_is_softer_than_the_softest(d, count):
     """The value found is always that of some direction, so it can only be too high."""
     rng, too_high = np.random.default_rng(d), 0
@@ -73,7 +73,9 @@ def random_form(rng, d, kind):
     return coefficients(lambda w: (monomials(w, exponents(d, 2)) @ a) ** 2 + 1e-3 * (w**4).sum(axis=1), d)
 
 
-@pytest.mark.parametrize(("d", "count"), [(1, 3), (2, 12), (3, 30), (4, 6), (6, 2)])
+@pytest.mark.parametrize(
+    ("d", "count"), [(1, 3), (2, 12), (3, 12), pytest.param(3, 60, marks=pytest.mark.long), (4, 3), (6, 2)]
+)
 def test_no_direction_has_a_smaller_value(d, count):
     rng, E = np.random.default_rng(d), exponents(d, 4)
     for k in range(count):

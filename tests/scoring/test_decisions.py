@@ -14,8 +14,8 @@ from softjaw.scoring.graspit import graspit_score, graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score
 from softjaw.scoring.rays import ray_volume
+from tests.turns import TURNS
 
-TURNS = 200
 ULP = np.finfo(float).eps
 LENGTHS = 0.2, 0.05
 A, FLAT, SLIPPERY = (0.8, 0.6, 0.015), (0.8, 0.6, 0.0), (0.0, 0.6, 0.015)

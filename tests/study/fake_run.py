@@ -119,8 +119,8 @@ def finalise(writer):
     writer.write_derived("slope", (e_n[:, 0, -1] - e_n[:, 0, 0]) / 4.0)
 
 
-def main():
-    """Run it and leave with its exit code."""
+def main(arguments=None):
+    """Run it; its exit code."""
     parser = argparse.ArgumentParser()
     parser.add_argument("file", type=Path)
     parser.add_argument("--digest", default="scene")
@@ -134,7 +134,7 @@ def main():
     parser.add_argument("--apart", action="store_true")  # forces that do not depend on each other
     for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     from mpi4py import MPI
 
     from softjaw.study.messages import StudyError, complain

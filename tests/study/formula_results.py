@@ -49,6 +49,16 @@ def quartic(x, y, t):
     return found
 
 
+def fresh(path: Path, layout: Layout, header: Header) -> None:
+    """A file without values, as ``create`` makes it."""
+    axes = [(axis.name, axis.units, axis.long_name, axis.values.tolist(), axis.options) for axis in layout.axes]
+    kind = f"{axes}{layout.options()}{header}"
+    if kind not in SKELETONS:
+        create(path, layout, header)
+        SKELETONS[kind] = path.read_bytes()
+    path.write_bytes(SKELETONS[kind])
+
+
 def make(
     path: Path, formula=linear, axes=None, scene=SCENE, meshes=1, derived=(), labels=(), added=(), **datasets
 ) -> Path:
@@ -59,11 +69,7 @@ def make(
     """
     axes = axes or grid_axes()
     layout = Layout(axes, 0, meshes, patches=False, derived=derived, added=added)
-    kind = f"{[(axis.long_name, axis.values.tolist(), axis.options) for axis in axes]}{layout.options()}{scene}{labels}"
-    if kind not in SKELETONS:
-        create(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
-        SKELETONS[kind] = path.read_bytes()
-    path.write_bytes(SKELETONS[kind])
+    fresh(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
     grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
     e_n = np.broadcast_to(formula(*grid), layout.shape)
     force = np.broadcast_to(grid[-1], layout.shape)

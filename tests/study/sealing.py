@@ -21,8 +21,9 @@ def sealed(path):
         layout, codes = result.layout, result.codes.ravel()
         for part in layout.parts:
             rows, sums = checksums.sums_of(guarded, layout, part, np.flatnonzero(codes != MISSING))
-            for row, crc in zip(rows, sums, strict=True):
-                file[f"{SUMS}/{part}"][np.unravel_index(row, layout.shape)] = crc
+            stored = file[f"{SUMS}/{part}"][()]
+            stored[np.unravel_index(rows, layout.shape)] = sums
+            file[f"{SUMS}/{part}"][...] = stored
         file[f"{SUMS}/{STATE}"][...] = np.vectorize(lambda code: checksums.OF_STATE.get(code, 0))(result.codes)
         for i, name in enumerate(layout.closing):
             file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])

@@ -317,7 +317,7 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
 @pytest.mark.launches
 def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
     def piped():
-        small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0]"
+        small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0] --set accuracy.meshes=1"
         run = f"{sys.executable} -m softjaw run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
         done = subprocess.run(
             ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=shared_path,

@@ -1,6 +1,6 @@
 """Outcomes of a study that rounding does not decide: rankings, levels of effects, flags, windows, probes, look-ups.
 
-Each decision is put where it is hardest, on its limit or on a tie, moved by a few ulp or turned: 200 times the same.
+Each decision is put where it is hardest, on its limit or on a tie, moved by a few ulp or turned: the same each time.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.turns import TURNS
+
 ULPS = np.finfo(float).eps * np.arange(-8, 9)
-tries = settings(max_examples=200, deadline=None)
+tries = settings(max_examples=TURNS, deadline=None)
 SPHERE = """
 [object]
 shape = "sphere"

@@ -115,8 +115,7 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
         assert not found[k].values["maps/flags"] & Flag.JUMPED
 
 
-def test_forces_are_apart_on_two_meshes_but_not_with_friction_that_acts_back():
-    for overrides in ((), WALL):
+def test_forces_are_apart_on_two_meshes():
+    for overrides in ((), WALL, ("effects.friction_pressure_coupling='tangential'",)):
         assert unit_of(*overrides).apart
         assert not unit_of(*overrides, "accuracy.meshes=1").apart
-    assert not unit_of("effects.friction_pressure_coupling='tangential'").apart

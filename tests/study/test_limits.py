@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from softjaw.fem.assembly import Pattern
 from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study import messages
 from softjaw.study.case.result import TimeLimitError
@@ -144,9 +145,12 @@ def test_factors_that_find_no_memory_say_so_and_the_next_solve_works():
     """36^3 unknowns of a Laplacian take more than 100 MB; MUMPS alone would call the system one that diverged."""
     second = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(36, 36))
     A = sp.kronsum(sp.kronsum(second, second), second).tocoo()
+    rows, columns = A.row.astype(np.int32), A.col.astype(np.int32)
+    pattern = Pattern(A.shape[0], rows, columns)
+    pattern.values[pattern.slots(rows, columns)] = A.data
     problem = SimpleNamespace(
-        size=A.shape[0], rows=A.row.astype(np.int32), columns=A.col.astype(np.int32),
-        residual=lambda x: A @ x - 1.0, tangent=lambda x: A.data, shorten=lambda x, step: 1.0,
+        size=A.shape[0], pattern=pattern, residual=lambda x: A @ x - 1.0, tangent=lambda x: None,
+        shorten=lambda x, step: 1.0,
     )  # fmt: skip
     solver = NonlinearSolver(problem)
     with limited_memory(0.02, 1), pytest.raises(MemoryError, match="for the factors of 46656 unknowns"):

@@ -452,7 +452,7 @@ def test_contacts_beside_each_other_are_flagged_although_their_normals_are_paral
 def test_pads_that_would_run_into_each_other_are_flagged():
     """Two pads on a ball of 12 mm: together they closing displacement further than the ball is thick."""
     ball = 'shape = "sphere"\nradius_mm = 6'
-    [(_, path)] = solved(ball, forces="[1, 20]", elements="[20, 10, 6]")
+    [(_, path)] = solved(ball, forces="[1, 20]", elements="[12, 6, 4]")
     assert [bool(case.values["maps/flags"] & Flag.COLLISION) for case in path] == [False, True]
     assert [2 * case.values["maps/closing"] > 0.012 for case in path] == [False, True]
 

@@ -12,13 +12,14 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 
+from softjaw.study.accuracy import measure
 from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
 from softjaw.study.show.figures import drawing as figures
 from softjaw.study.show.report import writing as report
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT
 from tests.study.view_files import make
 
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
@@ -87,21 +88,24 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(figures, "chosen", lambda names: [drawn])  # without solving and drawing anything
     monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
+    monkeypatch.setattr(measure, "calibration_seconds", lambda: 1.0)
     code = main([word.replace("FILE", str(file)).replace("PLACE", str(place)) for word in COMMANDS[command]])
     refused(code, capfd.readouterr().err, place)
     assert list(file.parent.iterdir()) == [file]
 
 
-@pytest.mark.launches
+@pytest.mark.launches  # where the ranks of the tests would start a run together
 @pytest.mark.parametrize("words", [("run", SMOKE, "-o"), ("figure", "4c", "--results")])
-def test_a_run_says_what_it_cannot_write(tmp_path, words):
+def test_a_run_says_what_it_cannot_write(tmp_path, words, capfd):
     with read_only(tmp_path, {}):
-        code, _, errors = launch(0, "-m", "softjaw", *words, tmp_path / "x.hdf")
-    refused(code, errors, tmp_path)
+        code = main([*words, str(tmp_path / "x.hdf")])
+    refused(code, capfd.readouterr().err, tmp_path)
 
 
 @pytest.mark.launches
-@pytest.mark.parametrize("command", ["show", "status", "export", "schema", "compare"])
+@pytest.mark.parametrize(
+    "command", ["show", "schema", *(pytest.param(n, marks=pytest.mark.long) for n in ("status", "export", "compare"))]
+)
 def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
     words = {"export": (file, "--csv"), "schema": (), "compare": (file, file)}.get(command, (file,))
     with Path("/dev/full").open("w") as full:

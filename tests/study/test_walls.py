@@ -46,6 +46,9 @@ COARSE = """[accuracy]
 wall_around_mm = 4
 wall_along_mm = 6
 wall_coarse_mm = 12
+meshes = 1
+[effects]
+friction_pressure_coupling = "none"
 """
 WHERE = "stations_mm = [40]\nangles_deg = [0]"
 

@@ -8,10 +8,9 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import StoredAxis
 from softjaw.study.result.write import ResultWriter, record
-from tests.study.formula_results import OBJECT
+from tests.study.formula_results import OBJECT, fresh
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
@@ -87,7 +86,7 @@ def solved(layout, index):
 def make(path, scene=SCENE, patches=True, failed=FAILED):
     """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
     layout = Layout(axes(), int(np.prod(GRID)), patches=patches)
-    create(path, layout, Header("d" * 64, scene, "<b>thing</b>", "scene.toml"))
+    fresh(path, layout, Header("d" * 64, scene, "<b>thing</b>", "scene.toml"))
     writer = ResultWriter(path, layout, None)
     for row, index in enumerate(np.ndindex(layout.shape)):
         if index == failed:

@@ -61,7 +61,7 @@ def test_a_rough_plane_holds_the_front():
     (smooth,) = Press(pad_of(), reference.plane).load_path([5.0])
     home = pad_of().nodes[pad_of().contact_nodes][:, :2]
     spread = [np.abs(state.contact_face[:, :2] - home).max() for state in (rough, smooth)]
-    assert spread[0] < 0.05 * spread[1]
+    assert spread[0] < 0.08 * spread[1]
     assert rough.closing < 0.98 * smooth.closing  # a held pad is stiffer
 
 
@@ -119,6 +119,24 @@ def test_tangent_by_finite_differences(control, gap):
     d, h = rng.normal(size=pad.size) * 1e-8, 1e-2
     found = (problem.residual(x + h * d) - problem.residual(x - h * d)) / (2 * h)
     np.testing.assert_allclose(K @ d, found, atol=1e-5 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
+def test_a_force_by_itself_remembers_the_load_path_of_a_coarser_mesh(gap):
+    """One step leads to the state of the load path: the same from its own mesh, nearly so from a coarser one."""
+    forces, fine, coarse = [1.0, 8.0], pad_of(elements=(8, 6, 2)), pad_of((True, False), (4, 3, 1))
+    path, starts = (list(press(gap, 0.4, pad).load_path(forces)) for pad in (fine, coarse))
+    one = press(gap, 0.4, fine)
+    for k in (1, 0):
+        again, found = one.at(forces[k], [path[k]]), one.at(forces[k], [starts[k]])
+        assert again.unknowns.tobytes() == press(gap, 0.4, fine).at(forces[k], [path[k]]).unknowns.tobytes()
+        assert (again.steps, found.steps) == (1, 1)
+        np.testing.assert_allclose(again.pressure, path[k].pressure, atol=1e-7 * path[k].pressure.max())
+        assert found.closing == pytest.approx(path[k].closing, rel=2e-2)
+        size = np.linalg.norm(found.points.friction, axis=-1)
+        load = found.points.load
+        assert (size <= 0.4 * load * (1 + 1e-9) + 1e-12 * load.max()).all()
+        assert found.checks.force_balance < 1e-8
 
 
 def test_newton_steps_to_and_fro_are_damped_and_others_are_not():

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softjaw.fem.contact.extract import extract, half_turned
+from softjaw.fem.contact.extract import extract, turned
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, Wall, face
@@ -104,9 +104,16 @@ def test_a_long_side_that_points_down_gives_the_same_patch_turned():
     np.testing.assert_allclose(grasp(thin(), down).poses[0].rotation, up[0].rotation, atol=1e-12)
     finger = next(grip(thin(), z=0.142, elements=(6, 4, 2), mesh=ROUGH).load_path([1.0])).fingers[0]
     patch = extract(finger.pad, finger)
-    again = half_turned(half_turned(patch))
-    for name in ("centroid", "normal", "corners", "pressure"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(patch, name))
+    for signs in ((-1.0, -1.0, 1.0), (1.0, -1.0, 1.0), (-1.0, 1.0, 1.0)):
+        once = turned(finger.pad, patch, signs)
+        again = turned(finger.pad, once, signs)
+        for name in ("centroid", "normal", "corners", "pressure"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(patch, name))
+        # the same corner of the grid comes first, and faces are run round in the same sense
+        for field in (once, patch):
+            sides = field.corners[:, 1] - field.corners[:, 0], field.corners[:, 3] - field.corners[:, 0]
+            assert (sides[0][:, 0] > 0).all()
+            assert (sides[1][:, 1] > 0).all()
 
 
 @pytest.fixture(scope="module")

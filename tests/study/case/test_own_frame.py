@@ -26,6 +26,8 @@ elements = [4, 4, 2]
 {candidates}
 [load]
 normal_force_n = [2]
+[effects]
+friction_pressure_coupling = "none"
 """
 GRID = "[candidates]\nstations_mm = [40]\nangles_deg = [0]"
 POSE = "[[candidates.poses]]\npoint_mm = {point}\napproach = {approach}\nlong_side = {long_side}"

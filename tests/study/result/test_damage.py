@@ -155,7 +155,7 @@ def without_trial(monkeypatch):
     monkeypatch.setattr(guarded, "trouble", lambda attempt: "")
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(300, marks=MANY)])
+@pytest.mark.parametrize("count", [3, pytest.param(300, marks=MANY)])
 @pytest.mark.usefixtures("without_trial")
 def test_a_flipped_bit_in_any_dataset_is_refused_or_changes_no_number(copy, answers, count):
     expected, sound = dict(answers(copy)), copy.read_bytes()
@@ -166,11 +166,11 @@ def test_a_flipped_bit_in_any_dataset_is_refused_or_changes_no_number(copy, answ
         flip(copy, offset + int(random.integers(length)), int(random.integers(8)))
         refused += judge(answers(copy), expected, copy)
         copy.write_bytes(sound)
-    assert refused > count  # most of them hit what somebody reads
+    assert refused >= count  # most of them hit what somebody reads
     assert dict(answers(copy)) == expected
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(100, marks=MANY)])
+@pytest.mark.parametrize("count", [1, pytest.param(100, marks=MANY)])
 def test_a_flipped_bit_in_any_byte_of_the_file_is_refused_or_changes_no_number(copy, answers, count):
     expected, sound = dict(answers(copy)), copy.read_bytes()
     random = np.random.default_rng(8)
@@ -180,7 +180,7 @@ def test_a_flipped_bit_in_any_byte_of_the_file_is_refused_or_changes_no_number(c
         copy.write_bytes(sound)
 
 
-@pytest.mark.parametrize(("length", "count"), [(512, 3), *(pytest.param(n, 60, marks=MANY) for n in (64, 512, 4096))])
+@pytest.mark.parametrize(("length", "count"), [(512, 1), *(pytest.param(n, 60, marks=MANY) for n in (64, 512, 4096))])
 def test_a_block_of_zeros_is_refused_or_changes_no_number(copy, answers, length, count):
     expected, sound = dict(answers(copy)), copy.read_bytes()
     blocks, random = [b for b in data_blocks(copy).values() if b[1]], np.random.default_rng(length)

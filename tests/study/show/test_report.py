@@ -20,7 +20,6 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.read import dataset
-from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import StoredAxis, open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.show.grasps import at, compared, grouped, images, judge, number, order
@@ -28,7 +27,7 @@ from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report
 from softjaw.study.show.tables.show import best
 from softjaw.study.show.view.model import read_scene
-from tests.study.formula_results import OBJECT
+from tests.study.formula_results import OBJECT, fresh
 
 ROOT = Path(__file__).parent.parent.parent
 FACES = (6, 4)
@@ -82,7 +81,7 @@ def solved(layout, index, message="", **changes):
 
 def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", message="", labels=(), **changes):
     """A result file whose cases are done, missing, or failed with the text that ``state`` gives."""
-    create(path, layout, Header("d" * 64, scene, title, "scene.toml", labels=labels))
+    fresh(path, layout, Header("d" * 64, scene, title, "scene.toml", labels=labels))
     writer = ResultWriter(path, layout, None)
     for row, index in enumerate(np.ndindex(layout.shape)):
         if (what := state(index)) == "done":
