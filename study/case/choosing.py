@@ -27,7 +27,7 @@ from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.finer import Finer
 from softjaw.study.case.model import Finger, contact_rules, pad_of, plate_compliance
 from softjaw.study.case.result import surely_below
-from softjaw.study.case.solving import PressedContact, Solved, Solver, grasp_of, refuse_along_axis, solver
+from softjaw.study.case.solving import OnRigid, PressedContact, Solved, Solver, grasp_of, refuse_along_axis, solver
 from softjaw.study.case.task import payload_alone
 from softjaw.study.case.wall import estimated_indentation, thin_body
 from softjaw.study.flags import Flag
@@ -229,7 +229,7 @@ class Candidate:
     def _solved(self, own: Solver, k: int) -> Solved:
         """Contacts at one force, on a finer mesh where e_n asks for it and the object is rigid."""
         found = own.level(self.forces, k)
-        if self.asked.accuracy.meshes < 3 or not self.rigid:
+        if self.asked.accuracy.meshes < 3 or not isinstance(own, OnRigid):
             return found
         if own not in self._finer:
             self._finer[own] = Finer(own.scene, self.fingers, self.poses, self.target)
