@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from softjaw.fem.objects import shapes as objects
 from softjaw.fem.objects.gap import GapObject, Pose
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
+from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
@@ -221,6 +222,14 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 def forces_apart(scene: Scene) -> bool:
     """Whether every force is solved by itself, on a fine mesh that starts from a coarse one and its load path."""
     return scene.accuracy.meshes > 1
+
+
+def pad_elements(scene: Scene, mesh: int) -> tuple[int, int, int]:
+    """Elements of a pad on the scene's mesh (1, 2) and on the finer ones of ``accuracy.meshes`` (3, 4)."""
+    found = scene.gripper.elements
+    for _ in range(2, mesh):
+        found = refined(found)
+    return found
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.patch import ContactPatch
+from softjaw.study.case.build import pad_elements
 from softjaw.study.case.evaluate import OF_MESHES, e_n_error
 from softjaw.study.case.model import Finger
 from softjaw.study.case.result import surely_below
@@ -25,25 +26,15 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import MOST_ELEMENTS
 
 FloatArray = NDArray[np.float64]
-TIMES = 1.4  # as many elements in every direction: on the bottle nearer to the limit than twice as many along the sides
 OF_FINER = 1.0  # weight of the difference of e_n between two meshes so near each other
 NOT_SOLVED = "on a finer mesh, which the error of e_n asks for, it was not solved ({reason})"
 
 
-def elements(scene: Scene, mesh: int) -> tuple[int, int, int]:
-    """Elements of a pad on the scene's mesh (2) and on the finer ones (3, 4, ...)."""
-    found = scene.gripper.elements
-    for _ in range(2, mesh):
-        # even numbers, of which symmetry leaves half
-        length, width = (2 * max(round(TIMES * n / 2), n // 2 + 1) for n in found[:2])
-        found = length, width, max(round(TIMES * found[2]), found[2] + 1)
-    return found
-
-
 def on_finer(scene: Scene, mesh: int) -> Scene:
-    """The scene with the pads' mesh that is `elements`."""
+    """The scene with the finer mesh of its pads that is `pad_elements`."""
     # values that the scene itself could have, so nothing is checked again
-    return scene.model_copy(update={"gripper": scene.gripper.model_copy(update={"elements": elements(scene, mesh)})})
+    gripper = scene.gripper.model_copy(update={"elements": pad_elements(scene, mesh)})
+    return scene.model_copy(update={"gripper": gripper})
 
 
 def weight_of(fine: Sequence[PressedContact], scene: Scene) -> float:
@@ -85,7 +76,7 @@ class Finer:
         for mesh in range(3, self._scene.accuracy.meshes + 1):
             # undecided, and unknown, is refined, which is right in both cases
             error = error_of(found, self._scene)
-            if surely_below(error, self._target) or math.prod(elements(self._scene, mesh)) > MOST_ELEMENTS:
+            if surely_below(error, self._target) or math.prod(pad_elements(self._scene, mesh)) > MOST_ELEMENTS:
                 break
             try:
                 found = self._again(mesh, found, force)

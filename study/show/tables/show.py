@@ -32,6 +32,7 @@ INTERVAL_MEANS = (
     "half-width of the uncertainty interval (95 %) of the column before it; [uncertainty] in the scene lists its parts"
 )
 MISALIGNMENT = "misalignment"  # its flag is told with the angle
+PAD_ELEMENTS = "pad_elements"
 FLAGS_WIDTH, LABEL_WIDTH = 15, 20
 RESERVED = {"map": 7, "flags": 13}  # characters of a column
 
@@ -139,8 +140,8 @@ def _columns(ds: xr.Dataset) -> Iterator[tuple[str, str, np.ndarray]]:
                 break
         if q.name == "e_n":  # what the paper compares it with
             yield f"e_n_{ds.planar}", q.unit, values_of(ds, q.name, ds.planar)
-    if MISALIGNMENT in ds:
-        yield MISALIGNMENT, ds[MISALIGNMENT].units, values_of(ds, MISALIGNMENT)
+    for name in (name for name in (MISALIGNMENT, PAD_ELEMENTS) if name in ds):
+        yield name, ds[name].units, values_of(ds, name)
 
 
 def _first(rows: Iterable[tuple[Any, ...]], top: int, columns: Columns) -> list[tuple[Any, ...]]:
@@ -224,7 +225,7 @@ def least(names: Sequence[str]) -> list[str]:
     main = [column for name in reversed(MAIN[3:]) for column in (map_row(name).of_error.name, name) if column in names]
     planar = [name for name in names if name in (f"e_n_{model}" for model in MODELS[1:])]
     last = [name for name in (*(map_row(MAIN[i]).of_error.name for i in (0, 2)), MAIN[2]) if name in names]
-    return [*(n for n in (MISALIGNMENT,) if n in names), *main, *planar, *last]
+    return [*(n for n in (PAD_ELEMENTS, MISALIGNMENT) if n in names), *main, *planar, *last]
 
 
 def _legend(table: Table, hidden: Sequence[str], width: int) -> list[str]:
