@@ -104,7 +104,7 @@ class Scene(SceneSection, metaclass=Loader):
             )
         meshes, walled = self.accuracy.meshes, getattr(self.object, "wall", None) is not None
         if meshes > 2 and walled and self.effects.object != "rigid":
-            yield f"accuracy.meshes = {meshes} refines cases on rigid objects alone: where the wall is simulated there are 2"
+            yield f"accuracy.meshes = {meshes} refines cases on rigid objects alone: on a simulated wall there are 2"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
             yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
 

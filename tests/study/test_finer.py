@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from softjaw import press
 from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import ConvergenceError
 from softjaw.friction.patch import ContactPatch
@@ -14,7 +15,7 @@ from softjaw.study import pipeline
 from softjaw.study.case.finer import joined
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
-from tests.study.test_levels import bits, unit_of, whole
+from tests.study.test_levels import WALL, bits, unit_of, whole
 
 OWN, FINER = (8, 4, 2), (12, 6, 3)
 HERE = "accuracy.meshes=3"
@@ -121,3 +122,18 @@ def test_friction_that_acts_back_has_a_third_mesh_too():
     assert three["maps/pad_elements"] == 216
     assert three["maps/e_n_error"] != two["maps/e_n_error"]
     assert three["maps/e_n"][0] == pytest.approx(two["maps/e_n"][0], rel=2 * two["maps/e_n_error"])
+
+
+@pytest.mark.long
+def test_a_simulated_wall_keeps_two_meshes():
+    two, three = (cases(*WALL, *more, wanted=[0])[0] for more in ((), (HERE,)))
+    assert three.values["maps/pad_elements"] == 6 * 4 * 2
+    assert without_count(three) == without_count(two)
+
+
+@pytest.mark.long
+def test_one_case_in_memory_is_refined_too():
+    scene = unit_of(HERE).scene
+    case = press(scene, candidate=0, force=1.0)
+    assert case.value("pad_elements") == 216
+    assert case.errors["e_n"] / case.e_n == pytest.approx(case.value("e_n_error"))
