@@ -34,7 +34,7 @@ def scene_text(scene: Any, file: str) -> str:
         "cases": str(scene.cases),
         "refinement": _refinement(c),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
-        "accuracy": "every case on two meshes" if scene.accuracy.meshes > 1 else "one mesh, no error maps",
+        "accuracy": _meshes(scene.accuracy.meshes),
         "target": _target(scene),
         "intervals": _intervals(scene),
         "effects": ", ".join(levels),
@@ -49,6 +49,12 @@ def scene_text(scene: Any, file: str) -> str:
 def _refinement(where: Any) -> str:
     """What a refinement may add; empty without one."""
     return f"at most {where.refine.budget} more cases, {where.refined_until}" if where.refine else ""
+
+
+def _meshes(count: int) -> str:
+    """On how many meshes a case is solved."""
+    finer = f", on up to {count} where e_n asks for it" if count > 2 else ""
+    return f"every case on two meshes{finer}" if count > 1 else "one mesh, no error maps"
 
 
 def limits_text(run: Any) -> str:
