@@ -196,8 +196,9 @@ class Candidate:
         low, high = (self.seen(at_levels(self.scene, **{name: own}), self.forces, k) for own in (step.low, step.high))
         if low is None or high is None:
             return nan, nan
-        # what other gaps change is no measure of the effect
-        if any(a.nodal_instead != b.nodal_instead for a, b in zip(low, high, strict=True)):
+        both = list(zip(low, high, strict=True))
+        # on a few elements e_n follows from their size, and what other gaps change is no measure of the effect
+        if any(a.on_few_elements or b.on_few_elements or a.nodal_instead != b.nodal_instead for a, b in both):
             return nan, nan
         (e_n, held), (other, other_held) = map(self._measured, (low, high))
         return other / e_n - 1.0 if e_n > 0 else nan, other_held / held - 1.0 if held > 0 else nan

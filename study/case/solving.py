@@ -129,6 +129,11 @@ class PressedContact(Contact):
         return [self.unit_limits[name].tau_z / self.state.force for name in MODELS]
 
     @property
+    def on_few_elements(self) -> bool:
+        """Whether so few elements are loaded that the contact's shape is theirs."""
+        return bool(np.count_nonzero(self.loaded) < FEW_ELEMENTS * self.state.pad.shape.per_side**2)
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
         shape, law = self.state.pad.shape, self.state.pad.material
@@ -137,7 +142,7 @@ class PressedContact(Contact):
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         # a single line of nodes loads the elements on both sides of it
         shared = self.state.pad.contact == "nodal"
-        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) - shared < NARROW
+        few = self.on_few_elements or min(widths) - shared < NARROW
         overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
         # Trilinear elements alone lock when the foam is nearly incompressible.
         return bool(overlaps or few or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
