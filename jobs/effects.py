@@ -252,9 +252,10 @@ def draw(rows: list[Row]) -> bytes:
                       title=f"{effect}\n{label if limit else 'never skipped'}")  # fmt: skip
         for panel in axes[:, 0]:
             panel.set(ylabel="relative error where skipped")
-        axes[1, 2].set(ylabel="error of the quality")
-        axes[1, 3].axis("off")
-        axes[1, 3].text(0.0, 0.95, LEGEND, va="top", linespacing=1.5, transform=axes[1, 3].transAxes)
+        axes[1, 1].set(ylabel="error of the quality")
+        for panel in axes[1, 2:]:
+            panel.axis("off")
+        axes[1, 2].text(0.0, 0.95, LEGEND, va="top", linespacing=1.5, transform=axes[1, 2].transAxes)
         return pictures.as_png(drawn)
 
 
