@@ -1,4 +1,4 @@
-"""What choosing effects is worth: wrong skips, effects taken without need and CPU time spent, table and picture.
+"""What choosing effects is worth: wrong skips and effects taken without need, table and picture.
 
     python jobs/effects.py results/effects.csv                    solve every case at both levels of every effect
     python jobs/effects.py results/effects.csv --only friction    a part of it, of friction, plates, patches, walls
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import time
 from collections.abc import Iterator
 from itertools import chain, cycle
 from pathlib import Path
@@ -77,7 +76,7 @@ PANELS = {  # of an effect: indicator up to which it is skipped without a measur
     "friction": (0.0, "1 - F_N / S"),
     "limit surface": (0.0, "radial fit error"),  # quality, not e_n; the quartic is never skipped
 }
-EXACT, COST = "model size", "cost"
+EXACT = "model size"
 PLAIN = {"object": "rigid", "sheet": "rigid", COUPLED: "none"}
 SURFACES = {"three_motions": "s", "full": "^", "quartic": "o"}  # and how they are drawn
 LEGEND = """filled: skipped by auto; open: taken
@@ -153,29 +152,15 @@ def named(label: str, n: int, force: float) -> str:
 
 
 def friction_rows() -> Iterator[Row]:
-    """Friction that acts back, chosen at every force, and what choosing costs."""
+    """Friction that acts back, chosen at every force."""
     for label, scene in rigid_scenes():
         free, coupled = contacts_at(scene), contacts_at(scene, **{COUPLED: "tangential"})
-        for n, candidate in enumerate(timed(label, candidates(at_levels(scene, sheet="rigid")), cost := [])):
+        for n, candidate in enumerate(candidates(at_levels(scene, sheet="rigid"))):
             for force, level in zip(candidate.forces, candidate.levels[COUPLED], strict=True):
                 if (n, force) in free and (n, force) in coupled:
                     error = off(e_n(free[n, force]), e_n(coupled[n, force]))
                     taken = int(level.level != "none")
                     yield COUPLING, named(label, n, force), level.indicator, level.change, taken, error
-        yield from cost
-
-
-def timed(label: str, found: Iterator[Candidate], rows: list[Row]) -> Iterator[Candidate]:
-    """Candidates as they are chosen; afterwards, as rows, CPU time of choosing and of all that is solved [s]."""
-    while True:
-        start = time.process_time()
-        if (candidate := next(found, None)) is None:
-            return
-        choosing = time.process_time() - start
-        for _ in candidate.solve(range(len(candidate.forces))):
-            pass
-        rows.append((COST, f"{label}, place {len(rows)}", choosing, np.nan, 0, time.process_time() - start))
-        yield candidate
 
 
 def plate_rows() -> Iterator[Row]:
@@ -212,7 +197,7 @@ def wall_rows() -> Iterator[Row]:
         )
         for force in scene.load.normal_force:
             alone = at_levels(scene.with_values({"load.normal_force_n": [force]}), **(PLAIN | {"object": "auto"}))
-            for n, candidate in enumerate(timed(f"{label}, {force:g} N", candidates(alone), cost := [])):
+            for n, candidate in enumerate(candidates(alone)):
                 key, name, level = (n, force), named(label, n, force), candidate.levels["object"][0]
                 number = EFFECTS["object"].index(level.level)
                 if key in shell and key in rigid:
@@ -222,7 +207,6 @@ def wall_rows() -> Iterator[Row]:
                 if key in shell and key in linear and number > 0:
                     error = off(e_n(linear[key]), e_n(shell[key]))
                     yield SHELLS, name, candidate.indentation[1], level.change, int(number > 1), error
-            yield from cost
 
 
 def of_effect(rows: list[Row], effect: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -239,8 +223,6 @@ def summary(rows: list[Row]) -> Iterator[str]:
         yield (f"{effect}: {len(x)} cases, {np.count_nonzero(taken)} taken, {unneeded} of them without need, {wrong}"
                f" wrong skips, largest error when skipped {error[~taken].max(initial=0.0):.2%}, largest of all"
                f" {error.max(initial=0.0):.1%}")  # fmt: skip
-    choosing, _, whole = of_effect(rows, COST)
-    yield f"choosing: {choosing.sum() / max(whole.sum(), 1e-9):.1%} of the CPU time of {len(whole)} candidates"
     _, _, error = of_effect(rows, EXACT)
     yield f"{EXACT}: {len(error)} cases, largest difference from the whole {error.max(initial=0.0):.1e}"
     for level in SURFACES:
@@ -270,9 +252,10 @@ def draw(rows: list[Row]) -> bytes:
                       title=f"{effect}\n{label if limit else 'never skipped'}")  # fmt: skip
         for panel in axes[:, 0]:
             panel.set(ylabel="relative error where skipped")
-        axes[1, 2].set(ylabel="error of the quality")
-        axes[1, 3].axis("off")
-        axes[1, 3].text(0.0, 0.95, LEGEND, va="top", linespacing=1.5, transform=axes[1, 3].transAxes)
+        axes[1, 1].set(ylabel="error of the quality")
+        for panel in axes[1, 2:]:
+            panel.axis("off")
+        axes[1, 2].text(0.0, 0.95, LEGEND, va="top", linespacing=1.5, transform=axes[1, 2].transAxes)
         return pictures.as_png(drawn)
 
 
@@ -299,14 +282,14 @@ def table(file: Path, parts: list[str]) -> None:
 
 
 PARTS = {  # with the effects that each has rows of
-    "friction": (friction_rows, (COUPLING, COST)),
+    "friction": (friction_rows, (COUPLING,)),
     "plates": (plate_rows, ("sheet",)),
     "patches": (patch_rows, ("friction", "limit surface", EXACT)),
     "walls": (wall_rows, (SHELL, SHELLS)),
 }
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="What choosing effects is worth: wrong skips, unneeded effects, CPU.")
+    parser = argparse.ArgumentParser(description="What choosing effects is worth: wrong skips, unneeded effects.")
     parser.add_argument("table", type=Path, help="CSV with a row for each case; written without -o, read with it")
     parser.add_argument("-o", dest="out", type=Path, help="PNG to write")
     parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS), help="leave the other parts out")

@@ -130,6 +130,11 @@ class PressedContact(Contact):
         return [self.unit_limits[name].tau_z / self.state.force for name in MODELS]
 
     @property
+    def on_few_elements(self) -> bool:
+        """Whether so few elements are loaded that the contact's shape is theirs."""
+        return bool(np.count_nonzero(self.loaded) < FEW_ELEMENTS * self.state.pad.shape.per_side**2)
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
         shape, law = self.state.pad.shape, self.state.pad.material
@@ -138,7 +143,7 @@ class PressedContact(Contact):
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         # a single line of nodes loads the elements on both sides of it
         shared = self.state.pad.contact == "nodal"
-        few = np.count_nonzero(loaded) / k**2 < FEW_ELEMENTS or min(widths) - shared < NARROW
+        few = self.on_few_elements or min(widths) - shared < NARROW
         normals = self.patch.normal.reshape(n * k, m * k, 3)
         # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
         pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)

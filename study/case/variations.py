@@ -48,9 +48,9 @@ class Variation:
 def by_formula(scene: Scene) -> tuple[str, ...]:
     """Parts that follow at every candidate from what is solved anyway.
 
-    A mesh error is mapped where every case has two meshes. Friction that does not act back on the pressure scales with
-    mu. A pad on a rigid object and a rigid sheet is in a state that depends only on the force over its modulus, so a
-    stiffer pad is a smaller force.
+    A mesh error is mapped where every case has two meshes. Friction that nowhere acts back on the pressure scales
+    with mu. A pad on a rigid object and a rigid sheet is in a state that depends only on the force over its modulus, so
+    a stiffer pad is a smaller force.
     """
     from softjaw.study.case.effects import may_bend  # loads PETSc, and most scenes ask for no uncertainty
 
@@ -58,7 +58,7 @@ def by_formula(scene: Scene) -> tuple[str, ...]:
     alike = not wall and not may_bend(scene) and len(scene.load.normal_force) > 1
     holds = {
         "mesh": scene.accuracy.meshes > 1,
-        "mu": scene.effects.friction_pressure_coupling != "tangential",
+        "mu": scene.effects.friction_pressure_coupling == "none",
         "modulus": alike,
     }
     return tuple(part for part in scene.uncertainty.parts if holds.get(part, False))

@@ -120,8 +120,8 @@ def test_a_body_has_a_measure_in_every_position_or_in_none(name, outcome, measur
     def decide(rng):
         return type(getattr(Quartic(shaken(rng, substitute(form, E, turn(rng))), E), measure))
 
-    found = outcomes(decide, 60)
-    assert found == ({np.ndarray if measure == "semi_axes" else outcome: 60} if outcome is float else {outcome: 60})
+    expected = np.ndarray if outcome is float and measure == "semi_axes" else outcome
+    assert outcomes(decide, TURNS // 2) == {expected: TURNS // 2}
 
 
 @pytest.mark.parametrize(("smallest", "outcome"), [(0.0, "undecided"), (1e-17, "undecided"), (1e-6, 3), (-1e-6, "no")])
@@ -175,7 +175,7 @@ def test_the_flags_of_a_convex_quartic(data, gamma, outcome):
         fit = convex_quartic(*turned(rng, *data), gamma=gamma)
         return fit.flag, fit.surface.rank, fit.certificate.by
 
-    assert outcomes(decide, 100) == {outcome: 100}
+    assert outcomes(decide) == {outcome: TURNS}
 
 
 @pytest.mark.parametrize("data", [HYPERBOLOID, ENDLESS])

@@ -314,6 +314,7 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.long
 @pytest.mark.launches
 def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
     def piped():

@@ -25,6 +25,7 @@ from tests.study.view_files import make
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
 PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
+ALONE = "--set", 'effects.friction_pressure_coupling="none"'
 COMMANDS = {
     "report": ("report", "FILE", "-o", "PLACE/x.html"),
     "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
@@ -33,7 +34,7 @@ COMMANDS = {
     "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
     "init": ("init", "bottle", "-o", "PLACE/x"),
     "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
-    "cost": ("cost", SMOKE, "-o", "PLACE/x.hdf", "--time-limit", "1", "--set", "gripper.elements=[4, 2, 2]"),
+    "cost": ("cost", SMOKE, "-o", "PLACE/x.hdf", "--time-limit", "1", "--set", "gripper.elements=[4, 2, 2]", *ALONE),
     "figure": ("figure", "4c", "-o", "PLACE/x.png"),
 }
 
@@ -89,6 +90,7 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
     monkeypatch.setattr(figures, "chosen", lambda names: [drawn])  # without solving and drawing anything
     monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
     monkeypatch.setattr(measure, "calibration_seconds", lambda: 1.0)
+    monkeypatch.setattr(measure, "warm_up", lambda probe: None)
     code = main([word.replace("FILE", str(file)).replace("PLACE", str(place)) for word in COMMANDS[command]])
     refused(code, capfd.readouterr().err, place)
     assert list(file.parent.iterdir()) == [file]

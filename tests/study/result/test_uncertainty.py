@@ -40,6 +40,8 @@ angles_deg = [0, 90]
 normal_force_n = [1, 2, 4]
 [accuracy]
 meshes = 1
+[effects]
+friction_pressure_coupling = "none"
 """
 )
 ALL = ("uncertainty.mesh=true", "uncertainty.mu=0.05", "uncertainty.shear_modulus_percent=10", "uncertainty.pose_mm=1")
@@ -126,6 +128,7 @@ def test_a_mesh_error_falls_with_the_contact_area_and_a_probe_keeps_its_own():
         (("accuracy.meshes=2",), ("mesh", "mu", "modulus"), 2),
         (("effects.sheet=elastic",), ("mu",), 4),
         (("effects.friction_pressure_coupling=tangential",), ("modulus",), 4),
+        (("effects.friction_pressure_coupling=auto",), ("modulus",), 4),
         (("load.normal_force_n=[2]",), ("mu",), 4),
         (("uncertainty.pose_deg=2",), ("mu", "modulus"), 5),
         (("uncertainty.pose_deg=2", "object.semi_axis_b_mm=25"), ("mu", "modulus"), 4),  # round: both turns are alike
