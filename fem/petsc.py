@@ -298,6 +298,13 @@ class NonlinearSolver:
         self._end = self._x.array.copy()
         return self._end.copy(), done
 
+    def approach(self, x: FloatArray, tolerance: float, iterations: int) -> tuple[FloatArray, float]:
+        """As `solve`, but what the iterations have come to is returned whether it converged or not, with its norm."""
+        try:
+            return self.solve(x, tolerance, iterations)[0], self._snes.getFunctionNorm()
+        except ConvergenceError:
+            return self._x.array.copy(), self._snes.getFunctionNorm()
+
     def _stalls(self) -> bool:
         """Whether the residual has not fallen any more for some iterations, as where an active set alternates."""
         before, after = self._norms[:-STALLED], self._norms[-STALLED:]

@@ -21,6 +21,7 @@ from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 from softjaw.fem.shell import wall_interpolation
+from softjaw.fem.shell.creep import creep
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.wall_mesh import BodyMesh
@@ -29,6 +30,7 @@ LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, w
 SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
+MOST_CREEPING, SLOW = 600, 2e-5  # iterations of a wall that creeps; velocity at which it may have come to rest, see ``creep``
 LONGEST_SOLVE = 12  # Newton iterations of a step from one state to the next; good ones take 3 to 8
 MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
@@ -123,6 +125,8 @@ class Grip(LoadPath):
     def __post_init__(self) -> None:
         """Set up the solver."""
         self._wanted, self._other, self._peak = self.problem, self.fallback, 0.0
+        self._last: FloatArray | None = None  # state on the path that was found last
+        self._crept, self._in_vain = False, 0.0  # whether the wall has crept on, and the last force it crept for [N]
         super().__post_init__()
 
     def _set_up(self) -> None:
@@ -157,7 +161,7 @@ class Grip(LoadPath):
         ConvergenceError, CheckError
             At the first force without an acceptable state.
         """
-        here = None
+        here, self._last, self._crept, self._in_vain = None, None, False, 0.0
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
             here = self._next(here, force, work)
@@ -174,7 +178,7 @@ class Grip(LoadPath):
 
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""
-        self.fallback = self._other
+        self.fallback, self._last, self._crept, self._in_vain = self._other, None, False, 0.0
         self._wanted.forget()
         if self.problem is self._wanted:
             self.opening.last = 1.0, 0.0
@@ -270,7 +274,44 @@ class Grip(LoadPath):
             return self._climb(here, force, work)
         except SpentError as error:
             spent = f"given up after {MOST_ITERATIONS} Newton iterations"
-            raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
+            failed = ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}")
+            failed.__cause__ = error
+        except ConvergenceError as error:
+            failed = error
+        # a second kind of gaps would creep just as long in vain
+        if self._last is None or self._in_vain == force:
+            raise failed
+        self._in_vain = force
+        try:
+            return self._creep(here, force, work)
+        except (ConvergenceError, SpentError):
+            raise failed from None
+
+    def _creep(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
+        """State at ``force`` that the wall creeps to from the last one on the path."""
+        assert self._last is not None
+        self.solver.left, slow = MOST_CREEPING, SLOW
+        start, (_, reached) = self._last, self.opening.last
+        for ahead in creep(self.problem, self.solver, start, force):
+            if self.opening(self.problem.wall_state(ahead.x)) <= 0.0:
+                raise CheckError(
+                    f"the wall collapsed: beyond {reached:.3g} N, where its load path ends, it folds until its opposite "
+                    f"sides meet at {force:.4g} N"
+                )
+            if ahead.speed > slow:
+                continue
+            try:
+                x = self._stepping.solve(ahead.x, Control(force=force), work, self._stepping.most)
+                break
+            except ConvergenceError:
+                slow = 0.2 * ahead.speed
+        self._watch(x, force)
+        compliance, moved = self._compliance(), self.problem.closing(x) - self.problem.closing(start)
+        expected = max(JUMP, 2.0 * (here.compliance if here else 0.0) * (force - reached))
+        jumped = not 0.0 <= moved <= expected or compliance < 0.0
+        self._crept |= jumped
+        snapped = jumped or self._gives_way(x, force, compliance) or bool(here and here.snapped)
+        return _OnPath(x, force, compliance, snapped, jumped or bool(here and here.fell))
 
     def _climb(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
@@ -297,6 +338,9 @@ class Grip(LoadPath):
         """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
         # twice what the slope so far foretells; a snap goes much further
         expected = max(JUMP, 2.0 * compliance * (force - reached))
+        # a wall that has crept before will creep again: no search for what lies between its states
+        if self._crept:
+            return self._stepping.solve(x, Control(force=force), work, self._stepping.most), False
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
@@ -310,6 +354,7 @@ class Grip(LoadPath):
 
     def _watch(self, x: FloatArray, force: float) -> None:
         self.opening.watch(self.problem.wall_state(x), force)
+        self._last = x
         self._peak = max(self._peak, force)
 
     def _gives_way(self, x: FloatArray, force: float, compliance: float) -> bool:

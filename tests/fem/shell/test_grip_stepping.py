@@ -96,7 +96,7 @@ def climbing(**choices):
     """A grip that has only its way up."""
     grip = Grip.__new__(Grip)
     grip._stepping = stepping(**choices)
-    grip.problem = grip._stepping.problem
+    grip.problem, grip._crept, grip._last = grip._stepping.problem, False, None
     return grip
 
 
