@@ -1,11 +1,10 @@
 """A wall that creeps to equilibrium where Newton's method does not find the next state: pseudo-transient continuation.
 
-The middle surface is given a resistance to its velocity, ``D dv/dt + R(v) = 0`` with ``D`` the area of a node times the
+Wall and pads are given a resistance to their velocity, ``D dx/dt + R(x) = 0`` with ``D`` the area of a node times the
 pad's modulus per thickness, in implicit steps of growing or shrinking length (Kelley and Keyes, SIAM J. Numer. Anal.
-35, 1998). The pads stay in equilibrium with the wall. The energy falls along the way, so it ends in a stable state:
-the one nearby where only the active set did not settle, and where a gripper that keeps its force comes to where a
-wall snaps from one state into another. Each step takes a few Newton iterations and need not converge; what comes of
-the whole is judged by an ordinary solve.
+35, 1998). The energy falls along the way, so it ends in a stable state: the one nearby where only the active set did
+not settle, and where a gripper that keeps its force comes to where a wall snaps from one state into another. A step
+takes a few Newton iterations and need not converge; what comes of the whole is judged by an ordinary solve.
 """
 
 from __future__ import annotations
@@ -23,8 +22,9 @@ from softjaw.fem.shell.grip_problem import GripProblem
 
 FIRST, SHORTEST = 0.25, 1e-5  # step of time, in units of D over the pad's modulus per thickness and area
 MOVE, FARTHEST = 4e-4, 1.2e-3  # of a node in one step: wanted, and the most that is taken [m]
+SLOWLY = 0.25  # part of the wanted move
 ITERATIONS = 2  # of a step
-NEAR, LOOSE = 1e-3, 30.0  # residual over the force at which a step ends early, and up to which it is taken
+NEAR, LOOSE = 1e-6, 30.0  # residual over the force at which a step ends early, and up to which it is taken
 SHORTER = 0.4  # part of a step that is tried after one that was not taken
 
 
@@ -49,7 +49,7 @@ def creep(problem: GripProblem, solver: NonlinearSolver, x: FloatArray, force: f
     own, time = slice(problem.model.size), FIRST
     resistance = _resistance(problem)
     while time > SHORTEST:
-        problem.control, problem.damping = Control(force=force), (resistance / time, x[own].copy())
+        problem.control, problem.damping = Control(force=force), (resistance / time, x.copy())
         try:
             ahead, norm = solver.approach(x, NEAR * force, ITERATIONS)
         finally:
@@ -61,13 +61,20 @@ def creep(problem: GripProblem, solver: NonlinearSolver, x: FloatArray, force: f
             continue
         x = ahead
         yield Creeping(x, move / time)
-        time *= float(np.clip(MOVE / max(move, 1e-12), 0.5, 2.0))
+        # a slow wall whose step has not converged: its active set alternates, which more resistance settles
+        if move < SLOWLY * MOVE and norm > NEAR * force:
+            time *= SHORTER
+        else:
+            time *= float(np.clip(MOVE / max(move, 1e-12), 0.5, 2.0))
     raise ConvergenceError(f"the wall does not creep on at {force:.4g} N")
 
 
 def _resistance(problem: GripProblem) -> FloatArray:
-    """Of every unknown of the wall [N/m]: none of directors."""
-    found, first = np.zeros(problem.model.size), problem.model.first
+    """Of every unknown [N/m]: none of directors, closing displacements and pressures."""
+    found, first = np.zeros(problem.size), problem.model.first
     area = np.broadcast_to(problem.model.shell.node_area[:, None], first.shape)
     found[first[first >= 0]] = problem.fingers[0].kappa * area[first >= 0]
+    for f in problem.fingers:
+        # a node of the foam counts as much as one of its contact face would, were the face all there is
+        found[f.offset : f.closing_dof] = f.kappa * f.area.sum() / f.pad.closing_dof
     return found

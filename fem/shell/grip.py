@@ -36,8 +36,27 @@ MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and wit
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
 ALIKE = 0.05  # part of the force by which the ends of the load path with both kinds of gaps may differ to be the wall's
+HARDLY_SHUT = 0.01  # part of the opening: a wall that has closed by less has not jumped
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
+
+
+def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
+    """Whether a wall has jumped between two states on its load path.
+
+    A wall that bends little by little closes about in proportion to the force. A soft pad hides from the closing
+    displacement what the wall does.
+
+    Parameters
+    ----------
+    low, high : (float, float)
+        Force [N], the second one larger, and part of the opening that is gone.
+
+    >>> jumps((3.0, 0.05), (5.0, 0.11)), jumps((3.0, 0.05), (5.0, 0.3)), jumps((3.0, 1e-4), (5.0, 1e-3))
+    (False, True, False)
+    """
+    (force, shut), (more, then) = low, high
+    return then > HARDLY_SHUT and GIVES_WAY * (then - shut) / (more - force) > shut / force
 
 
 @dataclass(frozen=True)
@@ -330,6 +349,7 @@ class Grip(LoadPath):
         if force > reached:
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
             gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
+            gives_way |= jumps((reached, self._shut(x)), (force, self._shut(ahead)))
         return _OnPath(ahead, force, slope, here.snapped or fell or gives_way, here.fell or fell)
 
     def _step_to(
@@ -364,6 +384,10 @@ class Grip(LoadPath):
         when they snap in, and no force falls there.
         """
         return bool(compliance * force > self.problem.closing(x) / GIVES_WAY)
+
+    def _shut(self, x: FloatArray) -> float:
+        """How much of the wall's opening is gone."""
+        return 1.0 - self.opening(self.problem.wall_state(x))
 
     def _compliance(self) -> float:
         """Change of the closing displacement per force where the last solve has ended [m/N]."""

@@ -93,7 +93,7 @@ class GripProblem:
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.area.sum() for f in self.fingers)
         self.control = Control(closing=0.0)
-        # stiffness (model.size,) [N/m] that ties the wall to a state it comes from, see ``creep``
+        # stiffness (size,) [N/m] that ties displacements to those of a state (size,), see ``creep``
         self.damping: tuple[FloatArray, FloatArray] | None = None
         self._first_places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
         self._bare = self._built()
@@ -168,9 +168,6 @@ class GripProblem:
             return np.full(self.size, np.nan)
         self._active_set = np.concatenate([c.active for c in contacts])
         R[: self.model.size] = self.model.residual(x[: self.model.size], wall_force)
-        if self.damping is not None:
-            stiffness, before = self.damping
-            R[: self.model.size] += stiffness * (x[: self.model.size] - before)
         for f, c in zip(self.fingers, contacts, strict=True):
             own, smallest = f.foam.force(x[f.own])
             if not smallest > 0.0:
@@ -178,6 +175,9 @@ class GripProblem:
             R[f.own] = own + gather(f.local_dofs, c.force, f.pad.size)
             R[f.pressures] = f.contact_rows(x[f.pressures], c.weighted)
         self._drive(x, R)
+        if self.damping is not None:
+            stiffness, before = self.damping
+            R += stiffness * (x - before)
         return R
 
     def _drive(self, x: FloatArray, R: FloatArray) -> None:
@@ -224,8 +224,8 @@ class GripProblem:
         values[:] = 0.0
         add_up(self._wall_slots, wall, values)
         if self.damping is not None:
-            own = np.arange(self.model.size)
-            values[self.pattern.slots(own, own)] += self.damping[0]
+            own = np.flatnonzero(self.damping[0])
+            values[self.pattern.slots(own, own)] += self.damping[0][own]
         for f, slots, own, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
             add_up(slots, own, values)
             idle = np.flatnonzero(~c.active)
