@@ -74,7 +74,7 @@ class WallState:
         Force of supports and springs on the whole object [N].
     snapped : bool
         Whether the wall has snapped in before: the force fell while the fingers closed, more force would open them
-        (the stiffness of the grasp is negative), or the force hardly grew.
+        (the stiffness of the grasp is negative), the force hardly grew, or the wall closed far more than in proportion.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
     """
