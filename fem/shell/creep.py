@@ -22,7 +22,7 @@ from softjaw.fem.shell.grip_problem import GripProblem
 
 FIRST, SHORTEST = 0.25, 1e-5  # step of time, in units of D over the pad's modulus per thickness and area
 MOVE, FARTHEST = 4e-4, 1.2e-3  # of a node in one step: wanted, and the most that is taken [m]
-SLOWLY = 0.25  # part of the wanted move
+SLOWLY, ALTERNATES, STAYS = 0.25, 1e-2, 0.3  # part of the wanted move, residual over the force and over the one before
 ITERATIONS = 2  # of a step
 NEAR, LOOSE = 1e-6, 30.0  # residual over the force at which a step ends early, and up to which it is taken
 SHORTER = 0.4  # part of a step that is tried after one that was not taken
@@ -51,7 +51,7 @@ def creep(problem: GripProblem, solver: NonlinearSolver, x: FloatArray, force: f
     while time > SHORTEST:
         problem.control, problem.damping = Control(force=force), (resistance / time, x.copy())
         try:
-            ahead, norm = solver.approach(x, NEAR * force, ITERATIONS)
+            ahead, norm, fall = solver.approach(x, NEAR * force, ITERATIONS)
         finally:
             problem.damping = None
         move = float(np.abs((ahead - x)[own]).max())
@@ -61,8 +61,8 @@ def creep(problem: GripProblem, solver: NonlinearSolver, x: FloatArray, force: f
             continue
         x = ahead
         yield Creeping(x, move / time)
-        # a slow wall whose step has not converged: its active set alternates, which more resistance settles
-        if move < SLOWLY * MOVE and norm > NEAR * force:
+        # little moves, little is out of balance, but it stays so: the active set alternates, which resistance settles
+        if move < SLOWLY * MOVE and NEAR < norm / force < ALTERNATES and fall > STAYS:
             time *= SHORTER
         else:
             time *= float(np.clip(MOVE / max(move, 1e-12), 0.5, 2.0))
