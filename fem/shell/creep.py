@@ -22,7 +22,7 @@ from softjaw.fem.shell.grip_problem import GripProblem
 
 FIRST, SHORTEST = 0.25, 1e-5  # step of time, in units of D over the pad's modulus per thickness and area
 MOVE, FARTHEST = 4e-4, 1.2e-3  # of a node in one step: wanted, and the most that is taken [m]
-SLOWLY, ALTERNATES, STAYS = 0.25, 1e-2, 0.3  # part of the wanted move, residual over the force and over the one before
+SLOWLY, ALTERNATES, STAYS = 0.25, 1e-2, 0.05  # part of the wanted move, residual over the force and over the one before
 ITERATIONS = 2  # of a step
 NEAR, LOOSE = 1e-6, 30.0  # residual over the force at which a step ends early, and up to which it is taken
 SHORTER = 0.4  # part of a step that is tried after one that was not taken

@@ -30,7 +30,8 @@ LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, w
 SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
-MOST_CREEPING, SLOW = 600, 2e-5  # iterations of a wall that creeps; velocity at which it may have come to rest, see ``creep``
+MOST_CREEPING = 600  # iterations of a wall that creeps for one force
+SLOW = 2e-5  # velocity at which it may have come to rest, see ``creep``
 LONGEST_SOLVE = 12  # Newton iterations of a step from one state to the next; good ones take 3 to 8
 MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
@@ -314,8 +315,8 @@ class Grip(LoadPath):
         for ahead in creep(self.problem, self.solver, start, force):
             if self.opening(self.problem.wall_state(ahead.x)) <= 0.0:
                 raise CheckError(
-                    f"the wall collapsed: beyond {reached:.3g} N, where its load path ends, it folds until its opposite "
-                    f"sides meet at {force:.4g} N"
+                    f"the wall collapsed: beyond {reached:.3g} N, where its load path ends, it folds until its "
+                    f"opposite sides meet at {force:.4g} N"
                 )
             if ahead.speed > slow:
                 continue
