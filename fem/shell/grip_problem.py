@@ -224,8 +224,8 @@ class GripProblem:
         values[:] = 0.0
         add_up(self._wall_slots, wall, values)
         if self.damping is not None:
-            own = np.flatnonzero(self.damping[0])
-            values[self.pattern.slots(own, own)] += self.damping[0][own]
+            tied = np.flatnonzero(self.damping[0])
+            values[self.pattern.slots(tied, tied)] += self.damping[0][tied]
         for f, slots, own, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
             add_up(slots, own, values)
             idle = np.flatnonzero(~c.active)
