@@ -298,6 +298,21 @@ class NonlinearSolver:
         self._end = self._x.array.copy()
         return self._end.copy(), done
 
+    def approach(self, x: FloatArray, tolerance: float, iterations: int) -> tuple[FloatArray, float, float]:
+        """As `solve`, but what the iterations have come to is returned whether it converged or not.
+
+        Returns
+        -------
+        x, norm, fall
+            The iterate, the norm of the residual there, and what part it is of that one iteration before.
+        """
+        try:
+            x, _ = self.solve(x, tolerance, iterations)
+        except ConvergenceError:
+            x = self._x.array.copy()
+        norm = self._snes.getFunctionNorm()
+        return x, norm, norm / self._norms[-1] if self._norms else 0.0
+
     def _stalls(self) -> bool:
         """Whether the residual has not fallen any more for some iterations, as where an active set alternates."""
         before, after = self._norms[:-STALLED], self._norms[-STALLED:]

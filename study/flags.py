@@ -50,8 +50,8 @@ class Flag(IntFlag):
         " ratio above 0.45, or two meshes put the error of e_n above accuracy.e_n, where the scene names it"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
-        "the force fell while the fingers closed, more force would open them, or it grew less than half as fast"
-        " as before on average"
+        "the force fell while the fingers closed, more force would open them, it grew less than half as fast as"
+        " before on average, or the wall closed more than twice as fast as before between two forces"
     )  # fmt: skip
     SLIDES_OUT = 1 << 14, "slides out", (
         "the pads push the object along its axis with more than friction can hold, so it slides out"

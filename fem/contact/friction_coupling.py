@@ -25,9 +25,9 @@ FloatArray = NDArray[np.float64]
 # Stiffness of stick in units of E / thickness: three times as much moves e_n by up to 0.05 % and takes a third more
 # Newton iterations.
 STICK = 30.0
-# Of the force from step to step, and of the first force at the first step: steps of 1.25 from 0.01 move e_n by up to
-# 0.3 %. Growth by 3 moves it by 1 %, a start at 0.1 by 0.3 %, both at the lowest force.
-GROWTH, START = 2.0, 0.02
+# Of the force from step to step, and of the first force at the first step: steps of 1.2 from 0.01 move e_n by up to
+# 0.5 %, in a waist by 1 %. Growth by 2 moves it by up to 2 % there, a start at 0.1 by 0.3 %.
+GROWTH, START = 1.5, 0.02
 BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
 MOST_DAMPED = 0.125  # of a step of Newton's method
 

@@ -21,6 +21,7 @@ from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.petsc import NonlinearSolver, Seconds
 from softjaw.fem.shell import wall_interpolation
+from softjaw.fem.shell.creep import creep
 from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.wall_mesh import BodyMesh
@@ -29,14 +30,35 @@ LONGEST_STEP = 5e-4  # of the closing displacement under displacement control, w
 SHORTEST_STEP = 1.0 / 16.0  # of that: where less is needed, the wall itself snaps from one state to another
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 BALANCE = 1e-6  # of the normal force
+MOST_CREEPING = 600  # iterations of a wall that creeps for one force
+SLOW = 2e-5  # velocity at which it may have come to rest, see ``creep``
 # Newton iterations of a step from one state to the next: good ones take 3 to 8, with friction 4 to 14.
 LONGEST_SOLVE, WITH_FRICTION = 12, 24
 MOST_ITERATIONS = 200  # of Newton's method for one force, with weighted and with nodal gaps each; usual ones take 6
 FOLDED = 0.75  # opening below which a wall without a further state counts as collapsed at once,
 INDENTED = 0.95  # and after nodal gaps have found none either
 ALIKE = 0.05  # part of the force by which the ends of the load path with both kinds of gaps may differ to be the wall's
+HARDLY_SHUT = 0.01  # part of the opening: a wall that has closed by less has not jumped
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
+
+
+def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
+    """Whether a wall has jumped between two states on its load path.
+
+    A wall that bends little by little closes about in proportion to the force. A soft pad hides from the closing
+    displacement what the wall does.
+
+    Parameters
+    ----------
+    low, high : (float, float)
+        Force [N], the second one larger, and part of the opening that is gone.
+
+    >>> jumps((3.0, 0.05), (5.0, 0.11)), jumps((3.0, 0.05), (5.0, 0.3)), jumps((3.0, 1e-4), (5.0, 1e-3))
+    (False, True, False)
+    """
+    (force, shut), (more, then) = low, high
+    return then > HARDLY_SHUT and GIVES_WAY * (then - shut) / (more - force) > shut / force
 
 
 @dataclass(frozen=True)
@@ -54,7 +76,7 @@ class WallState:
         Force of supports and springs on the whole object [N].
     snapped : bool
         Whether the wall has snapped in before: the force fell while the fingers closed, more force would open them
-        (the stiffness of the grasp is negative), or the force hardly grew.
+        (the stiffness of the grasp is negative), the force hardly grew, or the wall closed far more than in proportion.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
     """
@@ -134,6 +156,8 @@ class Grip(LoadPath):
     def __post_init__(self) -> None:
         """Set up the solver."""
         self._wanted, self._other, self._peak = self.problem, self.fallback, 0.0
+        self._last: FloatArray | None = None  # state on the path that was found last
+        self._crept, self._in_vain = False, 0.0  # whether the wall has crept on, and the last force it crept for [N]
         super().__post_init__()
 
     def _set_up(self) -> None:
@@ -169,7 +193,7 @@ class Grip(LoadPath):
         ConvergenceError, CheckError
             At the first force without an acceptable state.
         """
-        here = None
+        here, self._last, self._crept, self._in_vain = None, None, False, 0.0
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
             here = self._next(here, force, work)
@@ -186,7 +210,7 @@ class Grip(LoadPath):
 
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""
-        self.fallback = self._other
+        self.fallback, self._last, self._crept, self._in_vain = self._other, None, False, 0.0
         self._wanted.forget()
         if self.problem is self._wanted:
             self.opening.last = 1.0, 0.0
@@ -293,7 +317,44 @@ class Grip(LoadPath):
             return here
         except SpentError as error:
             spent = f"given up after {MOST_ITERATIONS} Newton iterations"
-            raise ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}") from error
+            failed = ConvergenceError(f"stuck at {self.opening.last[1]:.4g} N of {force:.4g} N: {spent}")
+            failed.__cause__ = error
+        except ConvergenceError as error:
+            failed = error
+        # a second kind of gaps would creep just as long in vain, and friction depends on a way that creeping is not
+        if self._last is None or self._in_vain == force or self.problem.memory is not None:
+            raise failed
+        self._in_vain = force
+        try:
+            return self._creep(here, force, work)
+        except (ConvergenceError, SpentError):
+            raise failed from None
+
+    def _creep(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
+        """State at ``force`` that the wall creeps to from the last one on the path."""
+        assert self._last is not None
+        self.solver.left, slow = MOST_CREEPING, SLOW
+        start, (_, reached) = self._last, self.opening.last
+        for ahead in creep(self.problem, self.solver, start, force):
+            if self.opening(self.problem.wall_state(ahead.x)) <= 0.0:
+                raise CheckError(
+                    f"the wall collapsed: beyond {reached:.3g} N, where its load path ends, it folds until its "
+                    f"opposite sides meet at {force:.4g} N"
+                )
+            if ahead.speed > slow:
+                continue
+            try:
+                x = self._stepping.solve(ahead.x, Control(force=force), work, self._stepping.most)
+                break
+            except ConvergenceError:
+                slow = 0.2 * ahead.speed
+        self._watch(x, force)
+        compliance, moved = self._compliance(), self.problem.closing(x) - self.problem.closing(start)
+        expected = max(JUMP, 2.0 * (here.compliance if here else 0.0) * (force - reached))
+        jumped = not 0.0 <= moved <= expected or compliance < 0.0
+        self._crept |= jumped
+        snapped = jumped or self._gives_way(x, force, compliance) or bool(here and here.snapped)
+        return _OnPath(x, force, compliance, snapped, jumped or bool(here and here.fell))
 
     def _climb(self, here: _OnPath | None, force: float, work: Work) -> _OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
@@ -314,6 +375,7 @@ class Grip(LoadPath):
         if force > reached:
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
             gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
+            gives_way |= jumps((reached, self._shut(x)), (force, self._shut(ahead)))
         return _OnPath(ahead, force, slope, here.snapped or fell or gives_way, here.fell or fell)
 
     def _step_to(
@@ -322,6 +384,9 @@ class Grip(LoadPath):
         """State at ``force``, and whether a limit was passed between it and the one at ``reached`` [N]."""
         # twice what the slope so far foretells; a snap goes much further
         expected = max(JUMP, 2.0 * compliance * (force - reached))
+        # a wall that has crept before will creep again: no search for what lies between its states
+        if self._crept:
+            return self._stepping.solve(x, Control(force=force), work, self._stepping.most), False
         before = self.problem.memory
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
@@ -338,6 +403,7 @@ class Grip(LoadPath):
     def _watch(self, x: FloatArray, force: float) -> None:
         self.problem.accept(x)
         self.opening.watch(self.problem.wall_state(x), force)
+        self._last = x
         self._peak = max(self._peak, force)
 
     def _gives_way(self, x: FloatArray, force: float, compliance: float) -> bool:
@@ -347,6 +413,10 @@ class Grip(LoadPath):
         when they snap in, and no force falls there.
         """
         return bool(compliance * force > self.problem.closing(x) / GIVES_WAY)
+
+    def _shut(self, x: FloatArray) -> float:
+        """How much of the wall's opening is gone."""
+        return 1.0 - self.opening(self.problem.wall_state(x))
 
     def _compliance(self) -> float:
         """Change of the closing displacement per force where the last solve has ended [m/N]."""

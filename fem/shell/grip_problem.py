@@ -95,6 +95,8 @@ class GripProblem:
             self.size += pad.size
         self.stiffness = sum(f.kappa * f.area.sum() for f in self.fingers)
         self.control = Control(closing=0.0)
+        # stiffness (size,) [N/m] that ties displacements to those of a state (size,), see ``creep``
+        self.damping: tuple[FloatArray, FloatArray] | None = None
         self._first_places = [f.wall.places(f.object_points(np.zeros(self.size))) for f in self.fingers]
         self._bare = self._built()
         self._values = [np.zeros(len(f.foam.rows)) for f in self.fingers]
@@ -175,6 +177,9 @@ class GripProblem:
             R[f.own] = own + gather(f.local_dofs, c.force, f.pad.size)
             R[f.pressures] = f.contact_rows(x[f.pressures], c.weighted)
         self._drive(x, R)
+        if self.damping is not None:
+            stiffness, before = self.damping
+            R += stiffness * (x - before)
         return R
 
     def _drive(self, x: FloatArray, R: FloatArray) -> None:
@@ -194,7 +199,7 @@ class GripProblem:
         """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
         q = x[: self.model.size].copy()
         wall = self.model.tangent(q, self._before)
-        self._before, self._by_force = q, self.control.force is not None
+        self._before, self._by_force, self._damped = q, self.control.force is not None, self.damping
         contacts = self._contact(x, self._no_force())
         self._tangent_set = np.concatenate([c.active for c in contacts])
         for f, values in zip(self.fingers, self._values, strict=True):
@@ -208,7 +213,7 @@ class GripProblem:
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """Whether the last tangent may serve once more, as in ``fem.contact.problem``."""
-        same_control = self._by_force == (self.control.force is not None)
+        same_control = self._by_force == (self.control.force is not None) and self._damped is self.damping
         if not same_control or not np.array_equal(self._active_set, self._tangent_set):
             return False
         if first:
@@ -220,6 +225,9 @@ class GripProblem:
         values = self.pattern.values
         values[:] = 0.0
         add_up(self._wall_slots, wall, values)
+        if self.damping is not None:
+            tied = np.flatnonzero(self.damping[0])
+            values[self.pattern.slots(tied, tied)] += self.damping[0][tied]
         for f, slots, own, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
             add_up(slots, own, values)
             idle = np.flatnonzero(~c.active)

@@ -214,6 +214,8 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
         assert wall.wall_flags(scene, state, place | values) == Flag.SLIDES_OUT
         values = {"maps/support_force": 0.0, "maps/wall_stress": 4e7, "maps/indentation": moved([6e-3], seed)[0]}
         assert wall.wall_flags(scene, state, place | values) == Flag.DENTED
+        values = {"maps/opening": 0.04, "maps/indentation": 17e-3, "maps/support_force": 0.0, "maps/wall_stress": 4e7}
+        assert wall.wall_flags(scene, state, values) == Flag.DENTED
 
 
 # --- look-ups and probes ----------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class ShellProblem:
         Outer forces at factor 1 [N]; they keep their direction.
     mixed : bool
         Whether the tangent is that of mixed integration points.
+    tie : optional
+        What else holds the shell: ``index (m, n)`` of the numbers, ``force`` and ``tangents`` of a state.
     """
 
     complementarity, non_negative = False, slice(0)
@@ -45,12 +48,18 @@ class ShellProblem:
         load: FloatArray | None = None,
         *,
         mixed: bool = True,
+        tie: Any = None,
     ) -> None:
-        self.shell, self.mixed = shell, mixed
+        self.shell, self.mixed, self.tie = shell, mixed, tie
         self.load = np.zeros(shell.size) if load is None else load
         unknown, self.free = free_numbers(fixed)
         self.size = len(self.free)
-        self._set_pattern(*shell.entries(unknown))
+        rows, columns = shell.entries(unknown)
+        if tie is not None:
+            own, n = unknown[tie.index], tie.index.shape[1]
+            rows = np.concatenate([rows, np.repeat(own[:, :, None], n, 2).ravel()])
+            columns = np.concatenate([columns, np.repeat(own[:, None, :], n, 1).ravel()])
+        self._set_pattern(rows, columns)
         self.stiffness = float(np.abs(shell.tangent(np.zeros(shell.size))).mean())
         self.factor = 0.0
         self.forget()
@@ -71,7 +80,9 @@ class ShellProblem:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `fem.petsc.Problem`."""
-        return (self.shell.residual(self.state(x)) - self.factor * self.load)[self.free]
+        q = self.state(x)
+        inner = self.shell.residual(q) + (0.0 if self.tie is None else self.tie.force(q))
+        return (inner - self.factor * self.load)[self.free]
 
     def tangent(self, x: FloatArray) -> None:
         """See `fem.petsc.Problem`."""
@@ -83,7 +94,7 @@ class ShellProblem:
         q = self.state(x)
         values = self.shell.tangent(q, self._before)
         self._before = q if self.mixed else None
-        return values
+        return values if self.tie is None else np.concatenate([values, self.tie.tangents(q).ravel()])
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Full steps."""

@@ -17,12 +17,13 @@ UX, UY, UZ = np.eye(6)[:3]  # a force on a node
 
 @dataclass
 class Case:
-    """``probes`` are (name, node, component, sign)."""
+    """``probes`` are (name, node, component, sign); ``tie`` holds some numbers to each other."""
 
     shell: Shell
     fixed: np.ndarray
     load: np.ndarray
     probes: list = field(default_factory=list)
+    tie: RimTie | None = None
 
     def read(self, q):
         return [sign * q.reshape(-1, 6)[node, component] for node, component, sign in self.probes]
@@ -158,16 +159,76 @@ def pinched_half_cylinder(n=40):
     return c
 
 
-def crushed_cylinder(n=40):
-    """Eighth of a cylinder with rigid diaphragms, far into its collapse."""
+def crushed_cylinder(n=40, rotation=0.5):
+    """Eighth of a cylinder on rigid diaphragms, far into its collapse.
+
+    A diaphragm holds what lies in its plane and lets the rim warp along the axis. ``rotation`` says what it does to the
+    directors there: None holds their components in its plane, which lets them tilt by small angles only; 1 leaves them
+    free, at right angles to the rim; 0.5 holds the component along the axis of the rotation vector of the whole motion,
+    as programs with rotations do. The rim's own tangent turns by its warp, so a director that is turned without any
+    rotation about the axis follows half of that, to the second order of both.
+    """
     c, k = cylinder(100.0, 100.0, 1.0, (0, np.pi / 2), 30e3, 0.3, n)
     symmetric(c.fixed, k[0], 0)
     symmetric(c.fixed, k[-1], 2)
     symmetric(c.fixed, k[:, 0], 1)
-    c.fixed[np.ix_(k[:, -1], [0, 2, 3, 5])] = True
+    rim = k[:, -1]
+    c.fixed[np.ix_(rim, [0, 2])] = True
+    if rotation is None:
+        c.fixed[np.ix_(rim, [3, 5])] = True
+    elif rotation < 1:
+        t = np.linspace(0, np.pi / 2, n + 1)[1:-1]
+        tangent = np.stack([np.cos(t), 0 * t, -np.sin(t)], -1)
+        c.tie = RimTie(c.shell, rim, tangent, rotation, 100.0 * np.pi / n)
     c.load[k[0, 0]] = -12000 / 4 * UZ
     c.probes = [(k[0, 0], 2, -1), (k[-1, 0], 0, 1)]
     return c
+
+
+class RimTie:
+    """Stiff ties ``d . (t + share * u_y' e_y) = 0`` between a rim's directors ``d`` and its undeformed tangents ``t``.
+
+    Parameters
+    ----------
+    shell : Shell
+    rim : (k,) array
+        Nodes along the rim; its ends are held by symmetry.
+    tangent : (k - 2, 3) array
+    share : float
+        Part of the tangent's turn by the axial warp ``u_y`` that the director follows.
+    apart : float
+        Distance of a node's two neighbours along the rim.
+    """
+
+    def __init__(self, shell, rim, tangent, share, apart):
+        self.shell, self.tangent, self.share, self.apart = shell, tangent, share, apart
+        self.stiffness = 1e3 * shell.young_modulus
+        inner = rim[1:-1]
+        self.inner = inner
+        self.index = np.stack([6 * inner + 3, 6 * inner + 4, 6 * inner + 5, 6 * rim[2:] + 1, 6 * rim[:-2] + 1], -1)
+
+    def _parts(self, q):
+        """Value and gradient of every tie."""
+        d = self.shell.mesh.D[self.inner] + q.reshape(-1, 6)[self.inner, 3:]
+        warp = self.share * (q[self.index[:, 3]] - q[self.index[:, 4]]) / self.apart
+        lean = self.share * d[:, 1] / self.apart
+        gradient = np.stack([self.tangent[:, 0], warp, self.tangent[:, 2], lean, -lean], -1)
+        return (d * self.tangent).sum(-1) + warp * d[:, 1], gradient
+
+    def force(self, q):
+        """Forces ``(6 k,)``."""
+        value, gradient = self._parts(q)
+        out = np.zeros(self.shell.size)
+        np.add.at(out, self.index, self.stiffness * value[:, None] * gradient)
+        return out
+
+    def tangents(self, q):
+        """Tangent of every tie ``(ties, 5, 5)``."""
+        value, gradient = self._parts(q)
+        bend = np.zeros((5, 5))
+        bend[1, 3:] = bend[3:, 1] = self.share / self.apart * np.array([1.0, -1.0])
+        outer = gradient[:, :, None] * gradient[:, None, :]
+        return self.stiffness * (outer + value[:, None, None] * bend)
 
 
 def linear_hemisphere(n):

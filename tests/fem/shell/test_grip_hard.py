@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.extract import extract, turned
+from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.fem.shell.grip import _OnPath
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
@@ -59,6 +61,19 @@ def test_a_wall_that_gives_way_is_flagged_and_stays_flagged():
     assert found == [False, True, True]
     stiff = grip(thin(1e-3), elements=(6, 4, 2), mesh=ROUGH).load_path([0.5, 5.0])
     assert not any(s.wall.snapped for s in stiff)
+
+
+def test_a_wall_creeps_to_the_state_that_its_load_path_leads_to():
+    held = grip(thin(), elements=(4, 2, 2), mesh=ROUGH)
+    path = held.load_path([1.0, 1.5])
+    next(path)
+    start = held._last
+    expected = next(path).fingers[0].closing
+    held._last, held.opening.last = start, (1.0, 1.0)
+    here = _OnPath(start, 1.0, held.problem.closing(start), False, False)
+    found = held._creep(here, 1.5, Work())
+    assert held.problem.closing(found.x) == pytest.approx(expected, rel=1e-6)
+    assert not found.fell
 
 
 @pytest.mark.long

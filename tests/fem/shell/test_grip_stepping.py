@@ -96,7 +96,7 @@ def climbing(**choices):
     """A grip that has only its way up."""
     grip = Grip.__new__(Grip)
     grip._stepping = stepping(**choices)
-    grip.problem = grip._stepping.problem
+    grip.problem, grip._crept, grip._last, grip._shut = grip._stepping.problem, False, None, lambda x: 0.0
     return grip
 
 
@@ -147,6 +147,15 @@ def test_a_state_at_which_more_force_would_open_the_fingers_is_beyond_a_limit(sl
     grip._compliance = lambda: slope
     found = grip._climb(_OnPath(start, 1.0, 0.2 * MM, False, False), 2.2, Work())
     assert (found.fell, found.snapped) == (beyond, beyond)
+
+
+@pytest.mark.parametrize(("shut", "snaps"), [(0.25, False), (0.35, True)])
+def test_a_wall_that_closes_far_more_than_in_proportion_has_snapped(shut, snaps):
+    """In proportion to the force 0.1 at 1 N becomes 0.22 at 2.2 N; twice that growth is 0.34."""
+    grip, start = climbing(), np.array([crossings(1.0)[0] * MM])
+    grip._compliance, grip._shut = (lambda: 1e-9), (lambda x: 0.1 if x is start else shut)
+    found = grip._climb(_OnPath(start, 1.0, 0.2 * MM, False, False), 2.2, Work())
+    assert found.snapped == snaps
 
 
 @pytest.mark.parametrize(("ends", "code"), [((3.74, 3.72), CheckError), ((3.74, 2.9), ConvergenceError)])

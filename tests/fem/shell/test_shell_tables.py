@@ -24,7 +24,7 @@ LINEAR = {
 
 
 def problem(case, **options):
-    return ShellProblem(case.shell, case.fixed.ravel(), case.load.ravel(), **options)
+    return ShellProblem(case.shell, case.fixed.ravel(), case.load.ravel(), tie=case.tie, **options)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,6 @@ def test_linear_course(name, n):
     [
         ("pulled_cylinder", [1.0], [2.768, 4.551, 3.269], 0.01),
         ("pinched_half_cylinder", np.linspace(0.05, 1, 20), [171.505], 0.01),
-        ("crushed_cylinder", np.linspace(0.05, 1, 20), [83.10, 34.27], 0.06),  # wrinkles, which depend on the mesh
     ],
 )
 def test_other_problems_at_full_load(name, levels, expected, tolerance):
@@ -108,14 +107,30 @@ def test_other_problems_at_full_load(name, levels, expected, tolerance):
     assert case.read(last.q) == pytest.approx(expected, rel=tolerance)
 
 
+COLLAPSE = [0.025, 0.05, 0.075, 0.1, 0.125, 0.15, *np.linspace(0.2, 1.0, 9)]
+
+
 @pytest.mark.long
-def test_a_crushed_cylinder_nears_the_published_end_load_with_the_mesh():
-    """Its wrinkles need fine meshes: 4.4, 4.1 and 3.5 % below with 40, 64 and 96 elements a side (9, 30, 94 s CPU)."""
-    errors = []
-    for n in (40, 64):
-        case = shell_problems.crushed_cylinder(n)
-        *_, last = load_steps(problem(case), [0.025, 0.05, 0.075, 0.1, 0.125, 0.15, *np.linspace(0.2, 1.0, 9)])
-        errors.append(1.0 - np.array(case.read(last.q)) / [83.10, 34.27])
-    assert (errors[1] > 0).all()
-    assert (errors[1] < errors[0]).all()
-    assert (errors[1] < 0.05).all()
+@pytest.mark.parametrize(
+    ("rotation", "low", "high"),
+    [(0.5, -0.015, 0.015), (1.0, 0.01, 0.05), (None, -0.06, -0.04)],
+    ids=["no rotation about the axis", "free", "no tilt"],
+)
+def test_a_crushed_cylinder_depends_on_what_its_diaphragms_do_to_rotations(rotation, low, high):
+    """Published end: 83.10 and 34.27. What a diaphragm does to directors matters more than the mesh does."""
+    case = shell_problems.crushed_cylinder(40, rotation)
+    *_, last = load_steps(problem(case), COLLAPSE)
+    off = np.array(case.read(last.q)) / [83.10, 34.27] - 1.0
+    assert (off >= low).all()
+    assert (off <= high).all()
+
+
+def test_ties_of_a_rim_have_the_force_and_tangent_of_one_energy():
+    case = shell_problems.crushed_cylinder(4)
+    tie, random = case.tie, np.random.default_rng(0)
+    q, step = 0.1 * random.normal(size=(2, case.shell.size))
+    h = 1e-6
+    change = (tie.force(q + h * step) - tie.force(q - h * step)) / (2 * h)
+    expected = np.zeros(case.shell.size)
+    np.add.at(expected, tie.index, np.einsum("mij,mj->mi", tie.tangents(q), step[tie.index]))
+    assert change == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
