@@ -31,7 +31,7 @@ WEIGHT_POWER = 1.6  # time of a contact solve over its unknowns
 # Time over that of the level which is taken for granted, about; more than the unknowns say.
 DEARER = {
     "gripper.element": {"hex27": 1.25}, "effects.sheet": {"elastic": 1.3},
-    "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 6.0},
+    "effects.object": {"linear_shell": 0.75}, "effects.friction_pressure_coupling": {"tangential": 4.0},
 }  # fmt: skip
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 4000)
 SURFACES = {  # name -> model and objective of ``[limit_surface]``

@@ -27,7 +27,7 @@ START = 0.3  # seconds until a rank has loaded what it solves with
 FIRST = 2.0  # times as long the first force takes, which begins with a coarse step
 REGION = 0.7  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
-COUPLED = {"none": 1.0, "auto": 3.0, "tangential": 5.0}
+COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
 
 

@@ -12,7 +12,7 @@ from softjaw.study.scene import load_scene, parse_scene
 from tests.study.launching import ROOT
 
 # CPU seconds of all load paths as they were measured on one core, compiled code there and loaded.
-MEASURED = {"smoke": 1.16, "box-poses": 3.8, "flask-mesh": 102.0, "bottle-rigid": 135.0}
+MEASURED = {"smoke": 1.24, "box-poses": 3.4, "flask-mesh": 57.0, "bottle-rigid": 86.0}
 SCENE = """
 [object]
 shape = "elliptic_cylinder"

@@ -36,6 +36,7 @@ WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall
         "accuracy.wall_along_mm=8", "accuracy.wall_coarse_mm=16", "load.normal_force_n=[1, 2, 3]",
         "gripper.elements=[6, 4, 2]")  # fmt: skip
 BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
+ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 
 
 def unit_of(*overrides):
@@ -56,7 +57,7 @@ def bits(result):
     return values, {k: v.tobytes() for k, v in result.patch.items()}, result.message, result.effects
 
 
-@BOTH
+@pytest.mark.parametrize("overrides", [(), ROUGH, WALL], ids=["rigid", "friction", "wall"])
 def test_a_force_has_the_same_bits_whichever_others_are_asked_for(overrides):
     assert list(whole(overrides)) == [0, 1, 2]
     for wanted in ([2], [1], (2, 0)) if not overrides else ([2], [1]):
