@@ -137,3 +137,11 @@ def test_one_case_in_memory_is_refined_too():
     case = press(scene, candidate=0, force=1.0)
     assert case.value("pad_elements") == 216
     assert case.errors["e_n"] / case.e_n == pytest.approx(case.value("e_n_error"))
+
+
+def test_a_fourth_mesh_follows_where_the_third_leaves_e_n_above_the_target():
+    three, four = (cases(f"accuracy.meshes={n}", "accuracy.e_n=1e-3", wanted=[0])[0].values for n in (3, 4))
+    assert three["maps/e_n_error"] > 1e-3
+    assert (three["maps/pad_elements"], four["maps/pad_elements"]) == (12 * 6 * 3, 16 * 8 * 4)
+    difference = abs(four["maps/e_n"][0] - three["maps/e_n"][0]) / four["maps/e_n"][0]
+    assert difference <= four["maps/e_n_error"] * (1 + 1e-9)
