@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.contact.checks import refuse_fall
-from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, load_steps
+from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, Damping, load_steps
 from softjaw.fem.contact.load_stepping import falls
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
@@ -397,8 +397,9 @@ def test_a_point_is_closed_where_it_bears_something(seed):
     problem = object.__new__(CoupledProblem)
     problem._contact, problem.size = (lambda x, tangent: None), 0
     problem._traction = lambda x: (np.zeros((2, 3, 3)),)
+    problem._path, problem._damping = [np.zeros(0)], Damping(slice(0))
     problem._points, problem._pressure = np.zeros((2, 3, 3)), lambda x: np.maximum(moved(pressure, seed), 0.0)
-    problem.accept(None)
+    problem.accept(np.zeros(0))
     assert problem._closed.tolist() == [[True] * 3, [False] * 3]
 
 

@@ -27,7 +27,13 @@ def crossings(F):
 class Curve:
     """One unknown, the closing displacement."""
 
-    control = Control(closing=0.0)
+    control, memory = Control(closing=0.0), None
+
+    def begin(self):
+        """Nothing has touched yet."""
+
+    def accept(self, x):
+        """Without friction the path does not matter."""
 
     def normal_force(self, x):
         return float(force(x[0] / MM))
