@@ -83,3 +83,16 @@ def e_n(finger):
     patch = extract(finger.pad, finger)
     local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
     return friction_limits(local, 1.0, "pcm").e_n
+
+
+def stirred(problem: GripProblem, rng: np.random.Generator) -> np.ndarray:
+    """Unknowns of pads that are pressed 1.5 mm into the wall, all of them moved at random."""
+    x = np.zeros(problem.size)
+    x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
+    for f in problem.fingers:
+        own, pad = x[f.own], f.pad
+        u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
+        own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
+        own[pad.closing_dof] = 1.5e-3
+        own[pad.closing_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
+    return x

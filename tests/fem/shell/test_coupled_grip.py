@@ -12,7 +12,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import wall_material
-from tests.fem.grips import _gap, e_n, grip, pose, thin
+from tests.fem.grips import _gap, e_n, grip, pose, stirred, thin
 
 MU = 0.4
 
@@ -34,14 +34,7 @@ def test_tangent_by_finite_differences(allowed, level, control):
     """From a state with a history: some points stick, some slip, some are open."""
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level, mu=0.2).problem
     rng = np.random.default_rng(1)
-    x = np.zeros(problem.size)
-    x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
-    for f in problem.fingers:
-        own, pad = x[f.own], f.pad
-        u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
-        own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
-        own[pad.closing_dof] = 1.5e-3
-        own[pad.closing_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
+    x = stirred(problem, rng)
     problem.accept(x)
     for size in (3e-6, 1e-6):
         x = x + size * rng.normal(size=problem.size) * np.isin(np.arange(problem.size), problem._damping.moved)

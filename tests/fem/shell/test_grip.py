@@ -12,7 +12,7 @@ from softjaw.fem.contact.problem import Control
 from softjaw.fem.shell.grip import _OnPath
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial
-from tests.fem.grips import _gap, e_n, grip, pose, thin
+from tests.fem.grips import _gap, e_n, grip, pose, stirred, thin
 
 FORCES = (0.5, 2.0)
 FINE = WallMesh(0.00085, 0.0025, 0.005)
@@ -37,14 +37,7 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
 def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem
     rng = np.random.default_rng(1)
-    x = np.zeros(problem.size)
-    x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
-    for f in problem.fingers:
-        own, pad = x[f.own], f.pad
-        u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
-        own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
-        own[pad.closing_dof] = 1.5e-3
-        own[pad.closing_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
+    x = stirred(problem, rng)
     problem.control = control
     problem.tangent(x)
     pattern = problem.pattern
