@@ -264,6 +264,7 @@ class Candidate:
         if level.reason == effects.FORCED or level.level != level_named(COUPLING, "tangential"):
             return self._solved(self.solver, k)
         try:
+            self._refuse_lost(k)
             return self._solved(self.coupled, k)
         except (ConvergenceError, CheckError) as error:
             without = level_named(COUPLING, "none")
@@ -271,6 +272,14 @@ class Candidate:
             found = self._solved(self.solver, k)
             note = "; ".join(text for text in (LEFT_OUT.format(reason=error), found.note) if text)
             return replace(found, note=note)
+
+    def _refuse_lost(self, k: int) -> None:
+        """Refuse friction on a wall whose coarse load path with it has ended: the fine one takes long to end, too."""
+        coarse = self.coupled.coarse
+        if isinstance(self.coupled, OnRigid) or coarse is None:
+            return
+        if lacking := [path.ended for path in coarse.followed(self.forces) if path.state(k) is None]:
+            raise ConvergenceError(f"on the coarse mesh {lacking[0]}")
 
     def effects_at(self, k: int, contacts: Sequence[PressedContact]) -> dict[str, Level]:
         """Levels of the effects that are chosen at the ``k``-th force, whose contacts are solved."""

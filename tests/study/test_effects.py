@@ -15,8 +15,9 @@ from softjaw.study.case import choosing, effects, model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.case.choosing import Candidate
-from softjaw.study.case.effects import ROWS, neglected_traction
+from softjaw.study.case.effects import ROWS, Level, neglected_traction
 from softjaw.study.case.result import CaseFailure
+from softjaw.study.case.solving import Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import EFFECTS, REASONS
 from softjaw.study.scene import load_scene, parse_scene
@@ -105,6 +106,23 @@ def test_a_flag_tells_what_is_left_out():
     for reason, flagged in ((effects.MUCH, False), (effects.FAILED, True)):
         candidate.levels = {"friction_pressure_coupling": [level._replace(reason=reason)]}
         assert bool(candidate.flags_at(0) & Flag.LEFT_OUT) == flagged
+
+
+def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended():
+    candidate = Candidate.__new__(Candidate)
+    candidate.forces, name = (1.0, 2.0), "friction_pressure_coupling"
+    candidate.levels = {name: [Level(TAKEN, 0.1, effects.UNDECIDED)] * 2}
+    path = SimpleNamespace(state=lambda k: None if k else object(), ended="the wall collapsed")
+    coupled, plain = (Solved([], [], []) for _ in range(2))
+    candidate.coupled = SimpleNamespace(coarse=SimpleNamespace(followed=lambda forces: [path]))
+    candidate.solver = SimpleNamespace()
+    candidate._solved = lambda own, k: coupled if own is candidate.coupled else plain
+    assert candidate._level(0) is coupled
+    found = candidate._level(1)
+    assert "the wall collapsed" in found.note
+    own = candidate.levels[name][1]
+    assert (own.level, own.reason) == (FREE, effects.FAILED)
+    assert candidate.flags_at(1) & Flag.LEFT_OUT
 
 
 def test_reasons_of_levels_that_no_target_chooses():
