@@ -22,6 +22,7 @@ from softjaw.fem.contact.problem import IDLE, ContactPoints, ContactProblem, Gap
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
+Path = tuple[FloatArray, ...]  # accepted states, the first one first
 # Stiffness of stick in units of E / thickness: three times as much moves e_n by up to 0.05 % and takes a third more
 # Newton iterations.
 STICK = 30.0
@@ -90,6 +91,17 @@ def stick_or_slip(
     return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
 
 
+def followed(path: Path, x: FloatArray) -> Path:
+    """The accepted states of a load path with one more."""
+    # a state is accepted as the end of one step, and again as the start of the next
+    return path if path and np.array_equal(x, path[-1]) else (*path, x.copy())
+
+
+def leading_to(path: Path, x: FloatArray) -> Path:
+    """The accepted states before ``x``: what its tractions depend on."""
+    return tuple(state for state in path if not np.array_equal(state, x))
+
+
 class Damping:
     """Shortens steps of Newton's method that take most of the last one back.
 
@@ -142,7 +154,7 @@ class CoupledProblem(ContactProblem):
         self._at, self._before = np.zeros((*shape, 3)), np.zeros((*shape, 3))
         self._closed = np.zeros(shape, dtype=bool)
         self._damping = Damping(slice(0, self.pad.closing_dof + 1))
-        self._path: list[FloatArray] = []
+        self._path: Path = ()
 
     def accept(self, x: FloatArray) -> None:
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
@@ -152,13 +164,11 @@ class CoupledProblem(ContactProblem):
         pressure = self._pressure(x)
         self._at, self._closed = self._points.copy(), pressure > IDLE * pressure.max(initial=0.0)
         self._damping.forget()
-        # a state is accepted as the end of one step, and again as the start of the next
-        if not (self._path and np.array_equal(x, self._path[-1])):
-            self._path.append(x.copy())
+        self._path = followed(self._path, x)
 
-    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+    def history(self, x: FloatArray) -> Path:
         """States that were accepted before ``x``: what its tractions depend on."""
-        return tuple(state for state in self._path if not np.array_equal(state, x))
+        return leading_to(self._path, x)
 
     def residual(self, x: FloatArray) -> FloatArray:
         """As that of the frictionless problem, with the tractions' forces on the pad."""

@@ -59,6 +59,11 @@ ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
+def at_once(reached: float, force: float) -> tuple[float, ...]:
+    """Forces to go through from one to the next [N] where the load path does not matter."""
+    return (force,)
+
+
 def falls(forces: Sequence[float]) -> bool:
     """Whether a force fell along a load path: by more than the solver's tolerance and rounding leave it open.
 

@@ -18,7 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import NEAR, Checks, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, Following, LoadPath, Settings, State, Stepping, Work
+from softjaw.fem.contact.load_stepping import (
+    ASTRAY,
+    STRAY,
+    Following,
+    LoadPath,
+    Settings,
+    State,
+    Stepping,
+    Work,
+    at_once,
+)
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem, Control, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.foam import Foam
@@ -122,7 +132,7 @@ class Press(LoadPath):
     fallbacks: Sequence[Pad] = ()
     settings: Settings = field(default_factory=Settings)
     problem_of: Callable[[Pad, Gap], ContactProblem] = ContactProblem
-    load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
+    load_steps: Callable[[float, float], Sequence[float]] = at_once
     stepping: type[Stepping] = Following
 
     def __post_init__(self) -> None:

@@ -19,13 +19,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.fem.assembly import pairs
-from softjaw.fem.contact.friction_coupling import STICK, Damping, stick_or_slip
-from softjaw.fem.contact.problem import IDLE, ContactPoints
+from softjaw.fem.contact.friction_coupling import STICK, Damping, Path, followed, leading_to, stick_or_slip
+from softjaw.fem.contact.problem import IDLE
 from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Wall
 from softjaw.fem.shell.grip_problem import Evaluated, Finger, GripProblem
-from softjaw.fem.shell.wall_kernel import changes
+from softjaw.fem.shell.wall_kernel import add_row, changes, number
 from softjaw.fem.shell.wall_model import NonlinearWall
 
 IntArray = NDArray[np.int32]
@@ -53,6 +53,14 @@ class _Anchor:
     closed: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class _Memory:
+    """What friction depends on: the last accepted state of each finger, and all of them on the way."""
+
+    anchors: tuple[_Anchor, ...]
+    path: Path
+
+
 class CoupledGripProblem(GripProblem):
     """One or two pads on a deformable wall, with friction coefficient ``mu``; for the rest a `GripProblem`."""
 
@@ -67,11 +75,12 @@ class CoupledGripProblem(GripProblem):
 
     def begin(self) -> None:
         """Begin another load path: nothing has touched yet."""
-        self.memory: tuple[_Anchor, ...] = tuple(
-            _Anchor(nowhere, nowhere, nowhere, np.zeros((n, 4), np.int32), np.zeros((n, 4)), np.zeros(n, dtype=bool))
-            for n, nowhere in ((f.pad.face_area.size, np.zeros((f.pad.face_area.size, 3))) for f in self.fingers)
-        )
-        self._path: list[FloatArray] = []
+        anchors = []
+        for f in self.fingers:
+            n, nowhere = f.pad.face_area.size, np.zeros((f.pad.face_area.size, 3))
+            none = np.zeros((n, 4), np.int32), np.zeros((n, 4)), np.zeros(n, dtype=bool)
+            anchors.append(_Anchor(nowhere, nowhere, nowhere, *none))
+        self.memory: _Memory = _Memory(tuple(anchors), ())
         moved = np.concatenate([np.arange(self.model.size), *(np.r_[f.offset : f.closing_dof] for f in self.fingers)])
         self._damping = Damping(moved)
 
@@ -79,26 +88,25 @@ class CoupledGripProblem(GripProblem):
         """Go on from the state ``x``: its points and tractions are those that later ones are measured from."""
         contacts, (v, _) = self._contact(x, self._no_force()), self.model.outer(x[: self.model.size])
         anchors = []
-        for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True)):
+        for f, c in zip(self.fingers, contacts, strict=True):
+            assert c.traction is not None
             pressure, wall = self._pressure(f, c), c.facing
             closed = (pressure > IDLE * pressure.max(initial=0.0)) & (wall.gap < FAR)
             moved = np.einsum("na,nai->ni", wall.N, v[wall.nodes])
-            anchors.append(_Anchor(f.object_points(x), moved, self._traction(k, x, c)[0], wall.nodes, wall.N, closed))
-        self.memory = tuple(anchors)
-        # a state is accepted as the end of one step, and again as the start of the next
-        if not (self._path and np.array_equal(x, self._path[-1])):
-            self._path.append(x.copy())
+            anchors.append(_Anchor(f.object_points(x), moved, c.traction, wall.nodes, wall.N, closed))
+        self.memory = _Memory(tuple(anchors), followed(self.memory.path, x))
         self._damping.forget()
 
-    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
+    def history(self, x: FloatArray) -> Path:
         """States that were accepted before ``x``: what its tractions depend on."""
-        return tuple(state for state in self._path if not np.array_equal(state, x))
+        return leading_to(self.memory.path, x)
 
     def _contact(self, x: FloatArray, wall_force: FloatArray) -> list[Evaluated]:
         """As that of the frictionless problem, with the tractions' forces."""
         contacts = super()._contact(x, wall_force)
         for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True)):
             t, area = self._traction(k, x, c)[0], f.pad.face_area
+            c.traction = t
             own = (t @ f.R).reshape(*area.shape, 3)
             c.force -= np.einsum("fq,qa,fqi->fia", area, f.pad.face_N, own)
             np.add.at(wall_force, c.facing.nodes, (area.ravel()[:, None] * c.facing.N)[..., None] * t[:, None, :])
@@ -114,7 +122,7 @@ class CoupledGripProblem(GripProblem):
         They are those by the motion along the wall ``(n, 3, 3)`` [Pa/m], by the director ``(n, 3, 3)`` [Pa] and by the
         pressure ``(n, 3)`` [-].
         """
-        f, anchor = self.fingers[k], self.memory[k]
+        f, anchor = self.fingers[k], self.memory.anchors[k]
         v, _ = self.model.outer(x[: self.model.size])
         stick = STICK * f.kappa
         # what faces no wall any more has no tangent plane either
@@ -129,11 +137,11 @@ class CoupledGripProblem(GripProblem):
 
     def _held(self, k: int, f: Finger, c: Evaluated) -> NDArray[np.bool_]:
         """Points whose traction changes with anything."""
-        return self.memory[k].closed & (c.facing.gap < FAR) & (self._pressure(f, c) > 0.0)
+        return self.memory.anchors[k].closed & (c.facing.gap < FAR) & (self._pressure(f, c) > 0.0)
 
     def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
         complete = super()._add_contact(k, x, c)
-        f, anchor, facing, pattern = self.fingers[k], self.memory[k], c.facing, self.pattern
+        f, anchor, facing, pattern = self.fingers[k], self.memory.anchors[k], c.facing, self.pattern
         t, by_motion, by_normal, by_pressure = self._traction(k, x, c, derivatives=True)
         return complete & _friction_tangent(
             f.pad.face_N, f.pad.face_area, self._held(k, f, c), t, by_motion, by_normal, by_pressure, f.kappa,
@@ -147,7 +155,7 @@ class CoupledGripProblem(GripProblem):
         held = self._held(k, f, c)
         faces = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0])[held]
         own = f.dofs.reshape(len(f.nodes), -1)[faces]
-        here, there = (self.wall_dofs(nodes[held]) for nodes in (c.facing.nodes, self.memory[k].nodes))
+        here, there = (self.wall_dofs(nodes[held]) for nodes in (c.facing.nodes, self.memory.anchors[k].nodes))
         rows = np.concatenate([own, here], axis=1)
         return [*super()._couplings(k, f, c), pairs(rows[:, :, None], there[:, None, :])]
 
@@ -158,14 +166,6 @@ class CoupledGripProblem(GripProblem):
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """As that of the frictionless problem, and as `Damping` has it."""
         return self._damping.shortened(x, step, super().shorten(x, step))
-
-    def contact_state(self, x: FloatArray, number: int) -> tuple[FloatArray, FloatArray, ContactPoints]:
-        """As that of the frictionless problem, with the friction forces of the points."""
-        pressure, gap, p = super().contact_state(x, number)
-        f, c = self.fingers[number], self._contact(x, self._no_force())[number]
-        area = f.pad.face_area
-        friction = area[..., None] * (self._traction(number, x, c)[0] @ f.R).reshape(*area.shape, 3)
-        return pressure, gap, ContactPoints(p.position, p.normal, p.depth, p.load, friction)
 
 
 @njit(cache=True)
@@ -178,7 +178,8 @@ def _friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure
     ``old_nodes``, ``old_N`` where their material points lie on the wall.
     """
     points, k = N.shape
-    t = 3 * k  # local order: pad (component, node), wall first, wall second, old place first, second, pressures
+    t = 3 * k  # local order: pad (component, node), wall first, wall second, pressures, old place first, second
+    old = t + 24 + k
     M, change = np.empty((t + 12, t + 48 + k)), np.empty((3, t + 48 + k))
     dof = np.empty(t + 48 + k, np.int64)
     D, dn, dA = np.empty((3, t + 24)), np.empty((3, t + 24)), np.empty((4, 3, t + 24))
@@ -198,9 +199,9 @@ def _friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure
             for a in range(4):
                 for c in range(3):
                     dragged = -old_N[m, a] * by_motion[m, d, c]
-                    change[d, t + 24 + 3 * a + c] = change[d, t + 36 + 3 * a + c] = dragged
+                    change[d, old + 3 * a + c] = change[d, old + 12 + 3 * a + c] = dragged
             for i in range(k):
-                change[d, t + 48 + i] = kappa * N[q, i] * by_pressure[m, d]
+                change[d, t + 24 + i] = kappa * N[q, i] * by_pressure[m, d]
         w = area[f, q]
         for j in range(t + 48 + k):
             for c in range(3):
@@ -214,28 +215,15 @@ def _friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure
                         share += normal[m, c] * dA[a, c, j]
                 for c in range(3):
                     M[t + 3 * a + c, j] = w * (wall_N[m, a] * change[c, j] + share * traction[m, c])
-        for i in range(k):
-            dof[t + 48 + i] = pressures[f, i]
-            for c in range(3):
-                dof[c * k + i] = pad_dofs[f, c, i]
+        number(pad_dofs[f], pressures[f], first, second, nodes[m], dof)
         for a in range(4):
             for c in range(3):
-                dof[t + 3 * a + c] = first[nodes[m, a], c]
-                dof[t + 12 + 3 * a + c] = second[nodes[m, a], c]
-                dof[t + 24 + 3 * a + c] = first[old_nodes[m, a], c]
-                dof[t + 36 + 3 * a + c] = second[old_nodes[m, a], c]
+                dof[old + 3 * a + c] = first[old_nodes[m, a], c]
+                dof[old + 12 + 3 * a + c] = second[old_nodes[m, a], c]
         for r in range(t + 24):
             if dof[r] < 0:
                 continue
             # what moves the outer face carries the same force
             local = r if r < t + 12 else r - 12
-            low, high = start[dof[r]], start[dof[r] + 1]
-            for j in range(t + 48 + k):
-                if dof[j] < 0:
-                    continue
-                place = low + np.searchsorted(column[low:high], dof[j])
-                if place == high or column[place] != dof[j]:
-                    complete = False
-                else:
-                    values[place] += M[local, j]
+            complete &= add_row(dof[r], M[local], dof, start, column, values)
     return complete

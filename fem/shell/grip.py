@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.contact.load_stepping import STRAY, LoadPath, Settings, Stepping, Work, falls
+from softjaw.fem.contact.load_stepping import STRAY, LoadPath, Settings, Stepping, Work, at_once, falls
 from softjaw.fem.contact.press import Pressed, pressed
 from softjaw.fem.contact.problem import Control, Gap, SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError, SpentError
@@ -151,13 +151,12 @@ class Grip(LoadPath):
     options: dict[str, Any] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
     fallback: Callable[[], GripProblem] | None = None
-    load_steps: Callable[[float, float], Sequence[float]] = lambda reached, force: (force,)
+    load_steps: Callable[[float, float], Sequence[float]] = at_once
 
     def __post_init__(self) -> None:
         """Set up the solver."""
         self._wanted, self._other, self._peak = self.problem, self.fallback, 0.0
-        self._last: FloatArray | None = None  # state on the path that was found last
-        self._crept, self._in_vain = False, 0.0  # whether the wall has crept on, and the last force it crept for [N]
+        self._begin()
         super().__post_init__()
 
     def _set_up(self) -> None:
@@ -193,7 +192,8 @@ class Grip(LoadPath):
         ConvergenceError, CheckError
             At the first force without an acceptable state.
         """
-        here, self._last, self._crept, self._in_vain = None, None, False, 0.0
+        here = None
+        self._begin()
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
             here = self._next(here, force, work)
@@ -208,9 +208,15 @@ class Grip(LoadPath):
             here = self._next(here, force, work)
         return self._gripped(here, work, elapsed())
 
+    def _begin(self) -> None:
+        """Nothing has been found on the load path yet."""
+        self._last: FloatArray | None = None  # state on the path that was found last
+        self._crept, self._in_vain = False, 0.0  # whether the wall has crept on, and the last force it crept for [N]
+
     def _begin_afresh(self) -> None:
         """Forget what was solved before, so that not a bit of what follows depends on it."""
-        self.fallback, self._last, self._crept, self._in_vain = self._other, None, False, 0.0
+        self._begin()
+        self.fallback = self._other
         self._wanted.forget()
         if self.problem is self._wanted:
             self.opening.last = 1.0, 0.0

@@ -70,6 +70,7 @@ class Evaluated:
     weighted: FloatArray
     active: NDArray[np.bool_]
     force: FloatArray
+    traction: FloatArray | None = None  # of friction on the pad's points (n, 3), in the object's frame [Pa]
 
 
 class GripProblem:
@@ -311,7 +312,8 @@ class GripProblem:
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
         load = np.where(gap < FAR, f.loads(pressure), 0.0)
-        return pressure, c.weighted / f.area, ContactPoints(own, normal, max(0.0, -float(gap.min())), load)
+        friction = None if c.traction is None else f.pad.face_area[..., None] * (c.traction @ f.R).reshape(own.shape)
+        return pressure, c.weighted / f.area, ContactPoints(own, normal, max(0.0, -float(gap.min())), load, friction)
 
     def _no_force(self) -> FloatArray:
         return np.zeros((len(self.model.first), 3))

@@ -81,7 +81,7 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
     points, k = N.shape
     t = 3 * k  # local order of unknowns: pad (component, node), wall first (node, component), wall second, pressures
     M = np.zeros((t + 12 + k, t + 24 + k))
-    row_dof, column_dof = np.empty(t + 24 + k, np.int64), np.empty(t + 24 + k, np.int64)
+    dof = np.empty(t + 24 + k, np.int64)
     D = np.empty((3, t + 24))  # change of the point relative to the wall, as far as it turns and slides what it faces
     dn, dA = np.empty((3, t + 24)), np.empty((4, 3, t + 24))
     complete = True
@@ -120,33 +120,49 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
                 for a in range(4):
                     for c in range(3):
                         M[t + 3 * a + c, t + 24 + i] = kappa * w * N[q, i] * wall_N[m, a] * normal[m, c]
-            for i in range(k):
-                row_dof[t + 24 + i] = pressures[f, i]
-                for c in range(3):
-                    row_dof[c * k + i] = pad_dofs[f, c, i]
-            for a in range(4):
-                for c in range(3):
-                    row_dof[t + 3 * a + c] = first[wall_nodes[m, a], c]
-                    row_dof[t + 12 + 3 * a + c] = second[wall_nodes[m, a], c]
-            column_dof[:] = row_dof
+            number(pad_dofs[f], pressures[f], first, second, wall_nodes[m], dof)
             for r in range(t + 24 + k):
-                if row_dof[r] < 0:
+                if dof[r] < 0:
                     continue
                 # what moves the outer face carries the same force
                 local = r if r < t + 12 else r - 12
                 gap_row = r >= t + 24
                 if gap_row and not active[f, r - t - 24]:
                     continue
-                low, high = start[row_dof[r]], start[row_dof[r] + 1]
-                for j in range(t + 24 + (0 if gap_row else k)):
-                    if column_dof[j] < 0:
-                        continue
-                    # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
-                    place = low + np.searchsorted(column[low:high], column_dof[j])
-                    if place == high or column[place] != column_dof[j]:
-                        complete = False
-                    else:
-                        values[place] += M[local, j]
+                columns = t + 24 + (0 if gap_row else k)
+                complete &= add_row(dof[r], M[local, :columns], dof, start, column, values)
+    return complete
+
+
+@njit(cache=True)
+def number(pad_dofs, pressures, first, second, nodes, dof):
+    """Write to ``dof`` the unknowns of a pad's face, of the wall's nodes that a point faces, and of the pressures."""
+    k = pressures.size
+    t = 3 * k
+    for i in range(k):
+        dof[t + 24 + i] = pressures[i]
+        for c in range(3):
+            dof[c * k + i] = pad_dofs[c, i]
+    for a in range(4):
+        for c in range(3):
+            dof[t + 3 * a + c] = first[nodes[a], c]
+            dof[t + 12 + 3 * a + c] = second[nodes[a], c]
+
+
+@njit(cache=True)
+def add_row(row, entries, dof, start, column, values):
+    """Add entries in the columns ``dof``, -1 where fixed, to a compressed row; whether all of them had a place."""
+    complete = True
+    low, high = start[row], start[row + 1]
+    for j in range(entries.size):
+        if dof[j] < 0:
+            continue
+        # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
+        place = low + np.searchsorted(column[low:high], dof[j])
+        if place == high or column[place] != dof[j]:
+            complete = False
+        else:
+            values[place] += entries[j]
     return complete
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, turned
 from softjaw.fem.contact.friction_coupling import load_steps
+from softjaw.fem.contact.load_stepping import at_once
 from softjaw.fem.contact.press import Press, Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.shell.coupled_grip import CoupledGripProblem
@@ -472,10 +473,8 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Gr
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
     first, *others = contact_rules(scene, walled=True)
     fallback = (lambda: problem(others[0])) if others else None
-    grip = Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback)
-    if coupled:
-        grip.load_steps = load_steps
-    return grip
+    steps = load_steps if coupled else at_once
+    return Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback, steps)
 
 
 def _gap(finger: Finger, turned: bool):

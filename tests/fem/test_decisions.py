@@ -397,7 +397,7 @@ def test_a_point_is_closed_where_it_bears_something(seed):
     problem = object.__new__(CoupledProblem)
     problem._contact, problem.size = (lambda x, tangent: None), 0
     problem._traction = lambda x: (np.zeros((2, 3, 3)),)
-    problem._path, problem._damping = [np.zeros(0)], Damping(slice(0))
+    problem._path, problem._damping = (), Damping(slice(0))
     problem._points, problem._pressure = np.zeros((2, 3, 3)), lambda x: np.maximum(moved(pressure, seed), 0.0)
     problem.accept(np.zeros(0))
     assert problem._closed.tolist() == [[True] * 3, [False] * 3]

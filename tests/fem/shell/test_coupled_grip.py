@@ -112,3 +112,16 @@ def test_a_level_from_the_coarse_load_path_is_that_of_the_fine_one():
         assert level.fingers[0].checks.force_balance < 1e-8
         assert level.fingers[0].iterations < 0.5 * path[0].fingers[0].iterations
         assert e_n(level.fingers[0]) == pytest.approx(e_n(path[k].fingers[0]), rel=0.1 * changed)
+
+
+def test_what_a_step_in_vain_went_through_is_forgotten():
+    problem = grip(thin(), elements=(4, 2, 2), mu=MU).problem
+    first, in_vain, second = (stirred(problem, np.random.default_rng(seed)) for seed in range(3))
+    problem.accept(first)
+    kept = problem.memory
+    problem.accept(in_vain)
+    problem.memory = kept
+    problem.accept(second)
+    problem.accept(second)
+    (before,) = problem.history(second)
+    np.testing.assert_array_equal(before, first)
