@@ -73,7 +73,7 @@ map: setup
 	@if [ -f $(PICTURE) ]; then echo 'picture  $(PICTURE)'; fi
 
 figures: setup
-	$(MPIRUN) $(BIN)/softjaw figure all -o $(FIGURES) || [ $$? = $(SOME_FAILED) ]
+	$(MPIRUN) $(BIN)/python -m mpi4py -m jobs.figures all -o $(FIGURES) || [ $$? = $(SOME_FAILED) ]
 
 effects: setup
 	$(BIN)/python jobs/effects.py results/effects.csv

@@ -9,7 +9,6 @@ import traceback
 from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from softjaw.study.cli.options import program
@@ -18,7 +17,7 @@ from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, Stud
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
-SOLVING = ("run", "cost", "figure")
+SOLVING = ("run", "cost")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,11 +64,9 @@ def command(options: Namespace) -> int:
     if options.command in SOLVING:
         # Before the solvers load, which may hang instead of failing where memory is short.
         require_room()
-    if options.command in ("run", "figure"):
+    if options.command == "run":
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
-    if options.command == "figure":
-        options.solve = _solve
-    if options.command in ("run", "cost"):  # a wrong scene is refused before the solvers are loaded
+    if options.command in SOLVING:  # a wrong scene is refused before the solvers are loaded
         options.scene_read = _module("cli.quick").scene_of(options)
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
@@ -80,13 +77,6 @@ def command(options: Namespace) -> int:
 
 def _module(name: str) -> Any:
     return import_module(f"softjaw.study.{name}")
-
-
-def _solve(scene: Path, file: Path) -> int:
-    """Solve a scene of a figure into a file; the exit code of the run."""
-    options = program().parse_args(["run", str(scene), "-o", str(file)])
-    options.petsc = []
-    return command(options)
 
 
 def _unforeseen(options: Namespace, error: Exception) -> int:

@@ -1,11 +1,10 @@
-"""Commands that draw: the report, the 3-D view and the figures of the paper."""
+"""Commands that draw: the report and the 3-D view."""
 
 from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
 
-from softjaw.study.show.figures import command as figures
 from softjaw.study.show.report.writing import write_report
 from softjaw.study.show.view import command as viewing
 
@@ -19,8 +18,3 @@ def report(options: Namespace) -> str:
 def view(options: Namespace) -> None:
     """Show a result in three dimensions."""
     viewing.view(options)
-
-
-def figure(options: Namespace) -> int:
-    """Redraw figures of the paper; ``options.solve`` solves what is missing."""
-    return figures.figure(options, options.solve)

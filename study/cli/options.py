@@ -58,7 +58,6 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          "report results/bottle-rigid.hdf -o results/bottle-rigid.html", "cli.drawings"),
         ("view", "the map on the object in 3-D: window, page, picture",
          "view results/bottle-rigid.hdf --force 4 --screenshot view.png", "cli.drawings"),
-        ("figure", "a figure of the paper, from its scene to the picture", "figure 4c", "cli.drawings"),
         ("compare", "two maps side by side: settings and cases that differ",
          "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results"),
     ),
@@ -152,7 +151,7 @@ def program() -> Program:
         )  # fmt: skip
         made[name].set_defaults(command=name, module=module)
     for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", _add_watch_options),
-                              ("view", _add_view_options), ("figure", _add_figure_options),
+                              ("view", _add_view_options),
                               ("patch", _add_patch_options)):  # fmt: skip
         add_options(made[name])
     _add_scene_options(made)
@@ -307,14 +306,6 @@ def _add_view_options(parser: argparse.ArgumentParser) -> None:
     add("--screenshot", metavar="PNG", help="write a picture; needs no screen")
     add("--html", metavar="HTML", help="write the view as one page that needs nothing else")
     add("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
-
-
-def _add_figure_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("names", metavar="FIGURE", nargs="+", help="4ab, 4c, 5a, 5b, 6ab, 6c, 7, 8, or all")
-    add("-o", metavar="PNG", dest="output", help="picture, or folder for several (default: results/figures)")
-    add("--results", metavar="FOLDER", default="results",
-        help="folder of the scenes' results (default: results)")  # fmt: skip
 
 
 def _format(text: str) -> str:

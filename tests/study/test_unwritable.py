@@ -7,17 +7,14 @@ import subprocess
 import sys
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-from matplotlib.figure import Figure
 
 from softjaw.study.accuracy import measure
 from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
-from softjaw.study.show.figures import drawing as figures
 from softjaw.study.show.report import writing as report
 from tests.study.launching import ROOT
 from tests.study.view_files import make
@@ -35,7 +32,6 @@ COMMANDS = {
     "init": ("init", "bottle", "-o", "PLACE/x"),
     "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
     "cost": ("cost", SMOKE, "-o", "PLACE/x.hdf", "--time-limit", "1", "--set", "gripper.elements=[4, 2, 2]", *ALONE),
-    "figure": ("figure", "4c", "-o", "PLACE/x.png"),
 }
 
 
@@ -84,10 +80,8 @@ def refused(code, errors, place):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_that_writes_says_what_it_cannot_write(file, place, command, capfd, monkeypatch):
-    drawn = SimpleNamespace(name="4c", scenes=(), file="4c.png", gaps=False, draw=lambda: (Figure(), "drawn"))
     for name in SIZES:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(figures, "chosen", lambda names: [drawn])  # without solving and drawing anything
     monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
     monkeypatch.setattr(measure, "calibration_seconds", lambda: 1.0)
     monkeypatch.setattr(measure, "warm_up", lambda probe: None)
@@ -97,10 +91,9 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
 
 
 @pytest.mark.launches  # where the ranks of the tests would start a run together
-@pytest.mark.parametrize("words", [("run", SMOKE, "-o"), ("figure", "4c", "--results")])
-def test_a_run_says_what_it_cannot_write(tmp_path, words, capfd):
+def test_a_run_says_what_it_cannot_write(tmp_path, capfd):
     with read_only(tmp_path, {}):
-        code = main([*words, str(tmp_path / "x.hdf")])
+        code = main(["run", SMOKE, "-o", str(tmp_path / "x.hdf")])
     refused(code, capfd.readouterr().err, tmp_path)
 
 

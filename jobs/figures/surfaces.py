@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from jobs.figures.contacts import WIDTH
 from softjaw.friction.motion import cor_grid, fibonacci_twists
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.study import pictures
 from softjaw.study.case.limit_surface import fitted
 from softjaw.study.quantities import FINGERS
 from softjaw.study.ranking import nearest
-from softjaw.study.show.figures import WIDTH
 from softjaw.study.show.grasps import Index, at, axis_text, field, forces, number
 from softjaw.study.show.stored_surface import (
     COMPONENTS,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,13 @@ import xarray as xr
 from softjaw.study import pictures
 from softjaw.study.case.build import outer_surface
 from softjaw.study.scene import load_scene
-from softjaw.study.show.figures import JOBS, WIDTH
 from softjaw.study.show.grasps import at, forces, number
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad
 
+SCENES = Path(__file__).parents[1]
+WIDTH = 8.5  # of every figure [in]
 RATIO = 0.6  # b/a of the contact that is drawn
 ARROWS = 9, 3  # at most, along and across the pad
 LONGEST = 3.6  # arrow [mm]
@@ -80,9 +82,9 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     def whole(plotter: Any) -> None:
         solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
         solids.dots(plotter, 1e3 * marks, MARK, color=FORCE)
-        for k, one in enumerate(both):
-            solids.block(plotter, one, f"pad {k}")
-            solids.pressures(plotter, one, top)
+        for k, finger in enumerate(both):
+            solids.block(plotter, finger, f"pad {k}")
+            solids.pressures(plotter, finger, top)
 
     drawn, axes = pictures.figure(WIDTH, 3.5, 1, 2, width_ratios=[1, 1.7])
     seen = -0.5 * pad.approach + 0.85 * np.cross(up, pad.approach) + 0.2 * up
@@ -98,14 +100,14 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
 
 def candidate_marks() -> np.ndarray:
     """Where the fingers of the map's candidates touch ``(2 c, 3)`` [m]."""
-    scene = load_scene(JOBS / f"{MAP}.toml")
-    found = []
+    scene = load_scene(SCENES / f"{MAP}.toml")
+    places = []
     for angle in scene.candidates.angles:
         stations = np.array(scene.candidates.station_values)
         reach = np.interp(stations, *outline(scene.object, angle))
         for sign in (1.0, -1.0):
-            found.append(np.stack([sign * reach * np.cos(angle), sign * reach * np.sin(angle), stations], axis=1))
-    return np.concatenate(found)
+            places.append(np.stack([sign * reach * np.cos(angle), sign * reach * np.sin(angle), stations], axis=1))
+    return np.concatenate(places)
 
 
 def outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
