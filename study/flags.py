@@ -47,7 +47,7 @@ class Flag(IntFlag):
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
         " only one along its length or its width does, the object's normal turns by more than 120 deg between loaded"
         " faces that lie beside each other, trilinear elements are too stiff for foam with a Poisson's"
-        " ratio above 0.45, or two meshes put the error of e_n above accuracy.e_n, where the scene names it"
+        " ratio above 0.45, or two meshes put the error above accuracy.target, where the scene names it"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
         "the force fell while the fingers closed, more force would open them, it grew less than half as fast as"
@@ -69,7 +69,7 @@ class Flag(IntFlag):
         "by more than a fifth of the object's half width between the fingers: what is held there has another shape"
     )  # fmt: skip
     LEFT_OUT = 1 << 23, "uncoupled", "friction that acts back on the pressure moves e_n and is left out", (
-        "on the coarse mesh by more than accuracy.e_n, or 1 % where the scene names no target"
+        "on the coarse mesh by more than accuracy.target, or 1 % where the scene names no target"
     )  # fmt: skip
     OBLIQUE = 1 << 24, "oblique", "a contact normal lies oblique to the approach", (
         "the force along it differs from the one that the gripper commands by 5 % or more: see force_excess"

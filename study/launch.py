@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import check_object, told, with_sampled_grasps
+from softjaw.study.case.build import told, with_sampled_grasps
 from softjaw.study.case.model import check_petsc, check_poses
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
@@ -51,33 +51,21 @@ def solve_scene(
     StudyError
         On every rank: nothing was started, or the file is in use or cannot be written.
     """
-    scene, choice = on_rank0(comm, with_target_met, scene, path)
-    given = [*overrides, *(choice.overrides() if choice else [])]
-    plan = on_rank0(comm, prepare, scene, scene_file, given)
-    growth = _growth(scene, plan, choice, comm)
-    return run_study(plan, work(scene, choice), path, comm, retry_failed=retry_failed, growth=growth)
+    scene = on_rank0(comm, with_sampled_grasps, scene)
+    plan = on_rank0(comm, prepare, scene, scene_file, overrides)
+    growth = _growth(scene, plan, comm)
+    return run_study(plan, work(scene), path, comm, retry_failed=retry_failed, growth=growth)
 
 
-def _growth(scene: Scene, plan: Any, choice: Any, comm: Any) -> Growth:
+def _growth(scene: Scene, plan: Any, comm: Any) -> Growth:
     """How the grasps of a scene are refined; also a file that has been refined already needs it."""
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
         made = on_rank0(comm, make_plan, scene, *about, True, rounds)
-        return made, work(refined(scene, rounds), choice)
+        return made, work(refined(scene, rounds))
 
     return Growth(study, lambda result: next_round(result, scene, each))
-
-
-def with_target_met(scene: Scene, path: Path) -> tuple[Scene, Any]:
-    """The scene with its sampled grasps and what its target of accuracy chooses, and the choice; by one rank."""
-    scene = with_sampled_grasps(scene)
-    if scene.accuracy.e_n is None:
-        return scene, None
-    from softjaw.study.accuracy.target import settled  # most scenes name no target, and start sooner
-
-    check_object(scene)
-    return settled(scene, path, lambda text: print(text, flush=True))
 
 
 def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
@@ -91,12 +79,10 @@ def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     return plan
 
 
-def work(scene: Scene, choice: Any = None) -> Work:
-    """How the cases of a scene are solved; ``choice`` is what its target of accuracy chose."""
+def work(scene: Scene) -> Work:
+    """How the cases of a scene are solved."""
 
     def finalise(writer: Any) -> None:
-        if choice is not None:
-            choice.fill(writer)
         derived.finalise(writer, scene)
         writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
 

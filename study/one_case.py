@@ -230,16 +230,13 @@ def _outcome(unit: Any, k: int, what: str) -> CaseResult:
 
 
 def _refuse_open_questions(scene: Scene) -> None:
-    """A case needs a scene that says all: no sweep, and no target that would choose a mesh."""
+    """A case needs a scene that says all: no sweep."""
     if not isinstance(scene, Scene):
         raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.load(file) gives")
     if scene.sweep:
         key, values = next(iter(scene.sweep.items()))
         remedy = f"choose a point of it by scene.with_values(**{{{key!r}: {values[0]!r}}})"
         raise ValueError(f"scene has a sweep of {', '.join(scene.sweep)}, a case has one value of each; {remedy}")
-    if scene.accuracy.e_n is not None:
-        remedy = "take it out by scene.with_values(**{'accuracy.e_n': None}), or set gripper.elements"
-        raise ValueError(f"accuracy.e_n = {scene.accuracy.e_n:g} chooses the mesh of a whole run; {remedy}")
 
 
 def _asked(

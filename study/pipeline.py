@@ -74,10 +74,11 @@ def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome:
         other = _state_values(coarse) | solving.wall_values(outcome, 1)
         values |= mesh_errors(fine, coarse, values, other, settings, views, weight_of(fine, scene))
         # only where the scene asks for a target: without one the sums at the end say how many cases miss the usual one
-        if scene.accuracy.e_n is not None:
-            values["maps/flags"] |= Flag.COARSE * bool(misses(values["maps/e_n_error"], scene.accuracy.e_n))
+        if (target := scene.accuracy.target) is not None:
+            error = values[f"maps/{scene.accuracy.target_of}_error"]
+            values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
     values |= _work(fine, outcome, time.perf_counter() - start)
-    if scene.accuracy.meshes > 2:
+    if scene.accuracy.target is not None:
         values["maps/pad_elements"] = math.prod(fine[0].state.pad.shape.elements)
     patches = [stored(c, pad_shape(scene.gripper)) for c in fine]
     patch = {name: np.stack([own[name] for own in patches]) for name in patches[0]}

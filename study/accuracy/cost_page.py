@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.accuracy.choose import BELOW, percent, seconds_text
-from softjaw.study.accuracy.choose import values_text as settings
 from softjaw.study.accuracy.combinations import NO_LOSS, Combination, best_of, combinations
 from softjaw.study.accuracy.convergence import LevelErrors, ParameterErrors
 from softjaw.study.accuracy.cost_study import CostStudy
 from softjaw.study.page import Block, box, bullets, heading, image, page, table, text, verbatim
 from softjaw.study.run.progress import duration
+from softjaw.study.scene.text import value_text
 
 GOALS = (0.05, 0.02, 0.01, 0.005, 0.002)
+BELOW = 1e-6  # errors below this are none
 NEEDED = 0.01  # change of e_n from which an effect is needed
 MOST_SHOWN = 12
 NAMES = ("e_n", "max force", "max torque", "quality")
@@ -41,11 +41,39 @@ ring marks the scene's own. Errors are against the limit that the parameter's le
 cases. Lower left is better; errors below 1e-6 are left out. The dotted line joins the combinations of all parameters
 that nothing beats, with predicted errors."""
 FRONT = """Combinations of all measured levels. Errors of the parameters are added, each the largest over the probe
-cases; times are multiplied; what is cheaper follows from the unknowns. 'accuracy.e_n' in a scene chooses from these and
-tries them on the probes and on cases held out."""
+cases; times are multiplied; what is cheaper follows from the unknowns."""
 PARAMETERS = """Errors are relative to the limit of the levels, by Richardson extrapolation where the observed order
 allows it: the largest over all probe cases, in brackets the median. The first row is the cheapest setting; the scene's
 own is marked with an arrow."""
+
+
+def percent(error: float) -> str:
+    """A relative error as it is shown.
+
+    >>> percent(0.0213), percent(0.00123), percent(3e-8), percent(0.34)
+    ('2.1 %', '0.12 %', '< 0.0001 %', '34 %')
+    """
+    if not math.isfinite(error):
+        return "–"
+    if error < BELOW:
+        return "< 0.0001 %"
+    return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
+
+
+def seconds_text(seconds: float) -> str:
+    """A CPU time per case.
+
+    >>> seconds_text(0.0234), seconds_text(0.6), seconds_text(12.3)
+    ('23 ms', '0.6 s', '12 s')
+    """
+    if not math.isfinite(seconds):
+        return "–"
+    return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{seconds:.2g} s"
+
+
+def settings(values: Mapping[str, Any]) -> str:
+    """Scene keys and values, as in ``gripper.elements = [20, 10, 6]``."""
+    return ", ".join(f"{key} = {value_text(value)}" for key, value in values.items()) or "as in the scene"
 
 
 def cost_page(study: CostStudy, tables: Sequence[ParameterErrors]) -> tuple[str, bytes]:

@@ -176,7 +176,7 @@ def new_study(scene: Scene, probes: Sequence[Any], title: str, scene_file: str) 
 
 def plain(scene: Scene) -> Scene:
     """The scene without its sweep and its target: what the settings are compared with."""
-    target: dict[str, Any] = {"accuracy.e_n": None, "accuracy.cost_file": None}
+    target: dict[str, Any] = {"accuracy.target": None}
     return scene.with_values(target)
 
 

@@ -225,7 +225,7 @@ def forces_apart(scene: Scene) -> bool:
 
 
 def pad_elements(scene: Scene, mesh: int) -> tuple[int, int, int]:
-    """Elements of a pad on the scene's mesh (1, 2) and on the finer ones of ``accuracy.meshes`` (3, 4)."""
+    """Elements of a pad on the scene's mesh (1, 2) and on the finer ones of ``accuracy.target`` (3, 4)."""
     found = scene.gripper.elements
     for _ in range(2, mesh):
         found = refined(found)

@@ -2,7 +2,7 @@
 
 The loop goes through the rows of `study.case.effects.ROWS`. Where an indicator leaves it open, the candidate is solved
 on the coarse mesh with and without the effect, and what that changes in e_n decides: the cheaper level is taken where
-the change is surely below the target, ``accuracy.e_n`` or 1 %. The coarse load paths lead through all forces of the
+the change is surely below the target, ``accuracy.target`` or 1 %. The coarse load paths lead through all forces of the
 scene from the lowest one on, and both the indicator and the change belong to one force: nothing depends on which forces
 are wanted, or on which rank they are solved.
 """
@@ -82,7 +82,7 @@ class Candidate:
         self.walled: bool = has_wall(scene.object)
         if self.walled:
             refuse_along_axis(fingers)
-        self.target = scene.accuracy.e_n or E_N_TARGET
+        self.target = scene.accuracy.target or E_N_TARGET
         self._coarse: dict[tuple[Any, ...], Solver] = {}
         self._finer: dict[Solver, Finer] = {}
         self._changes: dict[tuple[str, str, int], tuple[float, float]] = {}
@@ -229,12 +229,12 @@ class Candidate:
         return self._solver(at_levels(self.scene, **{COUPLING: "tangential"}))
 
     def _solved(self, own: Solver, k: int) -> Solved:
-        """Contacts at one force, on a finer mesh where e_n asks for it and the object is rigid."""
+        """Contacts at one force, on a finer mesh where the target asks for it and the object is rigid."""
         found = own.level(self.forces, k)
-        if self.asked.accuracy.meshes < 3 or not isinstance(own, OnRigid):
+        if self.asked.accuracy.target is None or not isinstance(own, OnRigid):
             return found
         if own not in self._finer:
-            self._finer[own] = Finer(own.scene, self.fingers, self.poses, self.target)
+            self._finer[own] = Finer(own.scene, self.fingers, self.poses)
         return self._finer[own].known_to_target(found, self.forces[k])
 
     def _solver(self, scene: Scene) -> Solver:

@@ -156,7 +156,7 @@ def may_bend(scene: Scene) -> bool:
         return False
     if scene.effects.sheet != "auto":
         return scene.effects.sheet == "elastic"
-    bound = STIFF_PLATE * (scene.accuracy.e_n or E_N_TARGET) / E_N_TARGET
+    bound = STIFF_PLATE * (scene.accuracy.target or E_N_TARGET) / E_N_TARGET
     return not surely_below(plate_compliance(scene.gripper), bound)
 
 

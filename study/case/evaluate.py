@@ -223,11 +223,13 @@ def mesh_errors(
     }
 
 
-def e_n_error(
-    fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]], weight: float = OF_MESHES
-) -> float:
-    """Relative error of e_n alone, as `mesh_errors` has it."""
-    own, other, *seen = ([c.limits["ccm"].e_n for c in contacts] for contacts in (fine, coarse, *views))
+def error_of_one(
+    name: str, fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]],
+    settings: EvaluationSettings, weight: float = OF_MESHES,
+) -> float:  # fmt: skip
+    """Relative error of ``e_n``, ``quality`` or ``payload`` alone, as `mesh_errors` has it."""
+    values = (_judged(c) if name == "e_n" else _held(c, settings) for c in (fine, coarse, *views))
+    own, other, *seen = (value[f"maps/{name}"] for value in values)
     return estimate(own, other, seen, "relative", weight)
 
 

@@ -1,7 +1,7 @@
-"""Finer meshes for the cases whose e_n two meshes do not tell to the target.
+"""Finer meshes for the cases that two meshes do not tell to the target.
 
 Each starts from the state on the mesh before it at the same force, so that forces stay independent of each other, and
-the error of its e_n comes from these two.
+its error comes from these two.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from numpy.typing import NDArray
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.patch import ContactPatch
-from softjaw.study.case.build import pad_elements
-from softjaw.study.case.evaluate import OF_MESHES, e_n_error
+from softjaw.study.case.build import build_object, pad_elements
+from softjaw.study.case.evaluate import OF_MESHES, error_of_one, settings_of
 from softjaw.study.case.model import Finger
 from softjaw.study.case.result import surely_below
 from softjaw.study.case.solving import PressedContact, Solved, Solver, solver
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import MOST_ELEMENTS
+from softjaw.study.scene.sections import MOST_ELEMENTS, MOST_MESHES
 
 FloatArray = NDArray[np.float64]
-OF_FINER = 1.0  # weight of the difference of e_n between two meshes so near each other
-NOT_SOLVED = "on a finer mesh, which the error of e_n asks for, it was not solved ({reason})"
+OF_FINER = 1.0  # weight of the difference between two meshes so near each other
+NOT_SOLVED = "on a finer mesh, which accuracy.target asks for, it was not solved ({reason})"
 
 
 def on_finer(scene: Scene, mesh: int) -> Scene:
@@ -43,15 +43,17 @@ def weight_of(fine: Sequence[PressedContact], scene: Scene) -> float:
 
 
 def error_of(found: Solved, scene: Scene) -> float:
-    """Error of e_n from the two finest meshes of a case, relative; NaN where there is one alone."""
+    """Error of ``accuracy.target_of`` from the two finest meshes of a case, relative; NaN where there is one alone."""
     fine, coarse = ([c[mesh] for c in found.contacts if len(c) > mesh] for mesh in (0, 1))
     if not coarse:
         return math.nan
-    return e_n_error(fine, coarse, list(zip(*(c.views for c in coarse), strict=True)), weight_of(fine, scene))
+    views, name = list(zip(*(c.views for c in coarse), strict=True)), scene.accuracy.target_of
+    settings = settings_of(scene, build_object(scene.object))
+    return error_of_one(name, fine, coarse, views, settings, weight_of(fine, scene))
 
 
 class Finer:
-    """Solves the cases of a candidate again whose e_n is not surely known to a target.
+    """Solves the cases of a candidate again that are not surely known to the scene's target.
 
     Parameters
     ----------
@@ -60,20 +62,19 @@ class Finer:
     fingers : list of Finger
         Both at first touch.
     poses : two Pose
-    target : float
-        Relative error of e_n.
     """
 
-    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any], target: float) -> None:
-        self._scene, self._fingers, self._poses, self._target = scene, fingers, poses, target
+    def __init__(self, scene: Scene, fingers: list[Finger], poses: Sequence[Any]) -> None:
+        self._scene, self._fingers, self._poses = scene, fingers, poses
+        self._target = float(scene.accuracy.target or 0.0)
         self._solvers: dict[int, Solver] = {}
 
     def known_to_target(self, found: Solved, force: float) -> Solved:
-        """The case as it is where its error is surely below the target, else on as many meshes as the scene allows.
+        """The case as it is where its error is surely below the target, else on up to `MOST_MESHES`.
 
         Where a finer mesh has no state the case keeps the answer of the one before, with a note.
         """
-        for mesh in range(3, self._scene.accuracy.meshes + 1):
+        for mesh in range(3, MOST_MESHES + 1):
             # undecided, and unknown, is refined, which is right in both cases
             error = error_of(found, self._scene)
             if surely_below(error, self._target) or math.prod(pad_elements(self._scene, mesh)) > MOST_ELEMENTS:

@@ -62,8 +62,6 @@ def plan(options: Namespace) -> str:
     path = target(options, scene)
     made = make_plan(scene, options.scene, options.overrides)
     lines = [plan_text(made, scene, path, options.ranks[0]), *told(scene)]
-    if scene.accuracy.e_n is not None:
-        lines.append("accuracy.e_n chooses mesh and effects when the run starts; this plan has those of the scene")
     if len(options.ranks) > 1 or options.repeat > 1:
         lines.append(scaling_text(made, path, options.ranks, options.repeat))
     return hanging("\n".join(lines), terminal_width())

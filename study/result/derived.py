@@ -26,38 +26,19 @@ LOW, HIGH = "force_low", "force_high"
 LOW_ERROR = f"{LOW}_error"
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
-PREDICTED, MEASURED, HELD_OUT = "e_n_error_predicted", "e_n_error_on_probes", "e_n_error_held_out"
-SECONDS = "seconds_per_case_predicted"
-MEANING = {
-    PREDICTED: ("", "predicted relative error of e_n", "Largest relative error of e_n that the cost study predicts for"
-                " the settings that accuracy.e_n chose: the sum over its parameters, or that of the chosen mesh."),
-    MEASURED: ("", "relative error of e_n on probe cases", "Largest relative error of e_n of the chosen settings on the"
-               " probe cases, against the limit of finer ones and with what that limit may be off. NaN: they were not"
-               " solved there."),
-    HELD_OUT: ("", "relative error of e_n on other cases", "The same on cases that the settings were not chosen by."
-               " NaN: there were none, or the target was missed before."),
-    SECONDS: ("s", "predicted CPU time of one case", "CPU time of one case with the chosen settings, on the probes."),
-}  # fmt: skip
 
 
 def derived(scene: Scene) -> list[Derived]:
     """Everything that is derived for a scene."""
-    return [*_of_sweep(scene), *_of_force_range(scene), *interval.derived(scene), *_of_target(scene)]
+    return [*_of_sweep(scene), *_of_force_range(scene), *interval.derived(scene)]
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
-    """Fill it, by one rank, after all cases; what a target of accuracy chose is written by who chose it."""
+    """Fill it, by one rank, after all cases."""
     _fill_sweep(writer, scene)
     _fill_force_range(writer, scene)
     interval.finalise(writer, scene)
     fill_grid(writer)
-
-
-def _of_target(scene: Scene) -> list[Derived]:
-    """What the choice of the settings promises: four numbers where the scene names a target."""
-    if scene.accuracy.e_n is None:
-        return []
-    return [Derived(name, *words, shape=(1,)) for name, words in MEANING.items()]
 
 
 def _of_sweep(scene: Scene) -> list[Derived]:

@@ -126,7 +126,7 @@ def has(scene: Any) -> tuple[str, ...]:
     asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
-    asked["finer meshes"] = scene.accuracy.meshes > 2
+    asked["finer meshes"] = scene.accuracy.target is not None
     return tuple(name for name, wanted in asked.items() if wanted)
 
 
@@ -156,7 +156,7 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
-    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene, scene.accuracy.meshes)) ** (4.0 / 3.0)
+    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes)) ** (4.0 / 3.0)
     wall = wall_size(scene) if shells(scene) else None
     return LIBRARIES + pad + (wall.memory if wall else 0.0)
 

@@ -102,9 +102,9 @@ class Scene(SceneSection, metaclass=Loader):
                 f"load.normal_force_n = {force:g} N on {area} is a mean pressure of {strain:.2g} times the pad's shear"
                 " modulus: cases may not converge"
             )
-        meshes, walled = self.accuracy.meshes, getattr(self.object, "wall", None) is not None
-        if meshes > 2 and walled and self.effects.object != "rigid":
-            yield f"accuracy.meshes = {meshes} refines cases on rigid objects alone: on a simulated wall there are 2"
+        walled = getattr(self.object, "wall", None) is not None
+        if self.accuracy.target is not None and walled and self.effects.object != "rigid":
+            yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
             yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
 

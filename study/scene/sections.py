@@ -29,6 +29,7 @@ WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 Share = Annotated[float, Field(ge=0, le=50)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
+MOST_MESHES = 4  # of a case, each 1.4 times as fine in every direction as the one before; each costs 3 times as much
 ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
 LEVELS = {  # level of the effect: models of [limit_surface]
     "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),
@@ -314,9 +315,13 @@ class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
     meshes: int = Field(
-        2, ge=1, le=4, description="2 solves every case on a coarser mesh too, which tells the error of every number;"
-        " 3 (4) also on up to one (two) finer ones where e_n has an error above e_n, else 1 %, on rigid objects"
+        2, ge=1, le=2, description="2 solves every case on a coarser mesh too, which tells the error of every number"
     )
+    target: float | None = Field(
+        None, gt=1e-4, le=0.5, description="largest relative error; a case on a rigid object that may have a larger one"
+        " is solved on up to two finer meshes"
+    )
+    target_of: Literal["payload", "quality", "e_n"] = Field("payload", description="what the target is for")
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
         "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
@@ -327,13 +332,18 @@ class Accuracy(SceneSection):
     wall_around_mm: WallSize = Field(1.5, description="size of a thin wall's elements round the object, under the pads")
     wall_along_mm: WallSize = Field(2.5, description="size of a thin wall's elements along the axis, under the pads")
     wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
-    e_n: float | None = Field(
-        None, gt=1e-4, le=0.5, description="largest relative error of e_n; mesh, steps and effects are chosen by it"
-    )
-    cost_file: Text | None = Field(
-        None, min_length=1, max_length=1000, description="result of 'softjaw cost' that they are chosen from"
-    )
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
+
+    def findings(self) -> Iterator[Finding]:
+        """A target needs errors."""
+        if self.target is not None and self.meshes < 2:
+            expected = "accuracy.meshes = 2, whose difference tells the error"
+            yield Finding(("target",), f"{self.target:g} with accuracy.meshes = 1", expected, "leave meshes out")
+
+    @property
+    def most_meshes(self) -> int:
+        """On how many meshes a case is solved at most."""
+        return self.meshes if self.target is None else MOST_MESHES
 
 
 class Uncertainty(SceneSection):

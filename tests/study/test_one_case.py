@@ -149,7 +149,6 @@ POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
         (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),
         (FLASK, {"station": 5.0, "angle": 0}, ValueError, "5000 mm.*0 to 120 mm"),
         (SMOKE.with_values(**{"gripper.max_opening_mm": 20.0}), {"station": 0, "angle": 0}, CaseError, "to 20 mm"),
-        (SMOKE.with_values(**{"accuracy.e_n": 0.02}), {"station": 0, "angle": 0}, ValueError, r"accuracy\.e_n"),
         (sj.Scene.load(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]), {"station": 0, "angle": 0}, ValueError,
          r"sweep of friction\.mu.*with_values"),
         (SMOKE.with_values(**{"petsc.contact_snes_tpye": "x"}), {"station": 0, "angle": 0}, sj.StudyError, "tpye"),

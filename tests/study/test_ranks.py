@@ -44,7 +44,8 @@ angles_deg = [0, 5, 185]
 normal_force_n = [1, 3]
 
 [accuracy]
-meshes = 3
+target = 0.01
+target_of = "e_n"
 
 [effects]
 friction_pressure_coupling = "none"

@@ -34,8 +34,7 @@ def scene_text(scene: Any, file: str) -> str:
         "cases": str(scene.cases),
         "refinement": _refinement(c),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
-        "accuracy": _meshes(scene.accuracy.meshes),
-        "target": _target(scene),
+        "accuracy": _meshes(scene.accuracy),
         "intervals": _intervals(scene),
         "effects": ", ".join(levels),
         "compliance": compliance_text(scene) if has_wall(o) else "",
@@ -51,10 +50,12 @@ def _refinement(where: Any) -> str:
     return f"at most {where.refine.budget} more cases, {where.refined_until}" if where.refine else ""
 
 
-def _meshes(count: int) -> str:
+def _meshes(accuracy: Any) -> str:
     """On how many meshes a case is solved."""
-    finer = f", on up to {count} where e_n asks for it" if count > 2 else ""
-    return f"every case on two meshes{finer}" if count > 1 else "one mesh, no error maps"
+    if accuracy.target is None:
+        return "every case on two meshes" if accuracy.meshes > 1 else "one mesh, no error maps"
+    goal = f"{accuracy.target_of} within {100 * accuracy.target:g} %"
+    return f"{goal}: every case on two meshes, on up to {accuracy.most_meshes} where its error asks for it"
 
 
 def limits_text(run: Any) -> str:
@@ -62,15 +63,6 @@ def limits_text(run: Any) -> str:
     limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
     memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
     return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that; the run continues"
-
-
-def _target(scene: Any) -> str:
-    """What will be chosen for a target of accuracy; empty without one."""
-    if scene.accuracy.e_n is None:
-        return ""
-    from softjaw.study.accuracy.choose import expected
-
-    return expected(scene)
 
 
 def _intervals(scene: Any) -> str:

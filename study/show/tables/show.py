@@ -21,7 +21,7 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.show.tables.answer import answer
 from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.show.tables.columns import GAP, PAPER, aligned, digits, head, wrapped
-from softjaw.study.show.tables.status import E_N_ERROR, largest_error, no_grasps
+from softjaw.study.show.tables.status import aim, largest_error, no_grasps
 from softjaw.study.units import shown, shown_unit
 
 Columns = tuple[tuple[str, str], ...]  # names and units
@@ -101,7 +101,8 @@ def best(
 
 def _largest_error(ds: xr.Dataset) -> str:
     """Of e_n by the mesh; nothing where the file has uncertainty intervals instead."""
-    errors = values_of(ds, E_N_ERROR.name) if E_N_ERROR.name in ds else None
+    name = f"{aim(ds)[0]}_error"
+    errors = values_of(ds, name) if name in ds else None
     if errors is None and "e_n_interval" in ds:
         return ""
     return largest_error(errors, ds, axes_of(ds), ds.label.values)

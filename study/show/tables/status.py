@@ -22,8 +22,7 @@ from softjaw.study.run.refine import about
 from softjaw.study.show.tables.columns import PAPER, terminal_width, wrapped
 
 MOST_REASONS, MOST_PLACES = 12, 3
-E_N_ERROR = map_row("e_n").of_error
-NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 or uncertainty.mesh = true in the scene gives them"
+NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
 
 
 def status(options: Namespace) -> str:
@@ -45,16 +44,22 @@ def status_text(result: Any, width: int = PAPER) -> str:
 
 
 def largest_mesh_error(result: Any) -> str:
-    """The largest error of e_n by the mesh so far; nothing where the scene asks for uncertainty intervals instead."""
-    has = E_N_ERROR in result.layout.quantities
-    if not has and any(d.name == "e_n_interval" for d in result.layout.derived):
-        return ""
-    errors = result.read(f"{E_N_ERROR.name}/{E_N_ERROR.name}") if has else None
+    """The largest error by the mesh so far of what the scene's target is for."""
+    row = map_row(aim(result)[0]).of_error
+    errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
     return largest_error(errors, result, result.axes, result.labels)
 
 
+def aim(cases: Any) -> tuple[str, float]:
+    """What the target of a file's scene is for, and the relative error; e_n and the usual one where it names none."""
+    accuracy = tomllib.loads(cases.scene).get("accuracy", {})
+    if "target" not in accuracy:
+        return "e_n", E_N_TARGET
+    return accuracy["target_of"], accuracy["target"]
+
+
 def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any) -> str:
-    """The largest error of e_n by the mesh, how many are above the target, and how many solved cases have none.
+    """The largest error by the mesh, how many are above the target, and how many solved cases have none.
 
     Parameters
     ----------
@@ -74,8 +79,8 @@ def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence
     if not count:
         return f"errors of the mesh: none of {solved} solved cases has one"
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
-    target = tomllib.loads(cases.scene).get("accuracy", {}).get("e_n") or E_N_TARGET
-    parts = [f"largest error of e_n by the mesh: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    name, target = aim(cases)
+    parts = [f"largest error of {name} by the mesh: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
     if above := int(np.count_nonzero(misses(known, target))):
         parts.append(f"{above} of {count} cases above {100 * target:g} %")
     if count < solved:
