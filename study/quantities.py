@@ -428,7 +428,7 @@ ROWS = (
 )  # fmt: skip
 TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
-FIRST, ON_OBJECT = MAIN[:2], MAIN[:4]  # maps that viewers open at, and that ParaView shows on the object
+FIRST = MAIN[:2]  # maps that viewers open at
 RANKED_BY = ("payload", "quality", "e_n", "epsilon")  # what grasps can be ranked by
 FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}

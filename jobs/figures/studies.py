@@ -11,8 +11,8 @@ from jobs.figures.contacts import WIDTH, outline
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
-from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.grasps import WIDE, field, forces, number, place
+from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View, read_scene
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.mjcf import as_mjcf
@@ -24,6 +25,8 @@ SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
 def export(options: Namespace) -> str:
     """Write grasps for planners and simulators; files that were written, or the text itself."""
     ds = open(options.file)
+    if options.form == "vtk":
+        return f"written: {_vtk(options, ds)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
     choice = Selection(options.model, options.force, options.by, few, dict(options.least))
     if options.form in TABLES:
@@ -44,6 +47,14 @@ def export(options: Namespace) -> str:
     if options.form in PLANNERS:
         return _written(options, [PLANNERS[options.form](found, gripper, ds)])
     return _written(options, [SIMULATORS[options.form](grasp) for grasp in found])
+
+
+def _vtk(options: Namespace, ds: Any) -> Path:
+    from softjaw.study.show.vtk import write_vtk  # slow to load
+
+    if options.output is None:
+        raise StudyError(USAGE, "--format vtk: name the file with -o")
+    return write_vtk(ds, Path(options.output), options.force)
 
 
 def _written(options: Namespace, texts: list[str]) -> str:

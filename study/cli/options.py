@@ -28,6 +28,7 @@ FORMATS = {  # of export: what stands in the file
     "mjcf": "a MuJoCo scene of one grasp, with the friction of each finger",
     "sdf": "the fingers of one grasp for Gazebo Classic with ODE",
     "physx": "the fingers of one grasp for PhysX and Isaac Sim (USD, .usda)",
+    "vtk": "maps on the object and all pads with their pressure, for ParaView (.vtm)",
 }
 NO_DRAKE = (
     "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
@@ -268,8 +269,12 @@ def _add_patch_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
     add("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved")
-    add("--deformed", action="store_true", help="FILE holds points of the pad's deformed contact face (CSV with x, y, "
-        "z), or of a contour along its width (y, z), seen from the backing plate")
+    add(
+        "--deformed",
+        action="store_true",
+        help="FILE holds points of the pad's deformed contact face (CSV with x, y, "
+        "z), or of a contour along its width (y, z), seen from the backing plate",
+    )
     add("--mu", type=values.positive, help="friction coefficient (default 0.8; with --deformed that of the scene)")
     add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
         "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
@@ -305,7 +310,6 @@ def _add_view_options(parser: argparse.ArgumentParser) -> None:
         help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
     add("--screenshot", metavar="PNG", help="write a picture; needs no screen")
     add("--html", metavar="HTML", help="write the view as one page that needs nothing else")
-    add("--vtkhdf", metavar="VTKHDF", help="write object and pads for ParaView and pyvista.read")
 
 
 def _format(text: str) -> str:

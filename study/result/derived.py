@@ -1,4 +1,4 @@
-"""What is filled once, after all cases: axes of curvature studies, safe force ranges, intervals; then comes the grid.
+"""What is filled once, after all cases: axes of curvature studies, safe force ranges, intervals.
 
 The safe force range of a candidate is enough to hold the object's weight, and not so much that its wall is damaged.
 """
@@ -15,7 +15,6 @@ from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import MARGIN
 from softjaw.study.result import interval
 from softjaw.study.result.layout import DONE, Derived
-from softjaw.study.result.vtkhdf import fill_grid
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
@@ -38,7 +37,6 @@ def finalise(writer: ResultWriter, scene: Scene) -> None:
     _fill_sweep(writer, scene)
     _fill_force_range(writer, scene)
     interval.finalise(writer, scene)
-    fill_grid(writer)
 
 
 def _of_sweep(scene: Scene) -> list[Derived]:

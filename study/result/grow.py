@@ -13,9 +13,8 @@ from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
 from softjaw.study.result.datasets import CLOSING, SUMS, Dataset
 from softjaw.study.result.guarded import reason
 from softjaw.study.result.layout import ROOT, Header, Layout
-from softjaw.study.result.skeleton import create, put_in_place
+from softjaw.study.result.skeleton import LIBVER, create, put_in_place
 from softjaw.study.result.store import open_result
-from softjaw.study.result.vtkhdf import LIBVER
 
 SESSIONS = f"{ROOT}/provenance/sessions"
 # What a new file has of its own, or what is filled again once nothing is missing.

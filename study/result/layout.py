@@ -31,7 +31,6 @@ from softjaw.study.quantities import FAILED as FAILED
 from softjaw.study.quantities import MISSING as MISSING
 from softjaw.study.result.datasets import CLOSING, Column, Dataset, columns_of, datasets_of
 from softjaw.study.result.datasets import ROOT as ROOT
-from softjaw.study.result.vtkhdf import grid_datasets
 
 PROGRAM, VERSION = "softjaw", 7
 LABEL, SESSIONS, REPORT = 80, 256, 8192
@@ -47,8 +46,8 @@ SESSION = np.dtype(
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``surface`` is the object as `study.result.vtkhdf.Surface`, None where the file shows none. ``placed`` is where the
-    frame in which stations and angles count lies in that of the poses, the object's own file, as rotation and origin.
+    ``placed`` is where the frame in which stations and angles count lies in that of the poses, the object's own file,
+    as rotation and origin.
     """
 
     digest: str
@@ -58,7 +57,6 @@ class Header:
     overrides: tuple[str, ...] = ()
     petsc_options: str = ""
     labels: tuple[str, ...] = ()
-    surface: Any = None
     placed: Any = None
 
 
@@ -80,9 +78,8 @@ class Layout:
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
-    candidates ``probes``. ``surface`` counts the points and triangles of the object, ``pad_faces`` the faces along and
-    across a pad, as `study.result.vtkhdf` shows them, or zeros. ``added`` is what each round of a
-    refinement added to the scene: stations [mm], or poses as `study.run.pattern.Place`.
+    candidates ``probes``. ``added`` is what each round of a refinement added to the scene: stations [mm], or poses as
+    `study.run.pattern.Place`.
     """
 
     axes: tuple[Any, ...]
@@ -95,8 +92,6 @@ class Layout:
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
-    surface: tuple[int, int] = (0, 0)
-    pad_faces: tuple[int, int] = (0, 0)
     probes: tuple[int, ...] = ()
     variations: tuple[str, ...] = ()
     added: tuple[tuple[Any, ...], ...] = ()
@@ -185,17 +180,11 @@ class Layout:
     def _by_path(self) -> dict[str, Dataset]:
         return {d.path: d for d in self.datasets}
 
-    @cached_property
-    def grid(self) -> tuple[Dataset, ...]:
-        """All datasets of the grid that ParaView opens."""
-        return tuple(grid_datasets(self))
-
     @property
     def nbytes(self) -> int:
         """Size of the file, rounded up generously for what HDF5 adds."""
-        datasets = (*self.datasets, *self.grid)
-        count = len(datasets) + len(self.axes) + 16
-        return sum(d.nbytes for d in datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
+        count = len(self.datasets) + len(self.axes) + 16
+        return sum(d.nbytes for d in self.datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
 
     @property
     def chosen(self) -> dict[str, tuple[int, ...]]:
@@ -222,8 +211,8 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled", "surface",
-                 "pad_faces", "probes", "variations", *["added"] * bool(self.added))  # fmt: skip
+        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled",
+                 "probes", "variations", *["added"] * bool(self.added))  # fmt: skip
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -245,13 +234,12 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
-        surface, pad_faces = (_pair(options.get(name, (0, 0))) for name in ("surface", "pad_faces"))
         probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
         if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
             raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
         added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
-        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, surface,
-                      pad_faces, probes, variations, added)  # fmt: skip
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, probes,
+                      variations, added)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 
@@ -263,10 +251,3 @@ def _place(given: Any) -> Any:
     if len(given) != 10:
         raise ValueError(f"an added pose of {len(given)} numbers")
     return tuple(map(float, given))
-
-
-def _pair(given: Sequence[int]) -> tuple[int, int]:
-    first, second = map(int, given)
-    if not 0 <= min(first, second) <= max(first, second) < 10**8:
-        raise ValueError(f"a grid of {first}, {second}")
-    return first, second

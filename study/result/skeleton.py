@@ -19,7 +19,7 @@ import numpy as np
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
 from softjaw.study.quantities import FIRST, MODELS
-from softjaw.study.result import checksums, vtkhdf
+from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING, SUMS
 from softjaw.study.result.guarded import GuardedFile, reason
 from softjaw.study.result.layout import (
@@ -35,8 +35,8 @@ from softjaw.study.result.layout import (
     Layout,
 )
 from softjaw.study.result.provenance import SAMPLING
-from softjaw.study.result.vtkhdf import LIBVER
 
+LIBVER = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
 TEXT = h5py.string_dtype("utf-8")
 EVEN = 1e-6  # relative difference of steps that makes an axis uneven
 TEXTS = {
@@ -46,7 +46,7 @@ TEXTS = {
     "report": "best grasps, failures with their reasons, how to read the file",
 }
 CUT = " ..."  # at the end of a text that was too long
-UNFINISHED = "Not all cases of this study are solved yet; this text and /VTKHDF are written at its end."
+UNFINISHED = "Not all cases of this study are solved yet; this text is written at its end."
 
 
 def create(path: Path, layout: Layout, header: Header) -> None:
@@ -123,8 +123,6 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
     for dataset in layout.datasets:
         _create_dataset(file, dataset)
     _write_texts(study, layout, header)
-    if layout.grid:
-        _write_grid(file, layout, header)
 
 
 def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> None:
@@ -132,17 +130,6 @@ def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> N
     file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
     for i, name in enumerate(layout.closing):
         file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
-
-
-def _write_grid(file: h5py.File, layout: Layout, header: Header) -> None:
-    root = file.create_group(vtkhdf.PATH)
-    root.attrs["about"] = f"{header.title}. {vtkhdf.ABOUT}"
-    vtkhdf.head(root, layout.shape[-1])
-    for dataset in layout.grid:
-        file.require_group(dataset.path.rpartition("/")[0])
-        _create_dataset(file, dataset)
-    for path, values in vtkhdf.skeleton(layout, header.surface).items():
-        file[path][...] = values
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:

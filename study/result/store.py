@@ -299,7 +299,7 @@ def open_result(path: str | Path, unchecked: bool = False) -> Result:
 
 def _go_through(result: Result) -> None:
     """Touch whatever readers of a result may read, however much of it is broken."""
-    for dataset in (*result.layout.datasets, *result.layout.grid):
+    for dataset in result.layout.datasets:
         # One broken dataset must not hide the next one from the trial.
         with suppress(StudyError):
             found = result.file.plain(dataset.path)

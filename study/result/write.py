@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,17 +107,13 @@ class ResultWriter:
     def _index(self, row: int) -> tuple[int, ...]:
         return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
 
-    def read(self, path: str, index: Any = ()) -> np.ndarray:
-        """Any dataset, named below ``/study`` (``e_n/ccm``) or from the root, or what it has at an index."""
-        return self._file[path if path.startswith("/") else f"{ROOT}/{path}"][index]
+    def read(self, path: str) -> np.ndarray:
+        """Any dataset below ``/study`` (``e_n/ccm``)."""
+        return self._file[f"{ROOT}/{path}"][()]
 
     def result(self) -> Result:
         """The same file for reading; not to be closed by itself."""
         return Result(self.path, GuardedFile(self.path, self._file))
-
-    def fill(self, path: str, start: int, values: np.ndarray) -> None:
-        """Write rows of a dataset that is no part of a case's row, from ``start`` on; by one rank, after all rows."""
-        self._file[path][start : start + len(values)] = values
 
     def write_report(self, text: str) -> None:
         """Write the report, cut where it is too long; by one rank, after all rows."""
@@ -226,12 +221,10 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
                 f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
             )
             raise StudyError(OTHER_FILE, text)
-        # How the object was cut into triangles may differ in the last bit on another machine; the file's own counts.
-        same = replace(layout, surface=result.layout.surface)
-        if result.layout.shape != layout.shape or result.layout.options() != same.options():
+        if result.layout.shape != layout.shape or result.layout.options() != layout.options():
             text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
-        for dataset in (*result.layout.datasets, *result.layout.grid):
+        for dataset in result.layout.datasets:
             if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
                 text = f"{path}: was repacked and cannot be written in parallel any more; choose another file with -o"
                 raise StudyError(OTHER_FILE, text)

@@ -18,7 +18,6 @@ from softjaw.study.case.fit import decided
 from softjaw.study.case.variations import changes, probe_candidates, with_probes
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
-from softjaw.study.result.grid_surface import surface_of
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.run.estimate import START, estimated
@@ -80,9 +79,9 @@ def make_plan(
         own = grasps.units(scene, lambda point: point.axis_symmetry) if scene.uncertainty.parts else []
         scene = refined(scene, rounds, probe_candidates(scene, own))
     patches = scene.output.patches != "none"
-    pad_faces = pad_shape(scene.gripper).patch_faces if patches else (0, 0)
+    faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     axes = tuple(grasps.axes(scene))
-    surface, placed = surface_of(scene, axes), own_frame(scene.object)
+    placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
     if ordered or scene.candidates.solve_best is not None or scene.candidates.skip_hopeless:
         from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
@@ -97,12 +96,11 @@ def make_plan(
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        surface=surface._replace(points=placed.to_object(surface.points)),
         placed=placed,
     )
     layout = Layout(
         axes,
-        math.prod(pad_faces),
+        faces,
         scene.accuracy.meshes,
         patches,
         tuple(derived(scene)),
@@ -111,8 +109,6 @@ def make_plan(
         has(scene),
         scene.limit_surface.samples,
         scene.sampled,
-        surface.counts,
-        pad_faces,
         probes,
         changes(scene) if probes else (),
         rounds,
@@ -195,9 +191,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
-    parts = {"deformed walls": shapes, "the view for ParaView": sum(d.nbytes for d in layout.grid) / 1e6}
-    space = f"{layout.nbytes / 1e6:.1f} MB in {path}"
-    space += "".join(f", {size:.1f} MB of it {what}" for what, size in parts.items() if size)
+    space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + f", {shapes:.1f} MB of it deformed walls" * bool(shapes)
     free = _free(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",

@@ -179,7 +179,6 @@ LIES = {
     "patches that are not there": options(patches=True, faces=10**6),
     "samples": options(samples=10**5, sampled=[0, 1]),
     "samples of nothing": options(samples=10**5, sampled=[-1]),
-    "a grid": options(surface=[10**7, 10**7], front=[100, 100]),
     "derived of no axis": options(derived=[{**DERIVED, "axes": ["q"]}]),
     "derived of great shape": options(derived=[{**DERIVED, "shape": [10**9, 10**9, 10**9]}]),
     "derived elsewhere": options(derived=[{**DERIVED, "name": "../../x", "units": 3, "long_name": [], "shape": [-1]}]),

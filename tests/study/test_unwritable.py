@@ -27,7 +27,7 @@ COMMANDS = {
     "report": ("report", "FILE", "-o", "PLACE/x.html"),
     "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
     "view: picture": ("view", "FILE", "--screenshot", "PLACE/x.png"),
-    "view: grids": ("view", "FILE", "--vtkhdf", "PLACE/x.vtkhdf"),
+    "export: vtk": ("export", "FILE", "--format", "vtk", "-o", "PLACE/x.vtm"),
     "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
     "init": ("init", "bottle", "-o", "PLACE/x"),
     "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),

@@ -11,7 +11,6 @@ import xarray as xr
 from softjaw.study.flags import Flag
 from softjaw.study.page import Block, heading, label, plot
 from softjaw.study.quantities import MODELS
-from softjaw.study.result.grid_surface import scene_at, undeformed
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -26,6 +25,7 @@ from softjaw.study.show.grasps import (
     place,
     spoken,
 )
+from softjaw.study.show.object_surface import scene_at, undeformed
 from softjaw.study.show.view.model import View
 
 # map, title, factor from SI; "F" divides by the normal force

@@ -17,7 +17,6 @@ from softjaw.study import pictures
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, heading, page, text
 from softjaw.study.quantities import FAILED, FIRST, NO_GRASP
-from softjaw.study.result.grid_surface import edges
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import (
     Index,
@@ -32,6 +31,7 @@ from softjaw.study.show.grasps import (
     number,
     quantity,
 )
+from softjaw.study.show.object_surface import edges
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
 from softjaw.study.show.view.model import Place, View, read_scene, view_of
 from softjaw.study.show.view.object3d import object_block

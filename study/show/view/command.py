@@ -11,9 +11,9 @@ from pathlib import Path
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, beside, write_file
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import judge
-from softjaw.study.show.view import grids, model, object3d, window
+from softjaw.study.show.view import model, object3d, window
 
-ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm"), "vtkhdf": (".vtkhdf", ".hdf")}
+ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm")}
 
 
 def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
@@ -32,7 +32,7 @@ def view(options: Namespace) -> None:
     """
     paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
     if not paths and not has_screen():
-        text = "no screen for a window: found none of --html, --screenshot and --vtkhdf, expected one of them"
+        text = "no screen for a window: found neither --html nor --screenshot, expected one of them"
         raise StudyError(USAGE, text)
     found, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
     quantity, written = model.quantity_of(found.ds, options.quantity), []
@@ -43,8 +43,6 @@ def view(options: Namespace) -> None:
     if "html" in paths:
         html = object3d.view_page(found, index, quantity, options.motion)
         written.append(write_file(paths["html"], html))
-    if "vtkhdf" in paths:
-        written += grids.write_grids(found, index, paths["vtkhdf"])
     for path in written:
         print(f"written: {path}")
     if not written:

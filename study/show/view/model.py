@@ -18,11 +18,10 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
 from softjaw.study.quantities import ALONG, AROUND, DONE, FAILED, NO_GRASP, STATES, TABLE
 from softjaw.study.ranking import nearest
-from softjaw.study.result.grid_surface import Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.result.read import axes_of, read_field, read_patch
-from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
+from softjaw.study.show.object_surface import NOBODY, Surface, Wall, scene_at, surface_of, undeformed, wall_of
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 

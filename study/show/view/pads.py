@@ -11,7 +11,6 @@ import xarray as xr
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.contact import LOADED
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.vtkhdf import corners_of
 from softjaw.study.show.grasps import Index, at
 
 LIFT = 2e-4  # how far off the object contact faces are drawn, besides where they overlap it [m]
@@ -118,6 +117,21 @@ class Pad:
         most = np.linalg.norm(force, axis=1).max(initial=1e-300)
         start = 1e3 * (places - (self.lift + 3 * LIFT) * self.approach)
         return np.stack([start, start + longest * force / most], axis=1)
+
+
+def corners_of(centres: np.ndarray) -> np.ndarray:
+    """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``, continued beyond the rim."""
+    for axis in (0, 1):
+        c = np.moveaxis(centres, axis, 0)
+        if len(c) > 1:
+            # Continued by a line and averaged: the outermost corners lie half a face beyond the centres.
+            c = np.concatenate([2 * c[:1] - c[1:2], c, 2 * c[-1:] - c[-2:-1]])
+            c = 0.5 * (c[1:] + c[:-1])
+        else:
+            # A single face has no neighbour to take the pitch from.
+            c = np.concatenate([c, c])
+        centres = np.moveaxis(c, 0, axis)
+    return centres
 
 
 def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces, placed: Pose) -> list[Pad]:

@@ -12,8 +12,8 @@ import pyvista as pv
 from softjaw.study.pictures import COLOURS, INK
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 from softjaw.study.ranking import nearest
-from softjaw.study.result.vtkhdf import NOBODY
 from softjaw.study.show.grasps import Index, forces, label_of
+from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import CROSSED, LONGEST, NEUTRAL, OPEN, View

@@ -1,4 +1,4 @@
-"""A result file opens as plots in the tools people have: silx, nexusformat, xarray, h5ls, h5web in a browser, ParaView.
+"""A result file opens as plots in the tools people have: silx, nexusformat, xarray, h5ls, h5web in a browser.
 
 They live in an environment of their own (``tests/browse``), made once in the user's cache and used again: minutes the
 first time. Where it cannot be had the tests that need it are skipped and say what was missing.
@@ -17,11 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
 
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
-from tests.study.result.test_vtkhdf import steps_of
 
 pytestmark = [pytest.mark.long, pytest.mark.launches]
 
@@ -149,22 +147,3 @@ def test_h5web_opens_at_the_map_with_its_axes(result, web, tmp_path):
     assert "n 2 2 3" in told["seen"]  # forces, angles, stations
     assert told["canvases"] == 1
     assert colours(tmp_path / "h5web.png") > 6
-
-
-def test_pyvista_opens_the_result_file_itself(result):
-    """At every force the pads' pressures add up to S of both fingers, and the maps stand on the object."""
-    grid = pv.read(result)
-    assert isinstance(grid, pv.UnstructuredGrid)
-    with open_result(result) as read:
-        S, quality = read.read("fingers/S"), read.read("quality/ccm")
-    for k, (force, grid) in enumerate(steps_of(result)):
-        assert force == k + 1
-        load = grid["pressure"] * grid.compute_cell_sizes()["Area"]
-        for candidate in range(6):
-            here = np.divmod(candidate, 2)
-            for finger in (0, 1):
-                own = (grid["candidate"] == candidate) & (grid["part"] == 1 + finger)
-                assert load[own].sum() == pytest.approx(S[(*here, k, finger)], rel=0.1)  # corners are rebuilt
-            shown = grid["quality"][(grid["candidate"] == candidate) & (grid["part"] == 0)]
-            assert len(shown) > 0
-            assert shown == pytest.approx(np.full(len(shown), quality[(*here, k)]), rel=1e-6)

@@ -19,7 +19,6 @@ from softjaw.study.result.layout import VERSION, Derived, Header, Layout, layout
 from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.skeleton import axes_of, create, groups, text_bytes, view_slice
 from softjaw.study.result.store import StoredAxis, open_result, torn_rows
-from softjaw.study.result.vtkhdf import Surface
 from softjaw.study.result.write import ResultWriter, blank, record, verify
 from tests.study.fake_run import fake_result
 
@@ -126,10 +125,9 @@ def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,), surface=(3, 1), pad_faces=(2, 2),
+    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,),
                    probes=(1,), variations=("mu", "pose"))  # fmt: skip
-    surface = Surface(np.eye(3), np.array([[0, 1, 2]]), np.array([0]))
-    create(tmp_path / "whole.hdf", layout, replace(HEADER, surface=surface))
+    create(tmp_path / "whole.hdf", layout, HEADER)
     seen = set()
 
     def look(name, node):
@@ -146,9 +144,6 @@ def test_every_dataset_says_what_it_is(tmp_path):
     with h5py.File(tmp_path / "whole.hdf") as file:
         file["study"].visititems(look)
         assert seen == set(BY_KEY)  # every dataset has a row, every row a dataset
-        for path in ("Points", *(f"CellData/{name}" for name in file["VTKHDF/CellData"])):
-            assert file[f"VTKHDF/{path}"].attrs["long_name"]
-            assert isinstance(file[f"VTKHDF/{path}"].attrs["units"], str)
         assert "Fibonacci" in file["study/provenance"].attrs["sampling"]
         for q in layout.quantities:
             assert f"{q.key} [" in file["study/definitions"][()].decode()

@@ -16,15 +16,14 @@ from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.grid_surface import Cells, Wall, areas, between, coloured, cut
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.result.vtkhdf import NOBODY, corners_of
 from softjaw.study.show.grasps import judge, order
+from softjaw.study.show.object_surface import NOBODY, Cells, Wall, areas, between, coloured, cut
 from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
-from softjaw.study.show.view.pads import pads_of
+from softjaw.study.show.view.pads import corners_of, pads_of
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
 
@@ -295,14 +294,13 @@ def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeyp
 def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
     for words, code in (
         (["--screenshot", tmp_path / "a.jpg"], USAGE),
-        (["--vtkhdf", file], USAGE),
         (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
         (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
         (["--station", "500", "--html", tmp_path / "a.html"], USAGE),
     ):
         assert main(["view", str(file), *map(str, words)]) == code
     errors = capsys.readouterr().err.splitlines()
-    assert len(errors) == 5
+    assert len(errors) == 4
     assert all(line.startswith("error: ") for line in errors)
     assert main(["view", str(tmp_path / "no.hdf"), "--html", str(tmp_path / "a.html")]) == OTHER_FILE
     assert not list(tmp_path.iterdir())

@@ -18,7 +18,6 @@ from softjaw.study.case.choosing import Candidate
 from softjaw.study.flags import Flag
 from softjaw.study.ranking import borne_level, judged, ranking
 from softjaw.study.result import derived
-from softjaw.study.result.grid_surface import undeformed
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
 from softjaw.study.result.skeleton import create
@@ -27,6 +26,7 @@ from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.grasps import at, judge
+from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
 from softjaw.study.show.tables.show import as_csv, as_json, as_text, best

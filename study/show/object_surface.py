@@ -1,24 +1,32 @@
 """The surfaces of a result's object: cut along the cells of its candidates, and where its wall's stored places lie.
 
-Positions are in the object's frame [m]. The grid in the file and every display draw from here.
+Positions are in the object's frame [m]. Every display and the export for ParaView draw from here.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.vtkhdf import NOBODY, Surface
 from softjaw.study.scene.problems import SceneError
 
 ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]
 FINER = 6  # places between those of the file among which the nearest is searched
+NOBODY = -1  # candidate of triangles that no candidate grasps
+
+
+class Surface(NamedTuple):
+    """Triangles of the object: ``points (n, 3)`` [m], ``triangles (m, 3)``, ``candidate (m,)``, -1 for none."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    candidate: np.ndarray
 
 
 def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> Surface:
