@@ -10,7 +10,6 @@ PAGE    = $(RESULT:.hdf=.html)
 PICTURE = $(RESULT:.hdf=.png)
 FIGURES = results/figures
 BIN     = .venv/bin
-LIMIT   = timeout -k 30
 # Of the benchmark: any of kernels linearised element contact factors getfem map; all if empty.
 PARTS   =
 # Of the random scenes and bodies of `make objects`: the page of 0 is kept in docs, those of others beside their results.
@@ -30,26 +29,17 @@ endif
 # It also refuses to start more ranks than there are cores; asked for when the recipe runs, after the set-up.
 AS_ROOT = OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 MPIRUN = mpirun -n $(RANKS)$(shell $(AS_ROOT) mpirun -n $(RANKS) true > /dev/null 2>&1 || echo ' --oversubscribe')
-# Two files of tests at a time; leave it out where pytest-xdist is missing.
-TWO = -n 2 --dist loadfile
-# Tests in random positions, of which the long run takes more.
-DECISIONS = $(wildcard tests/*/test_*decisions.py)
-# Tests whose numbers could depend on the kernel of the BLAS.
-NUMERICAL = tests/friction tests/lsfit tests/scoring tests/fem $(wildcard tests/test_*friction*.py \
-    tests/test_*decision*.py) tests/test_blas.py
 RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup map figures effects test test-blas test-long test-slurm bench hard-cases objects docs lint doctor
+.PHONY: help setup map figures effects test test-long bench hard-cases objects docs lint doctor
 
 help:
 	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
 	@echo 'make figures    the figures of the paper, into $(FIGURES)'
 	@echo 'make effects    indicators of the effects against true errors, into results/effects.csv and .png'
-	@echo 'make test       the tests, first without MPI, then on $(RANKS) ranks, then as test-blas'
-	@echo 'make test-blas  the numerical tests with each kernel of OpenBLAS that this CPU can run (OPENBLAS_CORETYPE)'
-	@echo 'make test-long  the checks that take minutes'
-	@echo 'make test-slurm the shipped batch script under a Slurm of one node, killed by its time limit; needs root'
+	@echo 'make test       the tests: on one rank, then on several what can depend on ranks; five minutes'
+	@echo 'make test-long  all else: kernels of the BLAS, hard cases, fuzzing, kills, Slurm; STAGES=slurm for one stage'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
 	@echo 'make objects    scans, hollow bodies, mugs and random scenes, into docs/objects.md; SEED=7 for others'
@@ -79,25 +69,9 @@ effects: setup
 	$(BIN)/python jobs/effects.py results/effects.csv
 	@$(BIN)/python jobs/effects.py results/effects.csv -o results/effects.png
 
-test: setup
-	$(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO)
-	$(LIMIT) 12m ./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no -m "not long and not launches"
-	@$(MAKE) --no-print-directory test-blas
-
-# Kernels end sums in other bits: a decision that hangs on them shows here.
-test-blas: setup
-	@for kernel in $$($(BIN)/python -m tests.blas); do \
-	    echo "OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q $(TWO) $(NUMERICAL)"; \
-	    OPENBLAS_CORETYPE=$$kernel $(LIMIT) 12m $(BIN)/python -m pytest -q $(TWO) $(NUMERICAL) || exit; \
-	done
-
-test-long: setup
-	$(BIN)/python -m pytest -q $(TWO) -m long --durations 10
-	TURNS=200 $(BIN)/python -m pytest -q $(TWO) $(DECISIONS)
-	./tests/on_ranks.sh $(MPIRUN) $(BIN)/python -m mpi4py -m pytest -q --color=no --every-rank -m "not long and not launches"
-
-test-slurm: setup
-	./tests/slurm/cluster.sh results/slurm/cluster $(BIN)/python -m tests.slurm.time_limit
+# STAGES names some of the stages that the last lines list: make test-long STAGES="slurm kernel-Zen"
+test test-long: setup
+	@$(BIN)/python -m tests.stages $@ $(STAGES)
 
 # mkdocs lies outside of .venv: it brings colorama, which numba then uses to write to the output of every run.
 docs: setup

@@ -93,7 +93,6 @@ def test_the_tutorial_shows_the_scene_that_it_runs():
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_the_site_is_built_and_needs_no_network():
     done = subprocess.run(["make", "docs"], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     if "could not find a version" in done.stderr.lower():

@@ -54,7 +54,6 @@ def test_a_measured_field_is_judged(here):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("name", SOLVING)
 def test_scripts_that_solve(name, tmp_path):
     done = subprocess.run(
@@ -81,7 +80,6 @@ PAGE = blocks("docs/python.md")
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_the_page_on_python_runs_as_it_stands(here, capsys):
     (here / "jobs").symlink_to(ROOT / "jobs")
     found = {}

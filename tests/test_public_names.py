@@ -94,7 +94,6 @@ def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_all_but_solving_works_anywhere_without_petsc_and_mpi(once, shared_path):
     path = once(make, shared_path / "a.hdf")
 

@@ -34,8 +34,6 @@ def slow(block: list[str]) -> bool:
     return any(("softjaw run " in line and FIRST not in line) or SOLVES.search(line) for line in block)
 
 
-pytestmark = pytest.mark.launches
-
 
 def as_typed(line: str) -> str:
     """The line with an mpirun that this machine accepts."""
@@ -85,7 +83,16 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("block", [b for b in SOFTJAW if b and not slow(b)], ids=lambda b: b[0][:60])
+def blocks(of_many_minutes: bool) -> list:
+    """Blocks that are slow, or those that are not; marked where ranks are started."""
+    return [
+        pytest.param(block, id=block[0][:60], marks=[pytest.mark.ranks] if "mpirun" in " ".join(block) else [])
+        for block in SOFTJAW
+        if block and slow(block) == of_many_minutes
+    ]
+
+
+@pytest.mark.parametrize("block", blocks(False))
 def test_commands_of_a_block(block, folder):
     if any("results/smoke.hdf" in line for line in block) and not any(" run " in line for line in block):
         pytest.fail("a block must make the file that it shows")
@@ -93,7 +100,7 @@ def test_commands_of_a_block(block, folder):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("block", [b for b in SOFTJAW if slow(b)], ids=lambda b: b[0][:60])
+@pytest.mark.parametrize("block", blocks(True))
 def test_commands_that_take_longer(block, folder):
     run_in(folder, block)
 

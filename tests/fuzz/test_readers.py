@@ -85,7 +85,6 @@ def slow(tmp_path_factory):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("kind", [*QUICK, *SLOW])
 def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_path, slow, kind):
     reader = {**QUICK, **slow}[kind]

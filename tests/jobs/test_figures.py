@@ -163,7 +163,6 @@ def data(coarse):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.name)
 def test_every_figure_is_drawn_from_coarse_results(coarse, tmp_path, figure):
     assert "nan" not in draw(figure, coarse, tmp_path / "x.png")
@@ -171,7 +170,6 @@ def test_every_figure_is_drawn_from_coarse_results(coarse, tmp_path, figure):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_the_script_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_path):
     words = ("-m", "mpi4py", "-m", "jobs.figures", "5a", "--results", tmp_path, "-o", tmp_path / "a.png")
     for ranks in (2, 0):
@@ -182,7 +180,6 @@ def test_the_script_solves_on_two_ranks_and_goes_on_from_what_is_solved(tmp_path
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, data, tmp_path):
     off = data("fig5-candidate").finger_frame_origin.values[0, 0, 0, 0]
     assert np.hypot(*off[:2]) > 0.015  # of pads that reach 25 mm to both sides
@@ -194,7 +191,6 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("name", ["bottle", "cup", "fig4-curvature", "fig5-candidate", "fig7-force-study"])
 def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
     found = data(name)
@@ -207,7 +203,6 @@ def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_fig7_torque_e_n_and_score_grow_with_the_force_and_so_does_what_the_planar_model_claims_too_much(data):
     lines = {name: values for name, (_, values) in studies.over_force(data("fig7-force-study")).items()}
     for name in ("torque", "e_n", "score"):
@@ -222,7 +217,6 @@ def test_fig7_torque_e_n_and_score_grow_with_the_force_and_so_does_what_the_plan
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_fig8_a_indentation_lowers_the_quality_but_raises_e_n_and_the_best_place_is_not_the_widest(data):
     walled, rigid = data("bottle"), data("bottle, rigid")
     ratio = {name: field(walled, name)[..., 1] / field(rigid, name)[..., 1] for name in ("e_n", "quality")}

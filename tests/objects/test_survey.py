@@ -83,7 +83,6 @@ def test_what_was_found_is_kept(tmp_path):
     assert json.loads((tmp_path / "one.json").read_text())["seconds"] == 100.0
 
 
-@pytest.mark.launches
 def test_a_command_that_hangs_is_stopped(tmp_path):
     assert said(["sleep", "60"], tmp_path, 0.1)[:2] == (None, "")
     code, _, seconds = said(["sh", "-c", "while :; do :; done"], tmp_path, 0.4)
@@ -93,7 +92,6 @@ def test_a_command_that_hangs_is_stopped(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_random_scenes_are_solved(tmp_path):
     options = Namespace(seed=SEED, results=tmp_path)
     (tmp_path / "random").mkdir()
@@ -107,7 +105,7 @@ def test_random_scenes_are_solved(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("start", ["mustard bottle", "mug in one", "bowl 0"])
 def test_an_object_is_solved_in_time(start, tmp_path):
     name = next(name for name in user_objects(SEED) if name.startswith(start))

@@ -9,15 +9,16 @@ shift
 PATH=$PATH:/usr/sbin
 say() { printf 'slurm: %s\n' "$*"; }
 fail() { printf 'slurm: %s\n' "$@" >&2; exit 1; }
+cannot() { printf 'slurm: %s\n' "$@" >&2; exit 77; } # nothing was tried
 
-[ "$(id -u)" = 0 ] || fail "slurmd has to be started by root"
+[ "$(id -u)" = 0 ] || cannot "slurmd has to be started by root"
 for program in munged slurmctld slurmd sbatch; do command -v $program > /dev/null || missing=1; done
 if [ -n "${missing:-}" ]; then
-    command -v apt-get > /dev/null || fail "munge, slurmctld, slurmd and slurm-client are not installed, nor is apt-get"
+    command -v apt-get > /dev/null || cannot "munge, slurmctld, slurmd and slurm-client are not installed, nor is apt-get"
     say "installing Debian's munge, slurmctld, slurmd and slurm-client"
     apt-get update -qq || true
     DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends munge slurmctld slurmd slurm-client \
-        > "$folder/apt.log" 2>&1 || fail "apt-get could not install Slurm; see $folder/apt.log"
+        > "$folder/apt.log" 2>&1 || cannot "apt-get could not install Slurm; see $folder/apt.log"
 fi
 
 # munged refuses folders that others may write to, such as those below /tmp

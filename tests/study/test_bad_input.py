@@ -18,8 +18,6 @@ from softjaw.study.flags import Flag
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, softjaw
 
-pytestmark = pytest.mark.launches
-
 SCENE = """[object]
 shape = "sphere"
 radius_mm = 30
@@ -161,7 +159,7 @@ def every_rank(folder, *words):
     return [int(line[5:]) for line in done.stdout.splitlines() if line.startswith("code ")], done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.ranks
 def test_all_ranks_leave_a_wrong_scene_with_the_same_code(once, folder):
     codes, errors = once(every_rank, folder, "--set", "friction.mu=-1")
     assert codes == [2, 2]
@@ -170,7 +168,7 @@ def test_all_ranks_leave_a_wrong_scene_with_the_same_code(once, folder):
     assert not list(folder.glob("out.hdf*"))
 
 
-@pytest.mark.long
+@pytest.mark.ranks
 def test_all_ranks_leave_a_file_of_others_with_the_same_code(once, folder):
     once((folder / "out.hdf").write_text, "my notes")
     codes, errors = once(every_rank, folder)

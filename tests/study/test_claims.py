@@ -76,7 +76,6 @@ def test_friction_that_acts_back_is_taken_where_it_moves_e_n():
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_claims_of_the_lookup_hold(tmp_path):
     """Between the stations and forces of the bottle's map, on cases that it does not hold.
 

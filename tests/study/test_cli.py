@@ -281,7 +281,6 @@ def processor_seconds(*command):
     return min(spent)
 
 
-@pytest.mark.launches
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once):
     modules, code = once(lambda: loaded(*QUICK[command](scene, finished)))
@@ -291,7 +290,6 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished, once):
     words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
@@ -300,7 +298,7 @@ def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, 
     assert spent[0] < 2.0 * spent[1]
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_bad_scene_is_told_once_by_all_ranks_together(once, tmp_path):
     code, output, errors = once(lambda: launch(2, "-m", "softjaw", "run", tmp_path / "no.toml"))
     assert code == 2
@@ -315,7 +313,6 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
     def piped():
         small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0] --set accuracy.meshes=1"

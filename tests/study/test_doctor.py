@@ -15,7 +15,7 @@ def answering(code, output="", errors=""):
     return lambda *_, **__: Answer(code, output, errors)
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_all_is_well_on_a_machine_that_was_set_up(capsys):
     assert doctor.doctor() == 0, capsys.readouterr().out
     lines = capsys.readouterr().out.splitlines()
@@ -95,13 +95,12 @@ def test_a_check_that_fails_itself_does_not_hide_the_others(monkeypatch, capsys)
     assert good.startswith("fine")
 
 
-@pytest.mark.launches
 def test_a_crash_and_a_hang_are_answers():
     assert ask("import os; os.abort()").trouble == "ended with exit code -6"
     assert ask("import time; time.sleep(60)", limit=0.5).trouble == "no answer in time"
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_two_ranks_see_each_other_whatever_started_this_process():
     told = "from mpi4py import MPI; sizes = MPI.COMM_WORLD.gather(MPI.COMM_WORLD.size); sizes and print(sizes)"
     answer = ask(told, prefix=tuple(doctor.mpirun(2)))
@@ -127,7 +126,6 @@ def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
 
 
-@pytest.mark.launches
 def test_the_doctor_loads_no_mpi_itself():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
     assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").output == "set()"

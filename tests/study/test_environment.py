@@ -67,7 +67,6 @@ def test_folders_are_judged_without_being_made(tmp_path):
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]
 
 
-@pytest.mark.launches
 def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
     def told():
         # a home that cannot be, and packages that numba could not write beside

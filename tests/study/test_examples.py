@@ -14,7 +14,7 @@ from softjaw.study.cli import program
 from softjaw.study.doctor import launch_environment
 from tests.study.launching import ROOT, launch
 
-pytestmark = [pytest.mark.long, pytest.mark.launches]
+pytestmark = pytest.mark.long
 SOLVING = ("cost",)  # minutes, and tested elsewhere; that their examples are well formed is tested in test_cli
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
 EXAMPLES = [

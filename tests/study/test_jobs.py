@@ -48,7 +48,6 @@ def run(name, path, *words):
     return softjaw(0, "run", JOBS[name], "-o", path, *words)
 
 
-@pytest.mark.launches
 def test_the_smoke_scene_runs_as_it_is(once, shared_path):
     path = shared_path / "smoke.hdf"
     code, output, errors = once(run, "smoke", path)
@@ -68,7 +67,6 @@ def quick(names, *chosen):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("name", ONE)
 def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
     path = shared_path / f"{name}.hdf"
@@ -86,7 +84,6 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
         assert result.read("checks/min_det_f").min() > 0
 
 
-@pytest.mark.launches
 @pytest.mark.parametrize("name", quick(WALLED, "bottle"))
 def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
     path, (overrides, indentations) = shared_path / f"{name}.hdf", WALLED[name]
@@ -107,7 +104,6 @@ def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared
             assert np.isfinite(wrenches).all()
 
 
-@pytest.mark.launches
 def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw_it(once, shared_path):
     path = shared_path / "fig4.hdf"
     words = "--set", "gripper.elements=[8, 20, 4]", "--set", 'effects.friction_pressure_coupling="none"'

@@ -21,7 +21,7 @@ from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
 
-pytestmark = [pytest.mark.long, pytest.mark.launches]
+pytestmark = [pytest.mark.long, pytest.mark.ranks]
 VICTIMS = ("one rank", "all ranks", "mpirun")
 KILLS, ALL_KILLS = 6, 50  # of each file at most, and of all files at least
 OPTIONS = ("--stations", 14, "--retry-failed")  # two kills in one case would mark it as deadly

@@ -106,7 +106,6 @@ def smoke(tmp_path, *words, addresses=None, ranks=0):
     return done.returncode, done.stderr
 
 
-@pytest.mark.launches
 @pytest.mark.parametrize("kilobytes", [300_000, 700_000, 850_000, 900_000, 1_100_000])
 def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
     """From 0.8 to 0.92 GB the run's first product in BLAS asked for memory for ever; below, and above, it crashed."""
@@ -118,13 +117,12 @@ def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_a_run_with_enough_addresses_starts_and_ends(tmp_path):
     assert smoke(tmp_path, addresses=int(1.3e9))[0] == messages.DONE
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_least_memory_that_a_scene_may_set_is_enough_on_every_rank(tmp_path, ranks):
     """The second rank made its first product in BLAS within the bound, and asked for ever for 128 MB."""
@@ -205,7 +203,7 @@ def whole(folder, *words):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     ("how", "ranks", "text"),
     [
@@ -230,7 +228,7 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(once, shared_path, 
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("how", ["hang", "stuck"])
 def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(once, shared_path, how):
     path = shared_path / f"{how}.hdf"
@@ -246,7 +244,7 @@ def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(onc
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(once, shared_path):
     path = shared_path / "alone.hdf"
     for _ in range(2):
@@ -259,7 +257,7 @@ def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
 def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(once, shared_path, how, ranks):
     path = shared_path / "lost.hdf"
@@ -298,7 +296,7 @@ def fill(folder):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_disk_that_fills_up_during_the_run_does_no_harm(once, small_disk):
     """All space of the file was taken when it was made."""
     path = small_disk / "full.hdf"
@@ -315,7 +313,7 @@ def test_a_disk_that_fills_up_during_the_run_does_no_harm(once, small_disk):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(once, small_disk):
     """The file's space is given back by hand, as a file system that copies on write would have to take it anew."""
     path = small_disk / "holes.hdf"
@@ -342,7 +340,7 @@ def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_wha
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
     path = small_disk / "readonly.hdf"
 
@@ -360,7 +358,7 @@ def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
 def test_more_ranks_than_cores_or_load_paths(once, shared_path, stations, ranks):
     path = shared_path / "many.hdf"
@@ -370,7 +368,7 @@ def test_more_ranks_than_cores_or_load_paths(once, shared_path, stations, ranks)
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [3, 4])
 def test_an_exception_on_one_rank_ends_all_with_one_traceback(once, shared_path, ranks):
     code, _, errors = once(study, ranks, shared_path / "bug.hdf", "--bug", 2)
@@ -379,7 +377,7 @@ def test_an_exception_on_one_rank_ends_all_with_one_traceback(once, shared_path,
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1"])
 def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(once, shared_path, name):
     """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""

@@ -186,7 +186,7 @@ def test_scenes_of_poses_and_samplers_can_be_refined():
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kill(once, shared_path):
     scene = shared_path / "box.toml"
 

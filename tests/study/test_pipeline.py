@@ -414,7 +414,6 @@ print(state.closing)
 
 
 @pytest.mark.long
-@pytest.mark.launches
 def test_a_changed_material_takes_effect_although_its_callers_were_compiled_before(tmp_path):
     """A foam twice as stiff yields less, also with the machine code of the last run at hand."""
     root = Path(__file__).parents[2]

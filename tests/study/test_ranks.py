@@ -17,7 +17,7 @@ from softjaw.study.run.shares import shares
 from softjaw.study.scene import parse_scene
 from tests.study.launching import ROOT, contents, differing, softjaw, wait_for
 
-pytestmark = pytest.mark.launches
+pytestmark = pytest.mark.ranks
 
 # Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
 SCENE = """

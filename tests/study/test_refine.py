@@ -165,7 +165,7 @@ def same_bits(scene, expected, own):
 
 
 @pytest.mark.long
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_path):
     scene = shared_path / "vase.toml"
 

@@ -16,7 +16,7 @@ from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
 from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import ROOT, contents, differing, start, study, wait_for
 
-pytestmark = pytest.mark.launches
+pytestmark = pytest.mark.ranks
 
 
 def states(path):

@@ -47,7 +47,7 @@ def claims(ranks, **values):
     return eval(done.stdout.strip().replace("] [", "], ["))
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_every_position_goes_to_one_rank_and_a_slow_rank_takes_fewer(once):
     taken, _ = once(lambda: claims(3, count=60))
     assert sorted(list(chain(*taken))) == list(range(60))
@@ -55,7 +55,7 @@ def test_every_position_goes_to_one_rank_and_a_slow_rank_takes_fewer(once):
     assert len(taken[0]) < min(len(taken[1]), len(taken[2]))
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_nodes_take_positions_in_turn(once):
     """Ranks 0 and 2 share one memory, rank 1 has its own: even positions there, odd ones here."""
     taken, _ = once(lambda: claims(3, count=21, color="comm.rank % 2"))
@@ -63,14 +63,14 @@ def test_nodes_take_positions_in_turn(once):
     assert taken[1] == list(range(1, 21, 2))
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 @pytest.mark.parametrize("count", [pytest.param(0, marks=pytest.mark.long), 1])
 def test_more_ranks_than_work(once, count):
     taken, _ = once(lambda: claims(3, count=count))
     assert list(chain(*taken)) == list(range(count))
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_stop_reaches_the_other_ranks(once):
     taken, stopped = once(lambda: claims(2, count=100_000, stop=20))
     assert stopped == [True, True]

@@ -12,7 +12,6 @@ from softjaw.study.cli import main
 from softjaw.study.scene.start import HERE
 from tests.study.launching import ROOT, wait_for
 
-pytestmark = pytest.mark.launches
 SHARED = "# ---- the same in all scripts"
 SCRIPTS = sorted((ROOT / "jobs" / "slurm").glob("*.sbatch"))
 # The first start works until USR1 comes and then has cases missing; the next one finishes.

@@ -12,7 +12,7 @@ import pytest
 from softjaw.study.doctor import launch_environment
 from tests.study.launching import ROOT, contents, differing, launch
 
-pytestmark = [pytest.mark.long, pytest.mark.launches]
+pytestmark = [pytest.mark.long, pytest.mark.ranks]
 NODES = ROOT / "tests" / "two_nodes.sh"
 
 

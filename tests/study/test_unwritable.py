@@ -90,14 +90,12 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
     assert list(file.parent.iterdir()) == [file]
 
 
-@pytest.mark.launches  # where the ranks of the tests would start a run together
 def test_a_run_says_what_it_cannot_write(tmp_path, capfd):
     with read_only(tmp_path, {}):
         code = main(["run", SMOKE, "-o", str(tmp_path / "x.hdf")])
     refused(code, capfd.readouterr().err, tmp_path)
 
 
-@pytest.mark.launches
 @pytest.mark.parametrize(
     "command", ["show", "schema", *(pytest.param(n, marks=pytest.mark.long) for n in ("status", "export", "compare"))]
 )

@@ -35,7 +35,7 @@ normal_force_n = [1]
 def poses(*given):
     """A scene with explicit poses (point, approach, long side)."""
     table = "\n[[candidates.poses]]\npoint_mm = {}\napproach = {}\nlong_side = {}"
-    return parse_scene(POSES + "".join(table.format(*map(list, pose)) for pose in given))
+    return parse_scene(POSES + "".join(table.format(*np.asarray(pose, float).tolist()) for pose in given))
 
 
 def about_z(angle):

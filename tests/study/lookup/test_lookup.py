@@ -326,7 +326,6 @@ def test_bounds_of_the_force_are_maps_too(tmp_path):
     assert there.quantities["force_high"][0] == "N"
 
 
-@pytest.mark.launches
 def test_it_needs_neither_mpi_nor_petsc(tmp_path):
     path = make(tmp_path / "a.hdf")
     code = (

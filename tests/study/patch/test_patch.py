@@ -403,7 +403,6 @@ def test_the_example_shows_what_its_closed_form_says(told):
     assert curved["f_y_max"] == pytest.approx(MU * patch["F_N"], rel=1e-6)
 
 
-@pytest.mark.launches
 def test_a_table_is_read_without_mpi_petsc_or_vtk(once):
     words = [
         sys.executable,

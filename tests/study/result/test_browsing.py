@@ -21,7 +21,7 @@ import pytest
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
 
-pytestmark = [pytest.mark.long, pytest.mark.launches]
+pytestmark = pytest.mark.long
 
 BROWSE = ROOT / "tests" / "browse"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -129,7 +129,6 @@ def test_what_is_no_sound_result_file_is_refused(half, tmp_path):
         read_field(half, "wall/place")
 
 
-@pytest.mark.launches
 def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
     code = (
         "import sys, softjaw; from softjaw.study.cli import main; main(['status', sys.argv[1]]);"

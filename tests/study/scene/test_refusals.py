@@ -78,7 +78,7 @@ def test_a_pad_that_just_meets_the_box_round_the_object_is_not_refused(angle):
         parse_scene(BOX + pose([angle, 31.1, 0], "", approach) + LOAD)
 
 
-@pytest.mark.launches
+@pytest.mark.ranks
 def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
     """The ball's corner of its box: only trying tells that the pad passes."""
 
@@ -110,7 +110,6 @@ def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options,
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
 def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
     words = ("-o", shared_path / "out.hdf", "--", *options.split())
@@ -122,7 +121,6 @@ def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, 
     assert not list(shared_path.glob("out.hdf*"))
 
 
-@pytest.mark.launches
 def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
     words = ("-X", "importtime", "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
     code, _, errors = once(lambda: launch(0, *words))

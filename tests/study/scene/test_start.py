@@ -67,7 +67,6 @@ def test_what_is_written_passes_check(kind, tmp_path, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_written_runs(kind, tmp_path):
     assert started(kind, "-o", "mine") == 0

@@ -15,7 +15,6 @@ from tests.study.sealing import sealed
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.launches,
     pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine"),
 ]
 REASON = "</script> convergence <b>lost</b>"

@@ -380,7 +380,6 @@ def test_slider_and_click_of_the_window_change_the_case(shown):
 
 
 @pytest.mark.long
-@pytest.mark.launches
 @pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine")
 def test_the_page_works_in_a_browser(file, tmp_path):
     """Slider, choice and click change what is shown; nothing is asked for from outside."""
