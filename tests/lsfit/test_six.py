@@ -10,7 +10,7 @@ from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import least_squares_quartic
 from softjaw.lsfit.samples import sample_rank, six_samples, sphere_motions
-from softjaw.lsfit.sos import ball_gram, gram_map, least_quadratic, quadratic_map
+from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import convex_span_quartic, span_ellipsoid, span_samples
 from softjaw.lsfit.surface import FitError, FitFlag
 from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
@@ -57,26 +57,6 @@ def test_the_start_is_the_ball_with_a_definite_matrix(d):
     x = ball_gram(d)
     np.testing.assert_allclose(monomials(w, E) @ x[: len(E)], (w**2).sum(axis=1) ** 2, rtol=1e-12)
     assert np.linalg.eigvalsh((gram_map(d) @ x).reshape(d * d, d * d))[0] > 1.99
-
-
-def test_the_nearest_semidefinite_matrix_is_found():
-    """In the Frobenius norm it has the negative eigenvalues replaced by zero."""
-    S = np.random.default_rng(3).normal(size=(5, 5))
-    S = S + S.T
-    values, V = np.linalg.eigh(S)
-    assert values[0] < 0 < values[-1]
-    E = exponents(5, 2)
-    A = quadratic_map(5)
-    H = (A.T @ A).toarray()
-    best = least_quadratic(H, A.T @ S.ravel(), A, (E == 2).any(axis=1).astype(float), tolerance=1e-11)
-    np.testing.assert_allclose(best.X, (V * np.maximum(values, 0)) @ V.T, atol=1e-5)
-    assert best.objective == pytest.approx(-(np.maximum(values, 0) ** 2).sum() / 2, rel=1e-10)
-    assert np.linalg.eigvalsh(best.X)[0] > 0
-
-
-def test_the_interior_point_method_says_when_it_stops_short():
-    with pytest.raises(FitError, match="ended after 2 steps with gap"):
-        least_quadratic(np.eye(3), np.array([1.0, 5.0, -1.0]), quadratic_map(2), np.array([1.0, 0, 1.0]), most=2)
 
 
 def test_a_nearly_flat_patch_ends_where_rounding_lets_it():
