@@ -16,6 +16,7 @@ Blekherman, Parrilo, "Convex ternary quartics are SOS-convex" (2024).
 from __future__ import annotations
 
 from functools import lru_cache
+
 import clarabel
 import numpy as np
 from numpy.typing import NDArray

@@ -140,31 +140,10 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     return np.diag(axes * max(h.min() - SPACING * h.max() / (1 - SPACING), 0))
 
 
-def ellipsoid_near(body: Body) -> FloatArray:
-    """Root ``(3, 3)`` of the quadratic form that fits the squared support best on evenly spread directions."""
-    reach = body.support(np.eye(3))
-    scale = 1 / np.where(reach > 0, reach, 1.0)
-    t = fibonacci_vertices(np.ones(3), 160)
-    i, j = np.triu_indices(3)
-    # an ellipsoid about 0 can only fit the even part of a support
-    h = (body.support(t * scale) + body.support(-t * scale)) / 2
-    fit = np.linalg.lstsq(t[:, i] * t[:, j] / h.max() ** 2, (h / h.max()) ** 2, rcond=None)[0]
-    B = np.zeros((3, 3))
-    B[i, j] += fit / 2
-    B[j, i] += fit / 2
-    return _root(B / np.outer(scale, scale))
-
-
 def _root(B: FloatArray) -> FloatArray:
     """Symmetric root of a symmetric matrix whose eigenvalues are negative by rounding at most."""
     values, vectors = np.linalg.eigh(B)
     return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
-
-
-def check_kind(kind: str) -> None:
-    """Refuse a metric of the normal forces that is neither "linf" nor "l1"."""
-    if kind not in ("linf", "l1"):
-        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
 
 
 def touching_points(body: Body, t: ArrayLike) -> FloatArray:

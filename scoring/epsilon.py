@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import Body, check_kind, ellipsoid_inside, is_ellipsoid, joined
+from softjaw.scoring.bodies import Body, ellipsoid_inside, is_ellipsoid, joined
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.gauge import cone_programme, contact_support, gauge
 from softjaw.scoring.reach import reach
@@ -91,7 +91,8 @@ def epsilon(
     >>> round(epsilon(pads, 1.0, 1.0).upper, 6) == round(0.4 / 1.04**0.5, 6)
     True
     """
-    check_kind(kind)
+    if kind not in ("linf", "l1"):
+        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
     C = np.array([contact.wrench_map(object_length, contact_length, centre_of_mass) for contact in contacts])
     if not len(C):
         raise ValueError("contacts is empty: a grasp needs at least one contact")

@@ -54,7 +54,7 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     tolerance : float
         Gap at which the programmes stop, relative to the value and to the contacts' supports for ``w / |w|^2``.
     """
-    u, z = facing(c, D, w, kind, tolerance)
+    u, z = _facing(c, D, w, kind, tolerance)
     upper = joined(contact_support(c, D, u).T, kind)
     # stationarity reads w ~ sum z_0 c - D' z_1: the multipliers are the loads, friction with the other sign
     lower = _reach(c, D, w, z * [1, -1, -1, -1], kind)
@@ -62,28 +62,14 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     return Gauge(np.minimum(lower, upper), upper, u)
 
 
-def facing(
-    c: FloatArray, D: FloatArray, w: FloatArray, kind: str, tolerance: float, centre: FloatArray | None = None
+def _facing(
+    c: FloatArray, D: FloatArray, w: FloatArray, kind: str, tolerance: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Normals ``u (m, r)``, ``u . w = 1``, where rays along ``w`` leave the grasp wrench space, and multipliers.
-
-    Parameters
-    ----------
-    c, D, w, kind, tolerance
-        As for `gauge`.
-    centre : (r,) array, optional
-        Where the rays begin, an inner point; 0 if not given.
-
-    Returns
-    -------
-    u : (m, r) array
-    z : (m, n, 4) array
-        Multipliers of the contacts' cones, from which the loads at that point follow.
-    """
+    """Normals ``u (m, r)``, ``u . w = 1``, where rays along ``w`` leave the space, and multipliers ``(m, n, 4)``."""
     n, r = c.shape
-    k, more = 1 if kind == "l1" else n, 0 if centre is None else 1
-    # (u, s, q) -> (s_i - c_i u, D_i u), then s_i >= 0, then q >= -centre u
-    L = np.zeros((n + k + more, 4, r + k + more))
+    k = 1 if kind == "l1" else n
+    # (u, s) -> (s_i - c_i u, D_i u), then s_i >= 0
+    L = np.zeros((n + k, 4, r + k))
     L[:n, 0, :r], L[:n, 1:, :r] = -c, D
     L[np.arange(n), 0, r + np.arange(n) % k] = 1
     L[n + np.arange(k), 0, r + np.arange(k)] = 1
@@ -91,18 +77,13 @@ def facing(
     h = contact_support(c, D, u0)
     # room for the start inside all cones, also where the supports themselves are nearly 0
     size = np.abs(h).max(axis=1, keepdims=True) + np.linalg.norm(D, axis=(1, 2)).max() * 1e-3
-    if centre is not None:
-        L[-1, 0, :r], L[-1, 0, -1] = centre, 1
-        size = size + np.abs(u0 @ centre)[:, None]
     s = np.maximum(h, 0)
     v0 = np.hstack([u0, (s.max(axis=1, keepdims=True) if kind == "l1" else s) + size])
-    if centre is not None:
-        v0 = np.hstack([v0, size - (u0 @ centre)[:, None]])
-    B = np.zeros((len(w), r + k + more, r - 1 + k + more))  # steps that keep u . w = 1
+    B = np.zeros((len(w), r + k, r - 1 + k))  # steps that keep u . w = 1
     # steps in units of |u0| keep the unknowns of one size, whatever the length of w
     B[:, :r, : r - 1] = _across(w) * np.linalg.norm(u0, axis=1)[:, None, None]
-    B[:, r:, r - 1 :] = np.eye(k + more)
-    cost = np.concatenate([np.zeros(r - 1), np.ones(k + more)])
+    B[:, r:, r - 1 :] = np.eye(k)
+    cost = np.concatenate([np.zeros(r - 1), np.ones(k)])
     G, inside = -np.einsum("iad,mde->miae", L, B), np.einsum("iad,md->mia", L, v0)
     x, z = cone_programme(cost, G, inside, tolerance * size[:, 0])
     u = u0 + np.einsum("mde,me->md", B, x)[:, :r]

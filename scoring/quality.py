@@ -1,4 +1,4 @@
-"""Quality of a grasp: volumes and epsilons of two contacts that face each other, and of any soft contacts anywhere."""
+"""Quality of a grasp: volumes and epsilons of two contacts that face each other, and of any two anywhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, vol
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
-from softjaw.scoring.rays import ray_volume
 
 FloatArray = NDArray[np.float64]
 
@@ -50,8 +49,7 @@ class Score:
     epsilon_l1 : float
         The same radius in the L1 grasp wrench space [-].
     method : str
-        How the volumes were found: "antipodal" in closed form, "pose" by division of two contacts in any pose, "rays"
-        by an estimate for three or more.
+        How the volumes were found: "antipodal" in closed form, "pose" by division of the surfaces.
     error : float
         Relative error of the volumes left by that method [-].
     """
@@ -153,12 +151,11 @@ def grasp_score(
     tolerance: float = 1e-4,
     with_epsilon: bool = True,
 ) -> Score:
-    """Score of two or more soft contacts in any poses, with any limit surfaces.
+    """Score of two soft contacts in any poses, with any limit surfaces.
 
     Parameters
     ----------
-    contacts : sequence of SoftContact
-        At least two.
+    contacts : two SoftContact
     object_length : float
         Length by which the arms of the contacts are divided [m].
     contact_length : float
@@ -186,18 +183,13 @@ def grasp_score(
     >>> found.method, abs(found.quality / (14 / 9 * math.pi**2 * 0.2) - 1) < 1e-12
     ('antipodal', True)
     """
-    if len(contacts) < 2:
-        raise ValueError(f"contacts has {len(contacts)} entry: a grasp needs at least two")
+    if len(contacts) != 2:
+        raise ValueError(f"contacts: found {len(contacts)}, expected the two of a parallel gripper")
     lengths = object_length, contact_length, centre_of_mass
     # the closed form would take any length
     contacts[0].wrench_map(*lengths)  # refuses lengths that are none
     bodies = [contact.body for contact in contacts]
-    if len(contacts) > 2:
-        rays = [ray_volume(contacts, *lengths, kind=kind) for kind in ("linf", "l1")]
-        # Of bodies that are no ellipsoids the estimate tends to be high, by an unknown share of what exceeds the bound.
-        error = max(1 - v.lower / v.volume if v.high else v.relative_error for v in rays)
-        linf, l1, method = rays[0].volume, rays[1].volume, "rays"
-    elif faces(contacts, tolerance):
+    if faces(contacts, tolerance):
         d = float(np.linalg.norm(contacts[1].position - contacts[0].position)) / object_length
         (V1, A1), (V2, A2) = ((body.volume / contact_length, body.shadow_area) for body in bodies)
         linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)
@@ -223,7 +215,7 @@ def _epsilons(
 ) -> tuple[float, float]:
     """L-infinity and L1, in closed form where there is one."""
     arms = np.array([contact.position for contact in contacts]) - np.asarray(centre_of_mass, float)
-    if len(contacts) == 2 and faces(contacts, ON_LINE):
+    if faces(contacts, ON_LINE):
         one, two = (_line_axes(contacts[0], contact) for contact in contacts)
         along = arms @ contacts[0].axes[2]
         on_line = np.abs(arms - np.outer(along, contacts[0].axes[2])).max() <= ON_LINE * np.abs(arms).max()

@@ -26,7 +26,7 @@ ON_TARGET = 1e-6  # of the target: an error that is no further above it meets it
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "task", "wall", "graspit", "finer meshes")
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "finer meshes")
 HELD = ("cor grid", "samples", "probes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
@@ -190,9 +190,6 @@ ROWS = (
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
              "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
              " many motions.", symbol="fitted", rank=9),
-    Quantity("quality_graspit", M, "", "grasp quality, linearised as in GraspIt!",
-             "As quality, with the hull of the 20 points that GraspIt! takes on each ellipsoid instead of the "
-             "ellipsoid: about half of quality, in nearly the same ratio everywhere.", needs=("graspit",)),
     Quantity("fit_error", (), "", "fit error of the fitted limit surface",
              "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
              "377 motions that it was not fitted to; CCM, of the finger where it is larger.", rank=10),

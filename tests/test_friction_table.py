@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jobs.graspit import graspit_vertices
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
 from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
@@ -31,7 +32,6 @@ from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
 from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.epsilon import epsilon
-from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests.generators import (

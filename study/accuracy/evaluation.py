@@ -14,8 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.bodies import PolytopeBody, hull_volume
-from softjaw.scoring.graspit import linearised_contacts
+from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices, hull_volume
 from softjaw.study.accuracy.parameters import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
@@ -115,13 +114,12 @@ def _with_bodies(found: SolvedProbe, contacts: Sequence[Contact], bodies: list[A
     return np.array([*_limits(contacts, "ccm"), volume])
 
 
-def _with_hulls(found: SolvedProbe, contacts: Sequence[Contact], points: int | None) -> FloatArray:
+def _with_hulls(found: SolvedProbe, contacts: Sequence[Contact], points: int) -> FloatArray:
     """Quantities with the quality by hulls in six dimensions, of so many points on each ellipsoid."""
     settings = found.settings
     cones = []
-    for contact in linearised_contacts(soft(contacts, _ellipsoids(contacts)), points, settings.torques):
-        assert isinstance(contact.body, PolytopeBody)
-        V = contact.body.vertices
+    for contact, body in zip(soft(contacts, _ellipsoids(contacts)), _ellipsoids(contacts), strict=True):
+        V = fibonacci_vertices(body.semi_axes, points)
         loads = contact.wrench_map(settings.arms, settings.torques, np.zeros(3))
         cones.append(np.vstack([np.zeros(6), np.hstack([np.ones((len(V), 1)), V]) @ loads.T]))
     sums = (cones[0][:, None] + cones[1][None]).reshape(-1, 6)

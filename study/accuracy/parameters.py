@@ -40,7 +40,7 @@ SURFACES = {  # name -> model and objective of ``[limit_surface]``
     "quartic": ("quartic", "least_squares"), "quartic, zhou": ("quartic", "zhou"),
 }  # fmt: skip
 HULL = 3000  # wrenches whose hull is the reference solution of the limit surfaces
-POINTS = {"hull of 20 points": None, "hull of 50 points": 50}
+POINTS = {"hull of 20 points": 20, "hull of 50 points": 50}
 SLOW = {"hull of 20 points": 0.5, "hull of 50 points": 5.0}  # s, expected of one case
 WINKLER = "Winkler foundation, planar contact"
 

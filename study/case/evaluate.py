@@ -18,11 +18,9 @@ from softjaw.friction.motion import cor_grid
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
-from softjaw.scoring.bodies import PolytopeBody, polytope_volume
 from softjaw.scoring.closed_form import volume_linf
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
-from softjaw.scoring.graspit import graspit_vertices
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.study.case.contact import Contact, angle, angles, pose_flags
@@ -64,8 +62,8 @@ class EvaluationSettings:
         What is to be held; with it the payload is computed.
     cor_grid : tuple
         Grid of centres of rotation whose wrenches are computed; none where it is empty.
-    epsilon_everywhere, graspit, six, sampled : bool
-        Whether to find epsilon in any pose, GraspIt!'s volume, 6-D ellipsoids, and to keep the sampled wrenches.
+    epsilon_everywhere, six, sampled : bool
+        Whether to find epsilon in any pose, 6-D ellipsoids, and to keep the sampled wrenches.
     """
 
     arms: ArrayLike
@@ -74,7 +72,6 @@ class EvaluationSettings:
     task: Task | None = None
     cor_grid: Any = ()
     epsilon_everywhere: bool = False
-    graspit: bool = False
     six: bool = False
     sampled: bool = False
 
@@ -100,7 +97,7 @@ def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
     return EvaluationSettings(
         *lengths(scene, obj), scene.limit_surface, task_of(scene, obj), scene.friction.cor_grid,
-        epsilon_everywhere=scene.score.epsilon == "everywhere", graspit=scene.score.graspit,
+        epsilon_everywhere=scene.score.epsilon == "everywhere",
         six=scene.effects.wrench == "6-D", sampled=bool(scene.sampled),
     )  # fmt: skip
 
@@ -288,8 +285,6 @@ def _scores(
     """
     facing = faces(contacts, settings)
     found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
-    if settings.graspit:
-        found["quality_graspit"] = [_graspit(contacts, m, settings, facing) for m in MODELS]
     closed = {m: _closed(contacts, m, settings) for m in MODELS}
     tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
     for m in MODELS:
@@ -346,19 +341,6 @@ def _closed_volume(
 ) -> float:
     """Volume of the grasp wrench space of contacts that face each other, from volume and shadow of both surfaces."""
     return volume_linf(*sizes[0], *sizes[1], float(np.linalg.norm(_line(contacts, settings))))
-
-
-def _graspit(contacts: Sequence[Contact], model: str, settings: EvaluationSettings, facing: bool) -> float:
-    """Volume with GraspIt!'s 20 points on each ellipsoid; torques over their length decide where the points lie."""
-    scale = np.array([1.0, 1.0, settings.torques])
-    axes = [c.ellipsoids[model].semi_axes / scale for c in contacts]
-    # Points on an axis of length 0 span no volume.
-    if any((a == 0).any() for a in axes):
-        return 0.0
-    points = [graspit_vertices(a) for a in axes]
-    if facing:
-        return _closed_volume([polytope_volume(p) for p in points], contacts, settings)
-    return volume_in_pose(soft(contacts, [PolytopeBody(p * scale) for p in points]), settings.arms, settings.torques)
 
 
 def _tilt(contacts: Sequence[Contact], bodies: Sequence[LimitSurface], settings: EvaluationSettings) -> float:

@@ -120,7 +120,6 @@ def has(scene: Any) -> tuple[str, ...]:
     """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
     asked["task"] = asked["mass"] or scene.task.direction is not None
-    asked["graspit"] = scene.score.graspit
     asked["wall"] = has_wall(scene.object)
     asked["finer meshes"] = scene.accuracy.target is not None
     return tuple(name for name, wanted in asked.items() if wanted)

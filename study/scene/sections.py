@@ -229,7 +229,6 @@ class ScoreKeys(SceneSection):
     epsilon: Literal["facing", "everywhere"] = Field(
         "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.1 s each)"
     )
-    graspit: bool = Field(False, description="also map the quality with GraspIt!'s 20 vertices per contact")
     object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 

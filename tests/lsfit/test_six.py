@@ -12,7 +12,7 @@ from softjaw.lsfit.quartic_fit import least_squares_quartic
 from softjaw.lsfit.samples import sample_rank, six_samples, sphere_motions
 from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import convex_span_quartic, span_ellipsoid, span_samples
-from softjaw.lsfit.surface import FitError, FitFlag
+from softjaw.lsfit.surface import FitFlag
 from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
 
 RHO = 2.0

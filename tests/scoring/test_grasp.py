@@ -65,17 +65,6 @@ def test_any_limit_surface_has_a_score():
     assert math.isnan(found.epsilon)
 
 
-@pytest.mark.long
-def test_three_contacts():
-    third = SoftContact([0, -0.03, 0], contact_axes([0, 1, 0], [0, 0, 1]), Ellipsoid(A))
-    found = grasp_score([*facing(), third], *LENGTHS, with_epsilon=False)
-    two = grasp_score(facing(), *LENGTHS, with_epsilon=False)
-    assert found.method == "rays"
-    assert 0 < found.error < 0.02
-    assert found.quality > two.quality
-    assert found.quality_l1 > two.quality_l1
-
-
 def test_contacts_that_carry_nothing_score_nothing_and_say_so():
     points = [(1.0, 1.0, 0.0)] * 2
     for angle in (0.0, 0.2):
@@ -89,8 +78,9 @@ def test_contacts_that_carry_nothing_score_nothing_and_say_so():
 
 def test_bad_arguments_are_named():
     one, two = facing()
-    with pytest.raises(ValueError, match="at least two"):
-        grasp_score([one], *LENGTHS)
+    for contacts in ([one], [one, two, one]):
+        with pytest.raises(ValueError, match="contacts"):
+            grasp_score(contacts, *LENGTHS)
     with pytest.raises(ValueError, match="object_length is 0"):
         grasp_score([one, two], 0.0, 0.05)
     with pytest.raises(ValueError, match="perpendicular unit vectors"):
