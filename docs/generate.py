@@ -26,9 +26,10 @@ from softjaw.study.quantities import EFFECT_TABLE, MODEL_NAMES, REASONS, STATES,
 from softjaw.study.scene.grasps import GraspPose, Refinement
 from softjaw.study.scene.model import SECTIONS, Scene
 from softjaw.study.scene.objects import SHAPES, SectionTable, Shape, Walled
-from softjaw.study.scene.section import SceneSection, kind_text
+from softjaw.study.scene.section import SceneSection
 from softjaw.study.units import UNITS, split_unit
 
+BOUNDS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
 ROOT = Path(__file__).parents[1]
 WIDTH = 96  # columns of a command's help
 NESTED = {  # tables within a section, with an example of where they stand
@@ -106,7 +107,7 @@ def _section(model: type[SceneSection], without: Iterable[str] = ()) -> list[str
 
 def _key_row(key: str, schema: Mapping[str, Any], whole: Mapping[str, Any]) -> tuple[str, ...]:
     unit = split_unit(key)[1]
-    takes = kind_text(schema) + (f" [{UNITS[unit].text}]" if unit else "")
+    takes = _kind(schema) + (f" [{UNITS[unit].text}]" if unit else "")
     if key in whole.get("required", ()):
         default = "required"
     elif schema.get("default") in (None, [], ""):
@@ -116,6 +117,35 @@ def _key_row(key: str, schema: Mapping[str, Any], whole: Mapping[str, Any]) -> t
     example = next(iter(schema.get("examples", ())), None)
     text = schema.get("description", "") + (f"; as in `{json.dumps(example)}`" if example is not None else "")
     return _code(key), takes, default, text
+
+
+def _options(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The alternatives of a key that is given; leaving it out is none of them, nor is switching a table on."""
+    return [s for s in schema.get("anyOf", ()) if s.get("type") not in ("null", "boolean")]
+
+
+def _choices(schema: Mapping[str, Any]) -> list[str]:
+    parts = (schema, *schema.get("anyOf", ()))
+    return [str(value) for s in parts for value in s.get("enum", [s["const"]] if "const" in s else [])]
+
+
+def _kind(schema: Mapping[str, Any]) -> str:
+    """What values a key takes, read off its JSON schema: kind and range, or all choices."""
+    kind, options = schema.get("type"), _options(schema)
+    if options:
+        return " or ".join(map(_kind, options))
+    if values := [json.dumps(v) for v in _choices(schema)]:
+        return values[0] if len(values) == 1 else f"one of {', '.join(values)}"
+    if kind in ("number", "integer"):
+        limits = " and ".join(f"{sign} {schema[name]:.10g}" for name, sign in BOUNDS.items() if name in schema)
+        return f"{'a whole number' if kind == 'integer' else 'a number'} {limits}".strip()
+    if kind == "array":
+        low, high = schema.get("minItems", 0), schema.get("maxItems")
+        count = f"{low}" if low == high else f"{low} or more" if high is None else f"{low} to {high}"
+        item = (schema.get("prefixItems") or [schema.get("items", {})])[0]
+        each = f", each {_kind(item)}" if item.get("type") in ("number", "integer", "array") else ""
+        return f"a list of {count}{each}"
+    return {"string": "text", "boolean": "true or false"}.get(str(kind), "a table")
 
 
 def scenes_page() -> str:

@@ -5,12 +5,17 @@ Files that a user asked for are whole under their name or not there.
 
 from __future__ import annotations
 
+import datetime
+import difflib
+import json
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 DONE, USAGE, OTHER_FILE, IN_USE, CANNOT_WRITE, SOME_FAILED, BUG, STOPPED = 0, 2, 3, 4, 5, 6, 70, 75
 MEANING = {
@@ -39,6 +44,23 @@ class StudyError(Exception):
         return self.message
 
 
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with an input, with its place; ``line`` is None where no line can be named."""
+
+    file: str
+    line: int | None
+    key: str
+    found: str
+    expected: str
+    remedy: str
+
+    def __str__(self) -> str:
+        place = self.file if self.line is None else f"{self.file}:{self.line}"
+        key, remedy = f" {self.key}:" if self.key else "", f"; {self.remedy}" if self.remedy else ""
+        return f"{place}:{key} found {self.found}, expected {self.expected}{remedy}"
+
+
 def printable(text: str) -> str:
     r"""A text of unknown origin with nothing in it that controls a terminal.
 
@@ -52,6 +74,28 @@ def shortened(text: str, width: int = 80) -> str:
     """A printable text of at most ``width`` characters."""
     text = printable(text)
     return text if len(text) <= width else text[: width - 4] + " ..."
+
+
+def shown(value: Any, width: int = 60) -> str:
+    """A value as TOML would write it, shortened to ``width`` characters."""
+    if isinstance(value, datetime.date | datetime.time):
+        text = str(value)
+    elif isinstance(value, Mapping):
+        text = "a table" if value else "an empty table"
+    else:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+        text = text if isinstance(value, str) else text.replace("Infinity", "inf").replace("NaN", "nan")
+    return shortened(text, width)
+
+
+def closest(word: str, words: Sequence[str]) -> str | None:
+    """The word that a mistyped one most likely means.
+
+    >>> closest("Pad-Lenght", ["mu", "pad_length"])
+    'pad_length'
+    """
+    lower = {known.lower(): known for known in words}
+    return next((lower[w] for w in difflib.get_close_matches(word.lower().replace("-", "_"), lower, n=1)), None)
 
 
 def first_rank() -> bool:

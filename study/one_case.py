@@ -232,7 +232,7 @@ def _outcome(unit: Any, k: int, what: str) -> CaseResult:
 def _refuse_open_questions(scene: Scene) -> None:
     """A case needs a scene that says all: no sweep."""
     if not isinstance(scene, Scene):
-        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.load(file) gives")
+        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.from_file(file) gives")
     if scene.sweep:
         key, values = next(iter(scene.sweep.items()))
         remedy = f"choose a point of it by scene.with_values(**{{{key!r}: {values[0]!r}}})"

@@ -72,7 +72,7 @@ def press(
 
     Examples
     --------
-    >>> scene = Scene.load("jobs/smoke.toml", ["gripper.elements=[8, 4, 2]"])
+    >>> scene = Scene.from_file("jobs/smoke.toml", ["gripper.elements=[8, 4, 2]"])
     >>> case = press(scene, station=0.0, angle=0.0, force=1.0)
     >>> case.e_n == case.limits["ccm"].e_n, case.result.effects["friction_pressure_coupling"].level
     (True, 'tangential traction')
@@ -120,10 +120,10 @@ def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool 
 
     Examples
     --------
-    ``mpirun -n 8 python study.py`` with ``softjaw.run(softjaw.Scene.load("bottle.toml"), "bottle.hdf")`` in it.
+    ``mpirun -n 8 python study.py`` with ``softjaw.run(softjaw.Scene.from_file("bottle.toml"), "bottle.hdf")`` in it.
     """
     if not isinstance(scene, Scene):
-        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.load(file) gives")
+        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.from_file(file) gives")
     path = Path(file)
     if path.suffix != ".hdf":
         text = f"file: found '{path}', expected a name that ends in .hdf, which all viewers open"

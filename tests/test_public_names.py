@@ -18,7 +18,7 @@ from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT
 
 SOURCE = ast.parse((ROOT / "softjaw" / "__init__.py").read_text(encoding="utf-8"))
-EXAMPLES = ("Scene.load", "Scene.from_dict", "Scene.with_values", "press", "open", "GraspMap", "ContactPatch",
+EXAMPLES = ("Scene.from_file", "Scene.from_dict", "Scene.with_values", "press", "open", "GraspMap", "ContactPatch",
             "read_pressure", "friction_limits", "friction_wrench", "fit_ellipsoid", "fit_quartic",
             "grasp_quality")  # fmt: skip
 BLOCKED = """
@@ -34,7 +34,7 @@ sys.path.insert(0, sys.argv[1])
 import softjaw as sj
 early = {"numpy", "scipy", "numba", "pydantic", "h5py"} & set(sys.modules)
 assert all(getattr(sj, name).__doc__ for name in sj.__all__)
-scene = sj.Scene.load(sys.argv[1] + "/jobs/smoke.toml")
+scene = sj.Scene.from_file(sys.argv[1] + "/jobs/smoke.toml")
 ds = sj.open(sys.argv[2])
 assert len(sj.read_patch(sys.argv[2], station=0)) == 0  # it holds none
 point = sj.GraspMap(sys.argv[2]).best()[0]
@@ -116,7 +116,7 @@ def test_all_but_solving_works_anywhere_without_petsc_and_mpi(once, shared_path)
 
 @pytest.mark.parametrize(("file", "error"), [("a.h5", StudyError), ("results", StudyError)])
 def test_a_result_file_has_its_ending(file, error, tmp_path):
-    scene = sj.Scene.load(ROOT / "jobs" / "smoke.toml")
+    scene = sj.Scene.from_file(ROOT / "jobs" / "smoke.toml")
     with pytest.raises(error, match=r"\.hdf"):
         sj.run(scene, tmp_path / file)
     with pytest.raises(TypeError, match="expected a Scene"):
@@ -126,7 +126,7 @@ def test_a_result_file_has_its_ending(file, error, tmp_path):
 USER = """
 import softjaw as sj
 
-scene = sj.Scene.load("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
+scene = sj.Scene.from_file("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
 case = sj.press(scene, station=0.067, angle=0.0, force=5.0)
 force: tuple[float, ...] = scene.load.normal_force_n
 e_n: float = case.limits["ccm"].e_n

@@ -14,7 +14,7 @@ import numpy as np
 import softjaw as sj
 
 FILE = Path("results/planner.hdf")
-scene = sj.Scene.load(Path(__file__).parents[1] / "bottle-rigid.toml").with_values(**{
+scene = sj.Scene.from_file(Path(__file__).parents[1] / "bottle-rigid.toml").with_values(**{
     "object.mass_g": 150,
     "gripper.elements": [12, 6, 4],
     "candidates.stations": 12,

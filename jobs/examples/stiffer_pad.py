@@ -15,7 +15,7 @@ import softjaw as sj
 
 SCENE = Path(__file__).parents[1] / "bottle-rigid.toml"
 STATION, FORCE = 0.067, 7.0  # the waist of the bottle [m], per finger [N]
-scene = sj.Scene.load(SCENE).with_values(**{"gripper.elements": [12, 6, 4], "accuracy.meshes": 2})
+scene = sj.Scene.from_file(SCENE).with_values(**{"gripper.elements": [12, 6, 4], "accuracy.meshes": 2})
 
 # %% From soft to hard foam
 moduli = [10, 20, 40, 80, 160]  # [kPa]

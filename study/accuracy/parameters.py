@@ -15,8 +15,7 @@ from typing import Any, get_args
 from softjaw.study.case.build import has_wall
 from softjaw.study.quantities import EFFECTS
 from softjaw.study.run.plan import wall_size
-from softjaw.study.scene import Scene
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import Scene, SceneError
 from softjaw.study.scene.sections import Accuracy, Effects, WallSize
 
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh

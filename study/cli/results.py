@@ -8,7 +8,7 @@ from pathlib import Path
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import SceneError
 from softjaw.study.show.tables import watch as watching
 from softjaw.study.show.tables.columns import terminal_width
 from softjaw.study.show.tables.compare import compare as compared

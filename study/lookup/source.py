@@ -13,8 +13,7 @@ import xarray as xr
 from softjaw.study.quantities import BY_KEY
 from softjaw.study.result.read import axes_of, maps_in, values_of
 from softjaw.study.result.store import place_text
-from softjaw.study.scene import parse_scene
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.units import UNITS, split_unit
 
 

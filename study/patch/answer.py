@@ -18,11 +18,10 @@ from softjaw.study.case.contact import ALIKE, ANTIPODAL, Contact, angles, pose_f
 from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
 from softjaw.study.flags import Flag, flags_in, raised
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, Problem, StudyError
 from softjaw.study.patch.contacts import check_facing, exact_surface, grasp_lengths, opposite
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.quantities import MODELS
-from softjaw.study.scene.problems import Problem
 
 SURFACES = {  # as a scene names them, and in the text
     "three_motions": "ellipsoid, three motions",

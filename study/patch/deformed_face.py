@@ -18,7 +18,7 @@ from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace, cell_of, measured_face
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.study.case.model import contact_rules, pad_of, settings
-from softjaw.study.messages import SOME_FAILED, USAGE, StudyError
+from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import (
     FACTORS,
@@ -31,7 +31,6 @@ from softjaw.study.patch.patch_reader import (
     without_unit,
 )
 from softjaw.study.scene import Scene
-from softjaw.study.scene.problems import Problem
 
 LOADED = 1e-9  # of the largest pressure, below which a face carries no load
 BESIDE = 1.5  # half sides of the pad: a point beyond them belongs to something else, or has another unit

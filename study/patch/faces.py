@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import ContactPatch, FloatArray, slivers
-from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.scene.problems import Problem
+from softjaw.study.messages import USAGE, Problem, StudyError
 
 MOST_PROBLEMS = 10  # reported of one file
 LARGEST = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa")}  # beyond is no contact on earth

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, shortened
+from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError, shortened, shown
 from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
-from softjaw.study.scene.problems import Problem, shown
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes

@@ -12,10 +12,9 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, StudyError, closest
 from softjaw.study.patch.faces import Faces, corner_geometry
 from softjaw.study.patch.patch_reader import FACTORS, Reading, check_count, refused, split_header
-from softjaw.study.scene.problems import closest
 
 TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9  # VTK's cell types
 

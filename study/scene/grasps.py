@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic_core import InitErrorDetails
 
+from softjaw.study.messages import closest, shown
+from softjaw.study.scene.errors import wrong
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
-from softjaw.study.scene.problems import Finding, closest, shown
 from softjaw.study.scene.section import Direction, Interval, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted, si
@@ -47,15 +49,13 @@ class GraspPose(SceneSection):
         azimuth, elevation = math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z))))
         return "{:.0f}, {:.0f}, {:.0f} mm, from {:.0f}/{:.0f} deg".format(*self.point_mm, azimuth, elevation)
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Directions that do not fix a frame, points far from any object."""
         cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
         if abs(cosine) > ALONG:
-            found, remedy = f"{shown(list(self.long_side))}, along the approach", "the long side lies in the pad's face"
-            yield Finding(("long_side",), found, "a direction across the approach", remedy)
+            yield wrong(self.long_side, "a direction across the approach, in the pad's face", "long_side")
         if max(map(abs, self.point_mm)) > LARGEST_MM:
-            expected = f"a point within {LARGEST_MM:g} mm of the origin"
-            yield Finding(("point_mm",), shown(list(self.point_mm)), expected, "check the unit, which is mm")
+            yield wrong(self.point_mm, f"a point within {LARGEST_MM:g} mm of the origin, in mm", "point_mm")
 
     def clearance_mm(self, spans: dict[str, Span], gripper: Gripper) -> float:
         """Distance at which a pad passes the box round the object along one of its sides [mm]; <= 0 where it meets."""
@@ -167,7 +167,7 @@ class Candidates(SceneSection):
         """Numbers of the candidates that are given by number or label, each once, in the order given."""
         return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Exactly one way of giving the candidates."""
         spread = self.stations is not None or self.station_range_mm is not None
         given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
@@ -175,58 +175,44 @@ class Candidates(SceneSection):
         ways = [way for way in given if given[way]]
         if len(ways) != 1:
             expected = "one of stations_mm, stations with station_range_mm, sampler, or [[candidates.poses]]"
-            remedy = "keep one of them" if ways else f"add one, {EXAMPLE}"
-            yield Finding(tuple(ways[-1:]), " and ".join(ways) or "no grasp candidates", expected, remedy)
+            yield wrong(ways, f"{expected}, {EXAMPLE}", *ways[-1:])
         if spread and (self.stations is None or self.station_range_mm is None):
-            found, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
-            yield Finding((found,), f"{found} alone", f"{missing} beside it", f"add {missing}, {EXAMPLE}")
-        for key in ("count", "seed") if not self.sampler else ():
-            if getattr(self, key) != Candidates.model_fields[key].default:
-                yield Finding(
-                    (key,), f"{key} without a sampler", 'sampler = "antipodal" beside it', "add it, or remove this"
-                )
-        for key in ("angles_deg", "roll_deg") if self.poses or self.sampler else ():
-            if getattr(self, key) != Candidates.model_fields[key].default:
-                yield Finding((key,), f"{key} without stations", "stations beside it", "remove it")
-        for i, pose in enumerate(self.poses):
-            yield from (f.below("poses", i) for f in pose.findings())
+            key, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
+            yield wrong(getattr(self, key), f"{missing} beside it, {EXAMPLE}", key)
+        needs = {"count": self.sampler, "seed": self.sampler, "angles_deg": not (self.poses or self.sampler)}
+        needs["roll_deg"] = needs["angles_deg"]
+        for key, met in needs.items():
+            if not met and (value := getattr(self, key)) != Candidates.model_fields[key].default:
+                way = "stations" if key.endswith("deg") else 'sampler = "antipodal"'
+                yield wrong(value, f"{way} beside it", key)
 
-    def findings_on(self, shape: Shape) -> Iterator[Finding]:
+    def rules_on(self, shape: Shape) -> Iterator[InitErrorDetails]:
         """Stations beside the object, or along its faces, cannot touch it."""
         low, high = shape.spans_mm.get("z", (-math.inf, math.inf))
         outside = [s for s in self.station_values_mm if not low <= s <= high]
         if outside:
-            found = f"{len(outside)} station{'s' * (len(outside) > 1)} off the object: {_listed(outside)} mm"
-            expected = f"stations from {low:g} to {high:g} mm, where the object is"
-            remedy = "stations are coordinates along the object's axis, in mm"
-            yield Finding((self._station_key,), found, expected, remedy)
+            expected = f"stations [mm] along the object's axis, from {low:g} to {high:g} mm"
+            yield wrong(outside, expected, self._station_key)
         for angle in self.angles_deg if isinstance(shape, Plate) and self.station_values_mm else ():
             if abs(math.cos(math.radians(angle))) < 0.5:
-                expected = "angles within 60 of 0 or 180: the planes face x"
-                yield Finding(("angles_deg",), f"{angle:g} degrees with two planes", expected, "write angles_deg = [0]")
+                yield wrong(angle, "angles within 60 of 0 or 180: the two planes face x", "angles_deg")
 
-    def pose_findings(self, shape: Shape, gripper: Gripper) -> Iterator[Finding]:
+    def pose_rules(self, shape: Shape, gripper: Gripper) -> Iterator[InitErrorDetails]:
         """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
         for i, pose in enumerate(self.poses if len(shape.spans_mm) == 3 else ()):
-            if any(pose.findings()) or (distance := pose.clearance_mm(shape.spans_mm, gripper)) <= 0:
-                continue
-            label = f" of '{pose.label}'" if pose.label else ""
-            found = f"a pad{label} that misses the object by {distance:.3g} mm"
-            remedy = "point_mm is in mm, in the frame in which the object's shape is given"
-            yield Finding(("poses", i, "point_mm"), found, "a pad that touches it", remedy)
+            if (distance := pose.clearance_mm(shape.spans_mm, gripper)) > 0:
+                label = f" of '{pose.label}'" if pose.label else ""
+                expected = f"a pad{label} that touches the object; it misses by {distance:.3g} mm"
+                yield wrong(pose.point_mm, f"{expected} (in mm, in the frame of the shape)", "poses", i, "point_mm")
 
-    def unknown_names(self, key: str, wanted: Any) -> Iterator[Finding]:
+    def name_rules(self, key: str, wanted: Any) -> Iterator[InitErrorDetails]:
         """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""
         labels = self.labels
-        numbers = f"0 to {len(labels) - 1}"
+        numbers = f"a candidate's number, 0 to {len(labels) - 1}, or its label"
         for i, name in enumerate(wanted if isinstance(wanted, tuple) else ()):
-            if isinstance(name, int) and not 0 <= name < len(labels):
-                remedy = "numbers count stations, then angles"
-                yield Finding((key, i), f"{name}", f"a candidate's number, {numbers}", remedy)
-            elif isinstance(name, str) and name not in labels:
-                near = closest(name, labels)
-                remedy = f"did you mean {shown(near)}?" if near else f"write the candidate's number, {numbers}"
-                yield Finding((key, i), shown(name), f"a candidate's label, as {shown(labels[0])}", remedy)
+            if name not in (labels if isinstance(name, str) else range(len(labels))):
+                near = closest(str(name), labels) or labels[0]
+                yield wrong(name, f"{numbers}, as {shown(near)}", key, i)
 
     def half_extent_mm(self, gripper: Gripper) -> float:
         """Half of what a pad covers along the object's axis [mm]."""

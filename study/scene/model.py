@@ -1,90 +1,150 @@
-"""The scene: what is grasped, with what, where, how hard, and how exactly it is simulated."""
+"""The scene: what is grasped, with what, where, how hard, and how exactly it is simulated; how it is read."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import InitErrorDetails
 
-from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
-from softjaw.study.scene.loader import Loader, SectionOrLoader
-from softjaw.study.scene.objects import SHAPES, Mesh, Object
-from softjaw.study.scene.problems import Finding, SceneError, closest, shown
-from softjaw.study.scene.section import SceneSection, model_findings
+from softjaw.study.messages import Problem, closest, shortened, shown
+from softjaw.study.scene.errors import KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
+from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose, Refinement
+from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
+from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (
+    LEVELS,
     Accuracy,
     Effects,
     Friction,
     Gripper,
     LimitSurfaceKeys,
+    Load,
     Output,
     Run,
     ScoreKeys,
     TaskKeys,
     Uncertainty,
-    petsc_findings,
+    petsc_rules,
 )
-from softjaw.study.scene.text import toml_text
+from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
-JOINT: tuple[tuple[Callable[..., Iterator[Finding]], tuple[str, ...]], ...] = (
-    # what several sections must satisfy together: the rule, and its sections, the one at fault first
-    (Effects.object_findings, ("effects", "object")),
-    (Friction.used_findings, ("friction", "effects")),
-    (Effects.surface_findings, ("effects", "limit_surface")),
-    (Gripper.symmetry_findings, ("gripper", "effects")),
-    (Gripper.support_findings, ("gripper", "effects", "accuracy")),
-    (Candidates.findings_on, ("candidates", "object")),
-    (Candidates.pose_findings, ("candidates", "object", "gripper")),
-    (lambda s, c: c.unknown_names("wrench_samples", s.wrench_samples), ("limit_surface", "candidates")),
-    (lambda u, c: c.unknown_names("probes", u.probes), ("uncertainty", "candidates")),
-    (Uncertainty.input_findings, ("uncertainty", "object", "friction", "sweep")),
-    (petsc_findings, ("petsc",)),
-)
+ALTERNATIVES = (("stations_mm",), ("stations", "station_range_mm"), ("poses",))  # ways of giving candidates
+NOT_SWEPT = {
+    "object.shape": "write one scene per shape",
+    "object.mesh": "write one scene per mesh",
+    "object.name": "a name changes no result",
+    "candidates.stations": "stations are an axis of the maps already",
+    "friction.cor_grid": "it changes the size of the results",
+    "accuracy.meshes": "it changes which maps there are",
+    "accuracy.target": "it changes which maps there are",
+    "effects.wrench": "it changes what is stored",
+    "object.mass_g": "it changes which maps there are; the safety factor is in proportion to 1 / mass",
+    "limit_surface.samples": "it changes the size of the results",
+    "limit_surface.wrench_samples": "it changes the size of the results",
+}
+NO_RESULT = ("output", "run", "uncertainty")  # sections that change no result of a case
+MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
+OVERRIDE = "section.key=value with a value as in TOML, as in gripper.pad_width_mm=20 or object.name='\"cup\"'"
+Rule = Callable[..., Iterator[InitErrorDetails]]
+JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
+    # What a section must satisfy together with others, which come before it: the rules, and the other sections
+    "effects": ((Effects.object_rules, ("object",)),),
+    "gripper": ((Gripper.symmetry_rules, ("effects",)), (Gripper.support_rules, ("effects", "accuracy"))),
+    "friction": ((Friction.used_rules, ("effects",)),),
+    "candidates": ((Candidates.rules_on, ("object",)), (Candidates.pose_rules, ("object", "gripper"))),
+    "limit_surface": (
+        (lambda surface, effects: effects.surface_rules(surface), ("effects",)),
+        (lambda surface, c: c.name_rules("wrench_samples", surface.wrench_samples), ("candidates",)),
+    ),
+    "petsc": ((petsc_rules, ()),),
+    "uncertainty": (
+        (lambda u, c: c.name_rules("probes", u.probes), ("candidates",)),
+        (Uncertainty.input_rules, ("object", "friction", "sweep")),
+    ),
+}
 
 
-def _optional(model: type[SceneSection]) -> Any:
-    """A section that may be left out."""
-    return Field(default_factory=model)
-
-
-class Scene(SceneSection, metaclass=Loader):
+class Scene(SceneSection):
     """A whole study as one frozen record. Keys are those of the file; properties without the unit are in SI units."""
 
+    model_config = ConfigDict(validate_default=True)
+    # A section follows those that its rules in `JOINT` look at.
     object: Object
-    gripper: Gripper = _optional(Gripper)
-    friction: Friction = _optional(Friction)
+    effects: Effects = Field(default_factory=Effects)
+    accuracy: Accuracy = Field(default_factory=Accuracy)
+    gripper: Gripper = Field(default_factory=Gripper)
+    friction: Friction = Field(default_factory=Friction)
     candidates: Candidates
-    load: SectionOrLoader = Field(...)  # or the function of the class would be its default
-    limit_surface: LimitSurfaceKeys = _optional(LimitSurfaceKeys)
-    score: ScoreKeys = _optional(ScoreKeys)
-    task: TaskKeys = _optional(TaskKeys)
-    effects: Effects = _optional(Effects)
-    accuracy: Accuracy = _optional(Accuracy)
-    uncertainty: Uncertainty = _optional(Uncertainty)
-    output: Output = _optional(Output)
-    run: Run = _optional(Run)
+    load: Load
+    limit_surface: LimitSurfaceKeys = Field(default_factory=LimitSurfaceKeys)
+    score: ScoreKeys = Field(default_factory=ScoreKeys)
+    task: TaskKeys = Field(default_factory=TaskKeys)
+    output: Output = Field(default_factory=Output)
+    run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
-    sweep: dict[str, tuple[Option, ...]] = Field(
+    sweep: dict[str, Annotated[tuple[str | int | float, ...], Field(strict=False, min_length=1)]] = Field(
         default_factory=dict,
         description='lists of values by dotted key, as in "object.semi_axis_b_mm" = [10, 20]',
         json_schema_extra={"additionalProperties": True},  # the dotted keys may stand without quotes
     )
+    uncertainty: Uncertainty = Field(default_factory=Uncertainty)
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Scene:
-        """Hold what the sections must satisfy together, for scenes made in Python too."""
-        wrong = findings({name: getattr(self, name) for name in Scene.model_fields})
-        if wrong:
-            raise _scene_error(wrong)
-        return self
+    @field_validator("*")
+    @classmethod
+    def _joint_rules(cls, part: Any, info: ValidationInfo) -> Any:
+        """Hold what sections must satisfy together; a rule needs all of its sections."""
+        for rule, names in JOINT.get(str(info.field_name), ()):
+            if all(name in info.data for name in names):
+                refuse(rule(part, *(info.data[name] for name in names)))
+        return part
+
+    @field_validator("sweep")
+    @classmethod
+    def _sweep_rules(cls, sweep: dict[str, tuple[Any, ...]], info: ValidationInfo) -> dict[str, tuple[Any, ...]]:
+        refuse(axis_rules(sweep, info.data))
+        if len(info.data) == list(cls.model_fields).index("sweep"):  # every section is valid
+            refuse(_point_rules(sweep, info.data))
+        return {k: v if isinstance(v[0], str) else tuple(sorted(map(float, v))) for k, v in sweep.items()}
+
+    def rules(self) -> Iterator[InitErrorDetails]:
+        """Not more cases than a file can hold."""
+        if self.cases > MOST_CASES:
+            yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
+
+    @classmethod
+    def from_file(cls, file: str | Path, overrides: Sequence[str] = ()) -> Scene:
+        """The scene of a file.
+
+        Parameters
+        ----------
+        file : path
+            Scene as TOML; a mesh that it names is looked for from the file's folder.
+        overrides : sequence of str
+            ``section.key=value`` as behind ``--set``.
+
+        Raises
+        ------
+        SceneError
+            With every problem found, each a sentence with file, line and key. It is a `ValueError`.
+
+        Examples
+        --------
+        >>> Scene.from_file("jobs/smoke.toml", ["gripper.pad_width_mm=20"]).gripper.pad_width
+        0.02
+        """
+        return load_scene(file, overrides)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -185,9 +245,7 @@ class Scene(SceneSection, metaclass=Loader):
         >>> Scene.from_dict(tables).object.radius
         0.03
         """
-        from softjaw.study.scene.load import scene_of
-
-        return scene_of(tables)
+        return _scene(plain_tables(tables), "", Path("scene"))
 
     def with_values(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> Scene:
         """The scene with values of dotted keys put in, and without its sweep.
@@ -215,13 +273,12 @@ class Scene(SceneSection, metaclass=Loader):
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any]) -> Scene:
         """The scene of tables in which everything is filled in, as `effective` gives them, and without a sweep."""
-        sections, wrong = checked_sections(tables)
-        if wrong:
-            raise _scene_error(wrong)
-        return Scene(**sections)
+        try:
+            return cls.model_validate(tables)
+        except ValidationError as error:
+            raise SceneError(problems_of(error, tables, tables_of(tables), lambda _: ("scene", None))) from None
 
 
-NAMES = tuple(Scene.model_fields)
 SECTIONS: dict[str, type[SceneSection]] = {
     name: field.annotation
     for name, field in Scene.model_fields.items()
@@ -234,10 +291,14 @@ def section_model(name: str, table: Mapping[str, Any]) -> type[SceneSection] | N
     return SHAPES.get(str(table.get("shape"))) if name == "object" else SECTIONS.get(name)
 
 
-def keys_by_place() -> dict[str, list[str]]:
-    """Keys of every section, and of every shape of ``[object]``, by the way the place is written in messages."""
-    shapes = {f'[object] with shape = "{name}"': list(model.model_fields) for name, model in SHAPES.items()}
-    return {f"[{name}]": list(model.model_fields) for name, model in SECTIONS.items()} | shapes
+def tables_of(data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Keys of every section by its name, with those of the tables inside; those of the object by its shape."""
+    tables = {name: dict(SECTIONS[name].model_fields if name in SECTIONS else {}) for name in Scene.model_fields}
+    shape = data.get("object")
+    model = SHAPES.get(str(shape.get("shape"))) if isinstance(shape, Mapping) else None
+    tables["object"] = {**SectionTable.model_fields, **(model.model_fields if model else {})}
+    tables["candidates"] |= {**GraspPose.model_fields, **Refinement.model_fields}
+    return tables
 
 
 def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -270,59 +331,6 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _scene_error(wrong: Iterable[Finding]) -> SceneError:
-    return SceneError([f.at("scene", None) for f in wrong])
-
-
-def checked_sections(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Finding]]:
-    """The valid sections of a scene, and everything wrong with it but for its sweep and its files."""
-    sections: dict[str, Any] = {}
-    found = [_unknown_section(name, value) for name, value in data.items() if name not in NAMES]
-    for name in NAMES:
-        if name not in data and Scene.model_fields[name].is_required():
-            remedy = f"add [{name}], as in jobs/smoke.toml"
-            found.append(Finding((name,), "no such section", f"a section [{name}]", remedy))
-        elif not isinstance(table := data.get(name, {}), Mapping):
-            found.append(Finding((name,), shown(table), f"a section [{name}]", f"write [{name}] on a line of its own"))
-        elif name in ("petsc", "sweep"):
-            sections[name] = dict(table)
-        elif (model := section_model(name, table)) is None:
-            found.append(_unknown_shape(table.get("shape")))
-        else:
-            try:
-                sections[name] = model.model_validate(table)
-            except ValidationError as error:
-                others = {place: keys for place, keys in keys_by_place().items() if keys != list(model.model_fields)}
-                found.extend(model_findings(error, model, name, table, others))
-    return sections, found + findings(sections)
-
-
-def findings(sections: Mapping[str, Any]) -> list[Finding]:
-    """Everything wrong with sections that are valid one by one; a joint rule needs all of its sections."""
-    found = [
-        f.below(name) for name, part in sections.items() if isinstance(part, SceneSection) for f in part.findings()
-    ]
-    for rule, names in JOINT:
-        if all(name in sections for name in names):
-            found += [f.below(names[0]) for f in rule(*(sections[name] for name in names))]
-    return found
-
-
-def _unknown_section(name: str, value: Any) -> Finding:
-    homes = [place for place, keys in keys_by_place().items() if name in keys]
-    expected = f"one of {', '.join(f'[{n}]' for n in NAMES)}"
-    if near := closest(name, NAMES):
-        return Finding((name,), "an unknown section", expected, f"did you mean [{near}]?")
-    kind = "an unknown section" if isinstance(value, Mapping) else "a key outside of any section"
-    return Finding((name,), kind, expected, f"it belongs to {homes[0]}" if homes else "remove it")
-
-
-def _unknown_shape(shape: Any) -> Finding:
-    near = closest(shape, list(SHAPES)) if isinstance(shape, str) else None
-    found, remedy = "nothing" if shape is None else shown(shape), f'did you mean "{near}"?' if near else "choose one"
-    return Finding(("object", "shape"), found, f"one of {', '.join(map(shown, SHAPES))}", remedy)
-
-
 @lru_cache(maxsize=16)
 def _stamped_digest(file: str, _stamp: tuple[int, int]) -> str:
     with Path(file).open("rb") as content:
@@ -333,3 +341,162 @@ def _file_digest(file: str) -> str:
     """SHA-256 of a file's bytes, computed again when the file changes."""
     status = Path(file).stat()
     return _stamped_digest(file, (status.st_mtime_ns, status.st_size))
+
+
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
+    """The scene of a file, with ``section.key=value`` overrides put in; see `Scene.from_file`."""
+    path = Path(path)
+    return parse_scene(read_text(path), path, overrides)
+
+
+def parse_scene(
+    text: str, path: Path | str = "scene.toml", overrides: Sequence[str] = (), check_files: bool = True
+) -> Scene:
+    """The scene of a text that stands in the file ``path``.
+
+    ``check_files = False`` leaves out whether a mesh exists, for a text kept in a result file.
+    """
+    path = Path(path)
+    return _scene(parse_toml(text, str(path)), text, path, overrides, check_files)
+
+
+def _scene(
+    data: dict[str, Any], text: str, path: Path, overrides: Sequence[str] = (), check_files: bool = True
+) -> Scene:
+    """The scene of tables that stand in a text, if any, of the file ``path``."""
+    if isinstance(data.get("sweep"), dict):
+        data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
+    given: dict[KeyPath, Place] = {}
+    problems = _put_overrides(data, overrides, given)
+    # Before the checks, which want to see what depends on the file's name and on the sweep.
+    _fill_in(data, path)
+    try:
+        scene = Scene.model_validate(data, context=check_files)
+    except ValidationError as error:
+        lines = lines_of(text)
+
+        def place(key: KeyPath) -> Place:
+            """An override before the file, whose value it replaces; of the file the line of the nearest key."""
+            above = [key[:n] for n in range(len(key), 0, -1)]
+            spelled = [(k[0], *str(k[1]).split("."), *k[2:]) if k[0] == "sweep" and k[1:] else k for k in above]
+            line = next((lines[k] for pair in zip(above, spelled, strict=True) for k in pair if k in lines), None)
+            return next((given[k] for k in above if k in given), (str(path), line))
+
+        problems += problems_of(error, data, tables_of(data), place)
+    if problems:
+        # Problems of the file first and from top to bottom, as an editor goes through them.
+        raise SceneError(sorted(problems, key=lambda p: (p.file != str(path), p.line or 0)))
+    return scene
+
+
+def _fill_in(data: dict[str, Any], path: Path) -> None:
+    """Fill in what depends on the scene file or on the sweep: result file, place of the mesh, values that are swept."""
+    output, shape, sweep = data.setdefault("output", {}), data.get("object"), data.get("sweep")
+    effects, surface = data.get("effects"), data.setdefault("limit_surface", {})
+    # A level of the effect and the model name the same choice; what the scene gives itself stays.
+    if isinstance(effects, dict) and isinstance(surface, dict) and (level := effects.get("limit_surface")) in LEVELS:
+        surface.setdefault("model", LEVELS[level][0])
+    if isinstance(output, dict):
+        output.setdefault("file", f"results/{path.stem}.hdf")
+    if isinstance(shape, dict) and isinstance(shape.get("mesh"), str) and shape["mesh"]:
+        # Relative to the scene, so that a run from any folder finds the mesh.
+        shape["mesh"] = str((path.parent / shape["mesh"]).resolve())
+    for key, values in sweep.items() if isinstance(sweep, dict) else ():
+        section, _, name = key.partition(".")
+        table = data.get(section)
+        if not isinstance(table, dict) or not isinstance(values, list) or not values or key in NOT_SWEPT:
+            continue
+        if (model := section_model(section, table)) and name in model.model_fields:
+            # A swept key needs a value at which the sections can be checked.
+            table.setdefault(name, values[0])
+
+
+def _put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, Place]) -> list[Problem]:
+    """Put ``section.key=value`` texts into ``data``; ``given`` gets the text behind every key."""
+    problems = []
+    for text in overrides:
+        place = f"--set {shortened(text)}"
+        if (tables := _override(text)) is None:
+            problems.append(Problem(place, None, "", shown(text), OVERRIDE, ""))
+        for section, table in (tables or {}).items():
+            if not isinstance(table, Mapping) or not isinstance(data.setdefault(section, {}), dict):
+                data[section], given[(section,)] = table, (place, None)
+                continue
+            for key, value in (flat(table) if section == "sweep" else table).items():
+                old = data[section].get(key)
+                both = isinstance(old, dict) and isinstance(value, Mapping)
+                data[section][key] = {**old, **value} if both else value
+                given[(section, key)] = place, None
+                given.setdefault((section,), (place, None)) if len(data[section]) == 1 else None
+                if section == "candidates":
+                    _drop_alternatives(data[section], key, given)
+    return problems
+
+
+def _override(text: str) -> dict[str, Any] | None:
+    """The tables that an override stands for; None where it is no TOML."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    # Shells take the quotes of a text away.
+    for written in (value, json.dumps(value)) if value[:1] not in tuple("[{\"'") else (value,):
+        with suppress(ValueError, RecursionError):
+            # What a terminal would obey has no place in a scene, nor in the messages about it.
+            if equals and text.isprintable():
+                return tomllib.loads(f"{key} = {written}")
+    return None
+
+
+def _drop_alternatives(table: dict[str, Any], key: str, given: Mapping[KeyPath, Place]) -> None:
+    """Let an override of one way of giving candidates replace the others, unless they are overrides too."""
+    for way in ALTERNATIVES if any(key in way for way in ALTERNATIVES) else ():
+        if key not in way and not any(("candidates", name) in given for name in way):
+            for name in way:
+                table.pop(name, None)
+
+
+def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """What is wrong with the axes of a sweep before any of their values is tried."""
+    shape = getattr(sections.get("object"), "shape", None)
+    for key, values in sweep.items():
+        section, _, name = key.partition(".")
+        model = section_model(section, {"shape": shape})
+        if model is None or name not in model.model_fields:
+            models = {**SECTIONS, **({"object": SHAPES[shape]} if shape else {})}
+            near = closest(key, [f"{s}.{k}" for s, m in models.items() for k in m.model_fields])
+            yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
+        elif key in NOT_SWEPT or section in NO_RESULT:
+            yield wrong(values, f"a key that can be swept; {NOT_SWEPT.get(key, 'it changes no result')}", key)
+        elif key == "gripper.element" and "output" in sections and sections["output"].patches == "all":
+            yield wrong(values, 'output.patches = "none" beside it, for faces that differ from case to case', key)
+        elif len(set(values)) < len(values) or len({isinstance(v, str) for v in values}) > 1:
+            yield wrong(values, "a list of numbers or a list of texts, each once", key)
+
+
+def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """What is wrong at the points of a sweep: single values, then the first combination."""
+    data = {name: v.model_dump(exclude_none=True) if hasattr(v, "model_dump") else v for name, v in sections.items()}
+    points = math.prod(map(len, sweep.values()))
+    if points > MOST_GRID_POINTS:  # trying too many would take minutes
+        yield wrong(points, f"at most {MOST_GRID_POINTS:,} combinations; sweep fewer keys or values")
+        return
+    good: dict[str, list[Any]] = {key: [] for key in sweep}
+    for key, values in sweep.items():
+        for i, value in enumerate(values):
+            if trouble := _trouble(data, {key: value}):
+                yield wrong(value, trouble, key, i)
+            else:
+                good[key].append(value)
+    for point in product(*good.values()) if len(sweep) > 1 else ():
+        at = dict(zip(good, point, strict=True))
+        if trouble := _trouble(data, at):
+            yield wrong(", ".join(f"{key} = {shown(value)}" for key, value in at.items()), trouble)
+            return
+
+
+def _trouble(data: Mapping[str, Any], values: Mapping[str, Any]) -> str:
+    """What is wrong with a scene with values put in; empty where nothing is."""
+    try:
+        Scene.model_validate(put(data, values))
+    except ValidationError as error:
+        first = problems_of(error, data, tables_of(data), lambda _: ("", None))[0]
+        return first.expected if first.key in values else f"{first.expected} in {first.key}"
+    return ""

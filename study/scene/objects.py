@@ -8,12 +8,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import InitErrorDetails
 
 from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
-from softjaw.study.scene.problems import Finding, shown
+from softjaw.study.scene.errors import refusal, wrong
 from softjaw.study.scene.section import Interval, Point, SceneSection, Text, numbers_text
-from softjaw.study.units import UNITS, converted, in_si, si
+from softjaw.study.units import UNITS, in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
 THICKEST = 0.1  # of the smallest extent: a thicker wall is no shell
@@ -59,18 +60,14 @@ class Shape(SceneSection):
         """`axis_symmetry` and `spans_mm`."""
         return 1, {}
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Extents outside 1 mm to 2 m are slips of the unit."""
         for i, (axis, (low, high)) in enumerate(self.spans_mm.items()):
             extent = high - low
             if not SMALLEST_MM <= extent <= LARGEST_MM:
-                other = "m" if extent < SMALLEST_MM else "um"
-                meant = converted(extent, other, "mm")
-                slip = f"the unit is mm: if {other} was meant, the extent is {meant:g} mm"
-                remedy = slip if SMALLEST_MM <= meant <= LARGEST_MM else "check the unit, which is mm"
-                expected = f"{SMALLEST_MM:g} mm to {in_si('most_mm', LARGEST_MM):g} m"
                 key = self.SIZE_KEYS[i % len(self.SIZE_KEYS)]
-                yield Finding((key,), f"an extent of {extent:g} mm along {axis}", expected, remedy)
+                expected = f"an extent of {SMALLEST_MM:g} to {LARGEST_MM:g} mm, not {extent:g} mm along {axis}"
+                yield wrong(getattr(self, key), f"{expected}; check the unit, which is mm", key)
                 return
 
 
@@ -103,39 +100,36 @@ class Walled(Shape):
         profile = self.wall_profile_mm
         return in_si("wall_mm", self.wall_mm) if profile is None else in_si("wall_profile_mm", profile)
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Exactly one thickness, thin beside the object, and a complete material."""
-        yield from super().findings()
+        yield from super().rules()
         if self.wall_mm is not None and self.wall_profile_mm is not None:
-            yield Finding(("wall_profile_mm",), "wall_mm beside it", "one of them", "keep the one that is meant")
+            yield wrong(self.wall_profile_mm, "either wall_mm or wall_profile_mm", "wall_profile_mm")
         if self.wall is not None:
-            yield from self._wall_findings()
+            yield from self._wall_rules()
             return
         for key in WALL_KEYS:
-            if getattr(self, key, None) is not None:
-                remedy = "add for example `wall_mm = 0.4`, or remove the key"
-                yield Finding((key,), f"{key} without a wall", "wall_mm beside it", remedy)
+            if (value := getattr(self, key, None)) is not None:
+                yield wrong(value, "a wall beside it, as in `wall_mm = 0.4`", key)
 
-    def _wall_findings(self) -> Iterator[Finding]:
+    def _wall_rules(self) -> Iterator[InitErrorDetails]:
         if self.base == "none" and self.base_wall_mm is not None:
-            yield Finding(("base_wall_mm",), 'base = "none" beside it', "one of them", "keep the one that is meant")
+            yield wrong(self.base_wall_mm, 'either base_wall_mm or base = "none"', "base_wall_mm")
         pairs = self.wall_profile_mm or ()
         for i, (low, high) in enumerate(pairwise(pairs), 1):
             if high[0] <= low[0]:
-                found = f"z = {high[0]:g} after {low[0]:g} mm"
-                yield Finding(("wall_profile_mm", i), found, "rising z", "sort the pairs [z, thickness] by z")
+                yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_profile_mm", i)
         most = THICKEST * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
         for thickness in [t for _, t in pairs] or [self.wall_mm or 0.0]:
             if not 0 < thickness <= most:
                 key = "wall_profile_mm" if pairs else "wall_mm"
                 expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
-                yield Finding((key,), f"{thickness:g} mm", expected, "leave a thicker wall out: it is as good as rigid")
+                yield wrong(thickness, f"{expected}; a thicker wall is as good as rigid: leave it out", key)
                 break
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:
-            found = f'"custom" without {" and ".join(missing)}'
-            remedy = "add for example `young_modulus_gpa = 2.0` and `wall_poisson_ratio = 0.38`, or name a material"
-            yield Finding(("wall_material",), found, "both of them", remedy)
+            expected = f"{' and '.join(missing)} beside it, as in `wall_poisson_ratio = 0.38`"
+            yield wrong("custom", expected, "wall_material")
 
 
 class SphereShape(Shape):
@@ -179,13 +173,12 @@ class BoxShape(Shape):
         symmetry = 4 if self.size_mm[0] == self.size_mm[1] else 2
         return symmetry, {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Edges cannot be rounder than the box is thick."""
-        yield from super().findings()
+        yield from super().rules()
         most = min(self.size_mm) / 2
         if self.edge_radius_mm > most:
-            expected = f"at most half the smallest size, {most:g} mm"
-            yield Finding(("edge_radius_mm",), f"{self.edge_radius_mm:g} mm", expected, f"write {most:g} or less")
+            yield wrong(self.edge_radius_mm, f"at most half the smallest size, {most:g} mm", "edge_radius_mm")
 
 
 class Plate(Shape):
@@ -219,18 +212,18 @@ class RevolutionShape(Walled):
         heights = [z for z, _ in self.profile_mm]
         return 0, {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """An outline leads from one end to the other: z never falls, and only the ends may lie on the axis."""
-        yield from super().findings()
+        yield from super().rules()
         for i, (z, r) in enumerate(self.profile_mm):
             before = self.profile_mm[i - 1]
             if i and (z < before[0] or (z, r) == before):
-                found = f"{numbers_text((z, r))} after {numbers_text(before)}"
-                yield Finding(("profile_mm", i), found, "rising z", "sort the points [z, radius] by z")
+                expected = f"points [z, radius] with rising z; the one before is {numbers_text(before)}"
+                yield wrong((z, r), expected, "profile_mm", i)
             at_end = i in (0, len(self.profile_mm) - 1)
             if r < 0 or (r == 0 and not at_end):
                 expected = "a radius >= 0" if at_end else "a radius > 0 between the ends"
-                yield Finding(("profile_mm", i), f"radius {r:g} mm", expected, "write each point as [z, radius], in mm")
+                yield wrong((z, r), f"{expected}, each point as [z, radius], in mm", "profile_mm", i)
 
 
 class SectionTable(SceneSection):
@@ -261,17 +254,16 @@ class Sections(Walled):
         z = [s.z_mm for s in self.sections]
         return symmetry, {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Sections are stacked upwards; only the first and the last may end on the axis."""
-        yield from super().findings()
+        yield from super().rules()
         for i, (low, high) in enumerate(pairwise(self.sections), 1):
             if high.z_mm <= low.z_mm:
-                found = f"z = {high.z_mm:g} after {low.z_mm:g} mm"
-                yield Finding(("sections", i, "z_mm"), found, "rising z", "sort the sections from bottom to top")
+                expected = f"sections from bottom to top; the one before is at {low.z_mm:g} mm"
+                yield wrong(high.z_mm, expected, "sections", i, "z_mm")
         for i, section in enumerate(self.sections[1:-1], 1):
             if section.a_mm == 0:
-                expected = "a semi-axis above 0 between the ends"
-                yield Finding(("sections", i, "a_mm"), "0 mm", expected, "write the semi-axis along x, in mm")
+                yield wrong(section.a_mm, "a semi-axis above 0 between the ends", "sections", i, "a_mm")
 
 
 class Mesh(Walled):
@@ -299,19 +291,20 @@ class Mesh(Walled):
         """Length of one unit of the file [m]."""
         return UNITS[self.unit].size
 
-    def file_findings(self) -> Iterator[Finding]:
-        """The mesh's file exists and can be one (its content is judged when it is read)."""
-        file, remedy = Path(self.mesh), "the path is relative to the scene file"
-        kind = f"a triangle mesh in a {', '.join(ENDINGS)} file"
+    @field_validator("mesh")
+    @classmethod
+    def _file_is_there(cls, mesh: str, info: ValidationInfo) -> str:
+        """Of a scene file that is read; what is in the mesh is judged when it is read."""
+        file, endings = Path(mesh), ", ".join(ENDINGS)
+        if not info.context:
+            return mesh
         if file.suffix.lower() not in ENDINGS:
-            yield Finding(("mesh",), shown(file.name), kind, "convert it to .stl")
-        elif not file.is_file():
-            yield Finding(("mesh",), f"{'a directory' if file.is_dir() else 'no such file'} at {file}", kind, remedy)
-        elif not (size := file.stat().st_size):
-            yield Finding(("mesh",), f"an empty file at {file}", kind, remedy)
-        elif size > LARGEST_FILE:
-            found, expected = f"{size >> 20} MiB in {file}", f"at most {LARGEST_FILE >> 20} MiB"
-            yield Finding(("mesh",), found, expected, "decimate the mesh, or save it as binary .stl")
+            raise refusal(f"a triangle mesh in a {endings} file; convert it to .stl")
+        if not file.is_file() or not (size := file.stat().st_size):
+            raise refusal(f"the {endings} file of a triangle mesh, not empty; the path is relative to the scene file")
+        if size > LARGEST_FILE:
+            raise refusal(f"at most {LARGEST_FILE >> 20} MiB; decimate the mesh, or save it as binary .stl")
+        return mesh
 
 
 Object = Annotated[

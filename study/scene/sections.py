@@ -9,10 +9,12 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import InitErrorDetails
 
 from softjaw.fem.pad.halving import halved
+from softjaw.study.messages import shown
+from softjaw.study.scene.errors import wrong
 from softjaw.study.scene.objects import Shape, Walled
-from softjaw.study.scene.problems import Finding, shown
 from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.units import si
 
@@ -37,7 +39,7 @@ LEVELS = {  # level of the effect: models of [limit_surface]
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
 VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
-OTHERS = "others go into the environment variable PETSC_OPTIONS"
+OTHERS = "other options go into the environment variable PETSC_OPTIONS"
 
 
 class Gripper(SceneSection):
@@ -103,27 +105,24 @@ class Gripper(SceneSection):
         """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and contact face [-]."""
         return (self.grading_x, self.grading_y, self.grading_z)
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
-        yield from self._hyperfoam_findings() if self.material == "hyperfoam" else self._material_findings()
+        yield from self._hyperfoam_rules() if self.material == "hyperfoam" else self._material_rules()
         pad = (self.pad_length_mm, self.pad_width_mm)
         if self.finger_size_mm and any(own < least for own, least in zip(self.finger_size_mm, pad, strict=True)):
-            found, expected = shown(list(self.finger_size_mm)), f"at least the pad's, {shown(list(pad))}"
-            yield Finding(("finger_size_mm",), found, expected, "length comes first; leave it out for the pad's size")
+            yield wrong(self.finger_size_mm, f"at least the pad's, {shown(list(pad))}, length first", "finger_size_mm")
         n = self.elements
         for i in (0, 1):
             if n[i] % 2 and self.grading[i] != 1:
-                found, expected = f"{self.grading[i]:g} with {n[i]} elements", "an even number of graded elements"
-                yield Finding((f"grading_{'xy'[i]}",), found, expected, "write 1.0, or even elements")
+                yield wrong(self.grading[i], f"1.0, or an even number of elements, not {n[i]}", f"grading_{'xy'[i]}")
         if math.prod(n) > MOST_ELEMENTS:
-            found, expected = f"{list(n)}, which is {math.prod(n):,} elements", f"at most {MOST_ELEMENTS:,} elements"
-            yield Finding(("elements",), found, expected, "start with [20, 10, 6]")
+            expected = f"at most {MOST_ELEMENTS:,} elements, not {math.prod(n):,}; start with [20, 10, 6]"
+            yield wrong(n, expected, "elements")
         edges = self._edges_mm()
         if max(map(max, edges)) > LARGEST_ASPECT * min(map(min, edges)):
             sizes = " x ".join(f"{low:.3g}" if low == high else f"{low:.3g}..{high:.3g}" for low, high in edges)
-            found = f"{list(n)}, which makes elements of {sizes} mm"
-            expected = f"edges that differ by a factor of {LARGEST_ASPECT:g} at most"
-            yield Finding(("elements",), found, expected, "change elements or grading; [20, 10, 6] suits most pads")
+            expected = f"elements whose edges differ by a factor of {LARGEST_ASPECT:g} at most, not {sizes} mm"
+            yield wrong(n, f"{expected}; [20, 10, 6] suits most pads", "elements")
 
     def _edges_mm(self) -> list[tuple[float, float]]:
         """Smallest and largest element edge along x, y and z [mm]."""
@@ -135,41 +134,38 @@ class Gripper(SceneSection):
             edges.append((min(steps) / sum(steps) * size, max(steps) / sum(steps) * size))
         return edges
 
-    def _material_findings(self) -> Iterator[Finding]:
+    def _material_rules(self) -> Iterator[InitErrorDetails]:
         if self.material == "blatz_ko" and self.poisson_ratio != 0.25:
-            found, remedy = f"{self.poisson_ratio:g}", 'remove the key, or choose material = "hyperfoam"'
-            yield Finding(("poisson_ratio",), found, "0.25, which Blatz-Ko foam always has", remedy)
+            expected = '0.25, which Blatz-Ko foam always has, or material = "hyperfoam"'
+            yield wrong(self.poisson_ratio, expected, "poisson_ratio")
         for key in ("alpha", "shear_moduli_kpa"):
-            if getattr(self, key):
-                found, remedy = f"{key} with material {shown(self.material)}", 'remove it, or choose "hyperfoam"'
-                yield Finding((key,), found, 'material = "hyperfoam"', remedy)
+            if terms := getattr(self, key):
+                yield wrong(terms, f'material = "hyperfoam", not {shown(self.material)}, beside it', key)
 
-    def _hyperfoam_findings(self) -> Iterator[Finding]:
+    def _hyperfoam_rules(self) -> Iterator[InitErrorDetails]:
         if len(self.alpha) != len(self.shear_moduli_kpa):
-            found = f"{len(self.alpha)} exponents and {len(self.shear_moduli_kpa)} moduli"
-            yield Finding(("alpha",), found, "as many exponents as moduli", "make both lists of the same length")
+            yield wrong(self.alpha, f"as many exponents as moduli, {len(self.shear_moduli_kpa)}", "alpha")
         if 0 in self.alpha:
-            yield Finding(("alpha",), "an exponent of 0", "others than 0", "use a small exponent such as 0.01")
+            yield wrong(self.alpha, "exponents other than 0, such as 0.01", "alpha")
         total = sum(self.shear_moduli_kpa)
         if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=1e-9):
-            found, expected = f"{self.shear_modulus_kpa:g} kPa", f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0"
-            yield Finding(("shear_modulus_kpa",), found, expected, "leave shear_modulus_kpa out")
+            expected = f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0; leave it out"
+            yield wrong(self.shear_modulus_kpa, expected, "shear_modulus_kpa")
 
-    def symmetry_findings(self, effects: Effects) -> Iterator[Finding]:
+    def symmetry_rules(self, effects: Effects) -> Iterator[InitErrorDetails]:
         """Symmetric halves need even counts."""
         n = list(self.elements)
         if effects.model_size != "full" and (n[0] % 2 or n[1] % 2):
             even = [n[0] + n[0] % 2, n[1] + n[1] % 2, n[2]]
-            expected = "even numbers along length and width, so that symmetric halves can be meshed"
-            yield Finding(("elements",), f"{n}", expected, f'write {even}, or effects.model_size = "full"')
+            expected = f'even numbers along length and width, {even}, or effects.model_size = "full"'
+            yield wrong(n, f"{expected}, so that symmetric halves can be meshed", "elements")
 
-    def support_findings(self, effects: Effects, accuracy: Accuracy) -> Iterator[Finding]:
+    def support_rules(self, effects: Effects, accuracy: Accuracy) -> Iterator[InitErrorDetails]:
         """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
         tilts = self.tilt_stiffness_nm_per_rad is not None
         if tilts and effects.sheet == "elastic":
-            expected = 'effects.sheet "rigid" or "auto": a plate that tilts is rigid itself'
-            remedy = "remove the key, or write effects.sheet = \"rigid\""
-            yield Finding(("tilt_stiffness_nm_per_rad",), 'a mount with effects.sheet = "elastic"', expected, remedy)
+            expected = 'effects.sheet = "rigid" or "auto": a plate that tilts is rigid itself'
+            yield wrong(self.tilt_stiffness_nm_per_rad, expected, "tilt_stiffness_nm_per_rad")
         if effects.sheet == "rigid" or tilts:
             return
         counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
@@ -177,9 +173,8 @@ class Gripper(SceneSection):
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
         if any(held < (1 - ROUNDING) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
             meshes = " and ".join(f"{list(n)}" for n in counts)
-            found = f"{list(self.sheet_support_mm)} mm with {meshes} elements along length and width"
-            expected = f"a support of at least {need[0]:g} x {need[1]:g} mm, which holds nodes of the pad's mesh"
-            yield Finding(("sheet_support_mm",), found, expected, "use even numbers of elements")
+            expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
+            yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")
 
 
 class Friction(SceneSection):
@@ -192,12 +187,11 @@ class Friction(SceneSection):
         False, description="whether the friction that pressing has used is missing for holding (CCM)"
     )
 
-    def used_findings(self, effects: Effects) -> Iterator[Finding]:
+    def used_rules(self, effects: Effects) -> Iterator[InitErrorDetails]:
         """What pressing uses is known only where friction acts back."""
         if self.used_by_pressing and effects.friction_pressure_coupling != "tangential":
-            found = f'true with effects.friction_pressure_coupling = "{effects.friction_pressure_coupling}"'
-            remedy = 'write friction_pressure_coupling = "tangential" in [effects]'
-            yield Finding(("used_by_pressing",), found, '"tangential" there', remedy)
+            expected = 'effects.friction_pressure_coupling = "tangential" beside it'
+            yield wrong(True, expected, "used_by_pressing")
 
 
 class Load(SceneSection):
@@ -246,11 +240,10 @@ class LimitSurfaceKeys(SceneSection):
         "none", description="candidates whose sampled wrenches are stored, by number or label"
     )
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Only some models have several objectives."""
         if self.objective == "zhou" and self.model not in CONVEX_FITS:
-            found, expected = f'"zhou" with model {shown(self.model)}', f"model {' or '.join(CONVEX_FITS)}"
-            yield Finding(("objective",), found, expected, 'write `objective = "least_squares"`')
+            yield wrong("zhou", f'"least_squares", or model {" or ".join(CONVEX_FITS)}', "objective")
 
 
 class TaskKeys(SceneSection):
@@ -294,20 +287,18 @@ class Effects(SceneSection):
         "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"
     )
 
-    def object_findings(self, shape: Shape) -> Iterator[Finding]:
+    def object_rules(self, shape: Shape) -> Iterator[InitErrorDetails]:
         """A shell needs a wall."""
         hollow = isinstance(shape, Walled) and shape.wall is not None
         if self.object.endswith("shell") and not hollow:
-            remedy = 'add wall_mm to [object], for example `wall_mm = 0.4`, or write "auto"'
-            yield Finding(("object",), f'"{self.object}" without a wall', "an object with a wall", remedy)
+            yield wrong(self.object, 'an object with a wall, as `wall_mm = 0.4` in [object], or "auto"', "object")
 
-    def surface_findings(self, surface: LimitSurfaceKeys) -> Iterator[Finding]:
+    def surface_rules(self, surface: LimitSurfaceKeys) -> Iterator[InitErrorDetails]:
         """A forced level is that of the model."""
         models = LEVELS.get(self.limit_surface, ())
         if models and surface.model not in models:
-            expected = f"the level of limit_surface.model, which is {shown(surface.model)}"
-            remedy = f'write `model = "{models[0]}"` in [limit_surface], or "auto" here'
-            yield Finding(("limit_surface",), shown(self.limit_surface), expected, remedy)
+            expected = f'"auto", or the level of limit_surface.model, which is {shown(surface.model)}'
+            yield wrong(self.limit_surface, expected, "limit_surface")
 
 
 class Accuracy(SceneSection):
@@ -333,11 +324,10 @@ class Accuracy(SceneSection):
     wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """A target needs errors."""
         if self.target is not None and self.meshes < 2:
-            expected = "accuracy.meshes = 2, whose difference tells the error"
-            yield Finding(("target",), f"{self.target:g} with accuracy.meshes = 1", expected, "leave meshes out")
+            yield wrong(self.target, "accuracy.meshes = 2 beside it, whose difference tells the error", "target")
 
     @property
     def most_meshes(self) -> int:
@@ -371,17 +361,15 @@ class Uncertainty(SceneSection):
         }  # fmt: skip
         return tuple(name for name, wanted in asked.items() if wanted)
 
-    def input_findings(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[Finding]:
+    def input_rules(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         """A friction coefficient that may be negative, a missing wall, and a sweep, which has no intervals."""
         if self.mu and self.mu >= friction.mu:
             expected = f"less than friction.mu, which is {friction.mu:g}"
-            yield Finding(("mu",), f"{self.mu:g}", expected, "write the half-width of mu itself, not per cent")
+            yield wrong(self.mu, f"{expected}: the half-width of mu itself", "mu")
         if self.wall_thickness_percent and getattr(shape, "wall", None) is None:
-            found, expected = f"{self.wall_thickness_percent:g}", "0 for an object without a wall"
-            yield Finding(("wall_thickness_percent",), found, expected, "give object.wall_mm, or leave it out")
+            yield wrong(self.wall_thickness_percent, "0 for an object without a wall", "wall_thickness_percent")
         if self.parts and sweep:
-            found, remedy = f"it beside a sweep over {', '.join(sweep)}", "leave [sweep] out here, or [uncertainty]"
-            yield Finding((), found, "a scene without a sweep", remedy)
+            yield wrong(self.parts, f"a scene without a sweep, not one over {', '.join(sweep)}")
 
 
 class Output(SceneSection):
@@ -392,15 +380,13 @@ class Output(SceneSection):
     )
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
 
-    def findings(self) -> Iterator[Finding]:
+    def rules(self) -> Iterator[InitErrorDetails]:
         """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
         path = PurePosixPath(self.file)
         if not self.file.endswith(".hdf"):
-            remedy = f"write {shown(self.file.removesuffix(path.suffix) + '.hdf')}"
-            yield Finding(("file",), shown(self.file), "a file ending in .hdf, which all viewers open", remedy)
+            yield wrong(self.file, "a file ending in .hdf, which all viewers open", "file")
         if path.is_absolute() or PureWindowsPath(self.file).drive or ".." in path.parts:
-            remedy = "give any other place on the command line with `-o`"
-            yield Finding(("file",), shown(self.file), "a path below the working directory", remedy)
+            yield wrong(self.file, "a path below the working directory; `-o` takes any other", "file")
 
 
 class Run(SceneSection):
@@ -415,18 +401,14 @@ class Run(SceneSection):
     )
 
 
-def petsc_findings(options: Mapping[str, Any]) -> Iterator[Finding]:
+def petsc_rules(options: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Options of the contact solver only, and none that writes files or runs code."""
     for key, value in options.items():
         bare = key.lstrip("-").removeprefix("contact_")
         if not key.startswith("contact_") or set(bare) - OPTION_CHARACTERS or not bare:
-            remedy = f"write `contact_{bare}` if the contact solver is meant; {OTHERS}"
-            expected = "an option of the contact solver, contact_..., as softjaw takes no others"
-            yield Finding((key,), f"the option {shown(key)}", expected, remedy)
+            expected = f"an option of the contact solver, as contact_{bare}; {OTHERS}"
+            yield wrong(value, expected, key)
         elif bare.endswith("python_type"):
-            yield Finding((key,), "an option that runs Python code", "options of the solver itself", "remove it")
-        elif not isinstance(value, str | int | float):
-            yield Finding((key,), shown(value), "text, a number, or true or false", "write the option's value alone")
+            yield wrong(value, "no option that runs Python code", key)
         elif isinstance(value, str) and set(value) - VALUE_CHARACTERS:
-            remedy = "options that name files go into the environment variable PETSC_OPTIONS"
-            yield Finding((key,), shown(value), "a word, a number or a list of them", remedy)
+            yield wrong(value, f"a word, a number or a list of them; {OTHERS}", key)

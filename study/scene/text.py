@@ -1,4 +1,4 @@
-"""The TOML text of a scene: reading it, the line of every key, writing it back, and comparing two of them."""
+"""The TOML text of a scene: reading it, writing it back, and comparing two of them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.scene.problems import KeyPath, Problem, SceneError, closest, shown
+from softjaw.study.messages import Problem, closest, shown
+from softjaw.study.scene.errors import SceneError
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
 REMEDY = "write each `key = value` once and on a line of its own, text in quotes, decimals with a point, lists in [ ]"
-_TOKEN = re.compile(
-    r'"""(?:\\.|[^\\])*?"{3,5}|' + r"'''.*?'{3,5}|" + r'"(?:\\.|[^"\\\n])*"|' + r"'[^'\n]*'|"
-    r"#[^\n]*|\n|[\[\]{}=,.]|[^\s\[\]{}=,.\"'#]+",
-    re.DOTALL,
-)
 MOST_NAMED, WIDTH = 5, 30
 
 
@@ -67,73 +63,6 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         line = min(int(number), len(lines)) if number.isdigit() else len(lines)
         found = f"{shown(lines[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
         raise SceneError([Problem(file, line, "", found, "TOML", REMEDY)]) from None
-
-
-def key_lines(text: str) -> dict[KeyPath, int]:
-    """First line of every section, key and list member of a text that is TOML, and of sections that are implied."""
-    tokens, line = [], 1
-    for match in _TOKEN.finditer(text):
-        if not match[0].startswith("#"):
-            tokens.append((match[0], line))
-        line += match[0].count("\n")
-    tokens.reverse()  # they are taken from the end
-    lines: dict[KeyPath, int] = {}
-    base: KeyPath = ()
-    counts: dict[KeyPath, int] = {}
-    while tokens:
-        token, line = tokens[-1]
-        if token == "\n":
-            tokens.pop()
-        elif token == "[":
-            many = tokens[-2:-1] and tokens[-2][0] == "["
-            base = _names(tokens, "]")
-            if many:
-                counts[base] = counts.get(base, -1) + 1
-                base = (*base, counts[base])
-                tokens.pop()
-            else:  # a table within the last of its kind
-                base = next(((*p, n, *base[len(p) :]) for p, n in counts.items() if base[: len(p)] == p), base)
-            _note(base, line, lines)
-        else:
-            _entry(tokens, base, lines)
-    return lines
-
-
-def _note(path: KeyPath, line: int, lines: dict[KeyPath, int]) -> None:
-    for n in range(1, len(path) + 1):
-        lines.setdefault(path[:n], line)
-
-
-def _names(tokens: list[tuple[str, int]], end: str) -> KeyPath:
-    parts: list[str] = []
-    while tokens and (token := tokens.pop()[0]) != end:
-        if token not in ".[":
-            # The parser itself takes quotes and escapes of a key away.
-            parts.append(next(iter(tomllib.loads(f"{token}=0"))))
-    return tuple(parts)
-
-
-def _entry(tokens: list[tuple[str, int]], base: KeyPath, lines: dict[KeyPath, int]) -> None:
-    line = tokens[-1][1]
-    path = (*base, *_names(tokens, "="))
-    _note(path, line, lines)
-    _value_lines(tokens, path, lines)
-
-
-def _value_lines(tokens: list[tuple[str, int]], path: KeyPath, lines: dict[KeyPath, int]) -> None:
-    opening = tokens.pop()[0] if tokens and tokens[-1][0] in "[{" else ""
-    index = 0
-    while tokens and tokens[-1][0] not in ("]", "}") and (opening or tokens[-1][0] not in (",", "\n")):
-        if not opening or tokens[-1][0] in (",", "\n"):
-            tokens.pop()
-        elif opening == "{":
-            _entry(tokens, path, lines)
-        else:
-            _note((*path, index), tokens[-1][1], lines)
-            _value_lines(tokens, (*path, index), lines)
-            index += 1
-    if opening and tokens:
-        tokens.pop()
 
 
 def toml_text(data: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import SceneError
 
 ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
 NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]

@@ -10,7 +10,7 @@ import numpy as np
 
 from softjaw.fem.errors import MeshError
 from softjaw.study.messages import StudyError
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import SceneError
 from tests.fuzz.edits import BINARY, TEXTUAL
 
 

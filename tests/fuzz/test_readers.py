@@ -108,8 +108,7 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
     "text", ["=", "a=b=c", "\x1b[2J=1", "x.y=" + "[" * 3000, "load.normal_force_n=[1e999]", "." * 99]
 )
 def test_an_override_is_taken_or_refused(tmp_path, text):
-    from softjaw.study.scene import load_scene
-    from softjaw.study.scene.problems import SceneError
+    from softjaw.study.scene import SceneError, load_scene
 
     path = tmp_path / "scene.toml"
     path.write_bytes(QUICK["scene"].content)

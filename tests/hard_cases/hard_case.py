@@ -19,7 +19,7 @@ from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene import Scene, SceneError, parse_scene
-from softjaw.study.scene.load import ALTERNATIVES
+from softjaw.study.scene.model import ALTERNATIVES
 from softjaw.study.scene.text import toml_text
 
 FOLDER = Path(__file__).parent

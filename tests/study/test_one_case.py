@@ -18,9 +18,9 @@ from tests.study.launching import ROOT
 
 JOBS = ROOT / "jobs"
 COARSE = "gripper.elements=[8, 4, 2]"
-SMOKE = sj.Scene.load(JOBS / "smoke.toml", [COARSE])
-BOXES = sj.Scene.load(JOBS / "box-poses.toml", [COARSE])
-FLASK = sj.Scene.load(JOBS / "flask-mesh.toml", [COARSE])
+SMOKE = sj.Scene.from_file(JOBS / "smoke.toml", [COARSE])
+BOXES = sj.Scene.from_file(JOBS / "box-poses.toml", [COARSE])
+FLASK = sj.Scene.from_file(JOBS / "flask-mesh.toml", [COARSE])
 
 
 def run(scene, path):
@@ -82,7 +82,7 @@ def test_an_image_by_symmetry_stands_where_the_run_has_it(solved):
 
 @pytest.mark.long
 def test_the_threads_of_a_script_change_no_bit():
-    scene, pressed = sj.Scene.load(JOBS / "smoke.toml"), []  # whose payload differs by 1e-4 with two threads
+    scene, pressed = sj.Scene.from_file(JOBS / "smoke.toml"), []  # whose payload differs by 1e-4 with two threads
     for threads in (1, 2):
         with threadpool_limits(threads):
             pressed.append(sj.press(scene, 0.0, np.pi / 2, 2.0))
@@ -99,8 +99,9 @@ def test_the_threads_of_a_script_change_no_bit():
         (BOXES, {"candidate": 1, "force": 5}, (1, 0, 1)),
         (FLASK.with_values(**{"candidates.stations_mm": [30], "candidates.angles_deg": [0]}),
          {"station": 0.03, "force": 5}, (0, 0, 1)),
-        (sj.Scene.load(JOBS / "sampled.toml", [COARSE, "candidates.count=2"]), {"candidate": 1, "force": 2}, (1, 0, 0)),
-        (sj.Scene.load(JOBS / "cup.toml", [
+        (sj.Scene.from_file(JOBS / "sampled.toml", [COARSE, "candidates.count=2"]),
+         {"candidate": 1, "force": 2}, (1, 0, 0)),
+        (sj.Scene.from_file(JOBS / "cup.toml", [
             COARSE, "candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]", "accuracy.wall_around_mm=4",
             "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12", "accuracy.meshes=1",
         ]), {"station": 0.055, "force": 2}, (0, 0, 1)),
@@ -149,8 +150,8 @@ POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
         (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),
         (FLASK, {"station": 5.0, "angle": 0}, ValueError, "5000 mm.*0 to 120 mm"),
         (SMOKE.with_values(**{"gripper.max_opening_mm": 20.0}), {"station": 0, "angle": 0}, CaseError, "to 20 mm"),
-        (sj.Scene.load(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]), {"station": 0, "angle": 0}, ValueError,
-         r"sweep of friction\.mu.*with_values"),
+        (sj.Scene.from_file(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]),
+         {"station": 0, "angle": 0}, ValueError, r"sweep of friction\.mu.*with_values"),
         (SMOKE.with_values(**{"petsc.contact_snes_tpye": "x"}), {"station": 0, "angle": 0}, sj.StudyError, "tpye"),
         (SMOKE.with_values(**{"petsc.contact_snes_max_it": 1}), {"station": 0, "angle": 0}, CaseError, "MAX_IT"),
     ],

@@ -22,8 +22,7 @@ from softjaw.study.lookup import GraspMap
 from softjaw.study.result import interval
 from softjaw.study.result.interval import derived
 from softjaw.study.result.layout import Derived, Layout
-from softjaw.study.scene import parse_scene
-from softjaw.study.scene.problems import SceneError
+from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.tables.certainty import Sure, sure, verdict
 from softjaw.study.show.tables.compare import compare
 from softjaw.study.show.tables.show import as_text, best
