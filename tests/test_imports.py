@@ -21,8 +21,8 @@ ALLOWED = {
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
     "scoring": {"softjaw.scoring"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
-    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pyvista", "rich", "vtkmodules"}
-    | {"xarray", "threadpoolctl", "(computed)"}
+    "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pydantic_core", "pyvista", "rich"}
+    | {"vtkmodules", "xarray", "threadpoolctl", "(computed)"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -14,6 +14,7 @@ from softjaw.study.messages import Problem, closest, shown
 from softjaw.study.units import UNITS, split_unit
 
 KeyPath = tuple[str | int, ...]
+Errors = Iterator[InitErrorDetails]  # what a rule yields
 Place = tuple[str, int | None]  # a file and a line of it, or an override
 Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
 MOST_LISTED = 50  # problems in one message

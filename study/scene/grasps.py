@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
-from pydantic_core import InitErrorDetails
 
 from softjaw.study.messages import closest, shown
-from softjaw.study.scene.errors import wrong
+from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
 from softjaw.study.scene.section import Direction, Interval, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.scene.sections import Gripper
@@ -49,7 +48,7 @@ class GraspPose(SceneSection):
         azimuth, elevation = math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z))))
         return "{:.0f}, {:.0f}, {:.0f} mm, from {:.0f}/{:.0f} deg".format(*self.point_mm, azimuth, elevation)
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Directions that do not fix a frame, points far from any object."""
         cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
         if abs(cosine) > ALONG:
@@ -167,7 +166,7 @@ class Candidates(SceneSection):
         """Numbers of the candidates that are given by number or label, each once, in the order given."""
         return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Exactly one way of giving the candidates."""
         spread = self.stations is not None or self.station_range_mm is not None
         given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
@@ -186,7 +185,7 @@ class Candidates(SceneSection):
                 way = "stations" if key.endswith("deg") else 'sampler = "antipodal"'
                 yield wrong(value, f"{way} beside it", key)
 
-    def rules_on(self, shape: Shape) -> Iterator[InitErrorDetails]:
+    def rules_on(self, shape: Shape) -> Errors:
         """Stations beside the object, or along its faces, cannot touch it."""
         low, high = shape.spans_mm.get("z", (-math.inf, math.inf))
         outside = [s for s in self.station_values_mm if not low <= s <= high]
@@ -197,7 +196,7 @@ class Candidates(SceneSection):
             if abs(math.cos(math.radians(angle))) < 0.5:
                 yield wrong(angle, "angles within 60 of 0 or 180: the two planes face x", "angles_deg")
 
-    def pose_rules(self, shape: Shape, gripper: Gripper) -> Iterator[InitErrorDetails]:
+    def pose_rules(self, shape: Shape, gripper: Gripper) -> Errors:
         """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
         for i, pose in enumerate(self.poses if len(shape.spans_mm) == 3 else ()):
             if (distance := pose.clearance_mm(shape.spans_mm, gripper)) > 0:
@@ -205,7 +204,7 @@ class Candidates(SceneSection):
                 expected = f"a pad{label} that touches the object; it misses by {distance:.3g} mm"
                 yield wrong(pose.point_mm, f"{expected} (in mm, in the frame of the shape)", "poses", i, "point_mm")
 
-    def name_rules(self, key: str, wanted: Any) -> Iterator[InitErrorDetails]:
+    def name_rules(self, key: str, wanted: Any) -> Errors:
         """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""
         labels = self.labels
         numbers = f"a candidate's number, 0 to {len(labels) - 1}, or its label"

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator
-from pydantic_core import InitErrorDetails
 
 from softjaw.study.messages import Problem, closest, shortened, shown
-from softjaw.study.scene.errors import KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
+from softjaw.study.scene.errors import Errors, KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose, Refinement
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
@@ -57,7 +56,7 @@ NOT_SWEPT = {
 NO_RESULT = ("output", "run", "uncertainty")  # sections that change no result of a case
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 OVERRIDE = "section.key=value with a value as in TOML, as in gripper.pad_width_mm=20 or object.name='\"cup\"'"
-Rule = Callable[..., Iterator[InitErrorDetails]]
+Rule = Callable[..., Errors]
 JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
     # What a section must satisfy together with others, which come before it: the rules, and the other sections
     "effects": ((Effects.object_rules, ("object",)),),
@@ -118,7 +117,7 @@ class Scene(SceneSection):
             refuse(_point_rules(sweep, info.data))
         return {k: v if isinstance(v[0], str) else tuple(sorted(map(float, v))) for k, v in sweep.items()}
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Not more cases than a file can hold."""
         if self.cases > MOST_CASES:
             yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
@@ -453,7 +452,7 @@ def _drop_alternatives(table: dict[str, Any], key: str, given: Mapping[KeyPath, 
                 table.pop(name, None)
 
 
-def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:
     """What is wrong with the axes of a sweep before any of their values is tried."""
     shape = getattr(sections.get("object"), "shape", None)
     for key, values in sweep.items():
@@ -471,7 +470,7 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             yield wrong(values, "a list of numbers or a list of texts, each once", key)
 
 
-def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:
     """What is wrong at the points of a sweep: single values, then the first combination."""
     data = {name: v.model_dump(exclude_none=True) if hasattr(v, "model_dump") else v for name, v in sections.items()}
     points = math.prod(map(len, sweep.values()))

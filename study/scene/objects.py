@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
-from pydantic_core import InitErrorDetails
 
 from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
-from softjaw.study.scene.errors import refusal, wrong
+from softjaw.study.scene.errors import Errors, refusal, wrong
 from softjaw.study.scene.section import Interval, Point, SceneSection, Text, numbers_text
 from softjaw.study.units import UNITS, in_si, si
 
@@ -60,7 +58,7 @@ class Shape(SceneSection):
         """`axis_symmetry` and `spans_mm`."""
         return 1, {}
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Extents outside 1 mm to 2 m are slips of the unit."""
         for i, (axis, (low, high)) in enumerate(self.spans_mm.items()):
             extent = high - low
@@ -100,7 +98,7 @@ class Walled(Shape):
         profile = self.wall_profile_mm
         return in_si("wall_mm", self.wall_mm) if profile is None else in_si("wall_profile_mm", profile)
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Exactly one thickness, thin beside the object, and a complete material."""
         yield from super().rules()
         if self.wall_mm is not None and self.wall_profile_mm is not None:
@@ -112,7 +110,7 @@ class Walled(Shape):
             if (value := getattr(self, key, None)) is not None:
                 yield wrong(value, "a wall beside it, as in `wall_mm = 0.4`", key)
 
-    def _wall_rules(self) -> Iterator[InitErrorDetails]:
+    def _wall_rules(self) -> Errors:
         if self.base == "none" and self.base_wall_mm is not None:
             yield wrong(self.base_wall_mm, 'either base_wall_mm or base = "none"', "base_wall_mm")
         pairs = self.wall_profile_mm or ()
@@ -173,7 +171,7 @@ class BoxShape(Shape):
         symmetry = 4 if self.size_mm[0] == self.size_mm[1] else 2
         return symmetry, {axis: (-size / 2, size / 2) for axis, size in zip("xyz", self.size_mm, strict=True)}
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Edges cannot be rounder than the box is thick."""
         yield from super().rules()
         most = min(self.size_mm) / 2
@@ -212,7 +210,7 @@ class RevolutionShape(Walled):
         heights = [z for z, _ in self.profile_mm]
         return 0, {"x": (-radius, radius), "y": (-radius, radius), "z": (min(heights), max(heights))}
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """An outline leads from one end to the other: z never falls, and only the ends may lie on the axis."""
         yield from super().rules()
         for i, (z, r) in enumerate(self.profile_mm):
@@ -254,7 +252,7 @@ class Sections(Walled):
         z = [s.z_mm for s in self.sections]
         return symmetry, {"x": (min(x), max(x)), "y": (min(y), max(y)), "z": (min(z), max(z))}
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Sections are stacked upwards; only the first and the last may end on the axis."""
         yield from super().rules()
         for i, (low, high) in enumerate(pairwise(self.sections), 1):

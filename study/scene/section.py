@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import InitErrorDetails
 
 from softjaw.study.messages import printable
-from softjaw.study.scene.errors import refusal, refuse
+from softjaw.study.scene.errors import Errors, refusal, refuse
 
 
 class SceneSection(BaseModel):
@@ -24,7 +23,7 @@ class SceneSection(BaseModel):
         refuse(self.rules())
         return self
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """What is wrong with keys that are valid one by one, by their paths within the section."""
         return iter(())
 

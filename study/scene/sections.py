@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import string
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import InitErrorDetails
 
 from softjaw.fem.pad.halving import halved
 from softjaw.study.messages import shown
-from softjaw.study.scene.errors import wrong
+from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.units import si
@@ -105,7 +104,7 @@ class Gripper(SceneSection):
         """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and contact face [-]."""
         return (self.grading_x, self.grading_y, self.grading_z)
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
         yield from self._hyperfoam_rules() if self.material == "hyperfoam" else self._material_rules()
         pad = (self.pad_length_mm, self.pad_width_mm)
@@ -134,7 +133,7 @@ class Gripper(SceneSection):
             edges.append((min(steps) / sum(steps) * size, max(steps) / sum(steps) * size))
         return edges
 
-    def _material_rules(self) -> Iterator[InitErrorDetails]:
+    def _material_rules(self) -> Errors:
         if self.material == "blatz_ko" and self.poisson_ratio != 0.25:
             expected = '0.25, which Blatz-Ko foam always has, or material = "hyperfoam"'
             yield wrong(self.poisson_ratio, expected, "poisson_ratio")
@@ -142,7 +141,7 @@ class Gripper(SceneSection):
             if terms := getattr(self, key):
                 yield wrong(terms, f'material = "hyperfoam", not {shown(self.material)}, beside it', key)
 
-    def _hyperfoam_rules(self) -> Iterator[InitErrorDetails]:
+    def _hyperfoam_rules(self) -> Errors:
         if len(self.alpha) != len(self.shear_moduli_kpa):
             yield wrong(self.alpha, f"as many exponents as moduli, {len(self.shear_moduli_kpa)}", "alpha")
         if 0 in self.alpha:
@@ -152,7 +151,7 @@ class Gripper(SceneSection):
             expected = f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0; leave it out"
             yield wrong(self.shear_modulus_kpa, expected, "shear_modulus_kpa")
 
-    def symmetry_rules(self, effects: Effects) -> Iterator[InitErrorDetails]:
+    def symmetry_rules(self, effects: Effects) -> Errors:
         """Symmetric halves need even counts."""
         n = list(self.elements)
         if effects.model_size != "full" and (n[0] % 2 or n[1] % 2):
@@ -160,7 +159,7 @@ class Gripper(SceneSection):
             expected = f'even numbers along length and width, {even}, or effects.model_size = "full"'
             yield wrong(n, f"{expected}, so that symmetric halves can be meshed", "elements")
 
-    def support_rules(self, effects: Effects, accuracy: Accuracy) -> Iterator[InitErrorDetails]:
+    def support_rules(self, effects: Effects, accuracy: Accuracy) -> Errors:
         """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
         tilts = self.tilt_stiffness_nm_per_rad is not None
         if tilts and effects.sheet == "elastic":
@@ -187,7 +186,7 @@ class Friction(SceneSection):
         False, description="whether the friction that pressing has used is missing for holding (CCM)"
     )
 
-    def used_rules(self, effects: Effects) -> Iterator[InitErrorDetails]:
+    def used_rules(self, effects: Effects) -> Errors:
         """What pressing uses is known only where friction acts back."""
         if self.used_by_pressing and effects.friction_pressure_coupling != "tangential":
             expected = 'effects.friction_pressure_coupling = "tangential" beside it'
@@ -240,7 +239,7 @@ class LimitSurfaceKeys(SceneSection):
         "none", description="candidates whose sampled wrenches are stored, by number or label"
     )
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Only some models have several objectives."""
         if self.objective == "zhou" and self.model not in CONVEX_FITS:
             yield wrong("zhou", f'"least_squares", or model {" or ".join(CONVEX_FITS)}', "objective")
@@ -287,13 +286,13 @@ class Effects(SceneSection):
         "auto", description="components of the friction wrench that are stored as a limit surface; auto is 3-D"
     )
 
-    def object_rules(self, shape: Shape) -> Iterator[InitErrorDetails]:
+    def object_rules(self, shape: Shape) -> Errors:
         """A shell needs a wall."""
         hollow = isinstance(shape, Walled) and shape.wall is not None
         if self.object.endswith("shell") and not hollow:
             yield wrong(self.object, 'an object with a wall, as `wall_mm = 0.4` in [object], or "auto"', "object")
 
-    def surface_rules(self, surface: LimitSurfaceKeys) -> Iterator[InitErrorDetails]:
+    def surface_rules(self, surface: LimitSurfaceKeys) -> Errors:
         """A forced level is that of the model."""
         models = LEVELS.get(self.limit_surface, ())
         if models and surface.model not in models:
@@ -324,7 +323,7 @@ class Accuracy(SceneSection):
     wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
     wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """A target needs errors."""
         if self.target is not None and self.meshes < 2:
             yield wrong(self.target, "accuracy.meshes = 2 beside it, whose difference tells the error", "target")
@@ -361,7 +360,7 @@ class Uncertainty(SceneSection):
         }  # fmt: skip
         return tuple(name for name, wanted in asked.items() if wanted)
 
-    def input_rules(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    def input_rules(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Errors:
         """A friction coefficient that may be negative, a missing wall, and a sweep, which has no intervals."""
         if self.mu and self.mu >= friction.mu:
             expected = f"less than friction.mu, which is {friction.mu:g}"
@@ -380,7 +379,7 @@ class Output(SceneSection):
     )
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
 
-    def rules(self) -> Iterator[InitErrorDetails]:
+    def rules(self) -> Errors:
         """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
         path = PurePosixPath(self.file)
         if not self.file.endswith(".hdf"):
@@ -401,7 +400,7 @@ class Run(SceneSection):
     )
 
 
-def petsc_rules(options: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+def petsc_rules(options: Mapping[str, Any]) -> Errors:
     """Options of the contact solver only, and none that writes files or runs code."""
     for key, value in options.items():
         bare = key.lstrip("-").removeprefix("contact_")

@@ -294,7 +294,7 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named():
     assert (p.key, p.found) == ('sweep."object.radius_mm"[0]', "10")
     # Each value fits the scene alone; together they make elements of 0.2 x 5 mm.
     p = problem(BALL, "sweep.gripper.pad_width_mm=[22, 2]", "sweep.gripper.pad_thickness_mm=[15, 30]")
-    assert (p.key, p.found) == ("sweep", '"gripper.pad_width_mm = 2.0, gripper.pad_thickness_mm = 30.0"')
+    assert (p.key, p.found) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
 
 
 def test_too_many_cases_are_refused():
