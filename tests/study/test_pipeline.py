@@ -259,7 +259,8 @@ def test_without_friction_nothing_is_held_and_a_flag_says_so():
         values = result.values
         for name in ("quality", "epsilon", "f_x_max", "f_y_max", "tau_z_max"):
             assert (np.asarray(values[f"maps/{name}"]) == 0.0).all()
-        assert values["maps/flags"] & ~Flag.COARSE == Flag.NO_TORQUE | Flag.NO_FORCE
+        # without friction rounding decides whether the two pressures balance each other
+        assert values["maps/flags"] & ~(Flag.COARSE | Flag.NOT_BORNE) == Flag.NO_TORQUE | Flag.NO_FORCE
         assert "carries no torque" in result.message
         assert values["maps/e_n"] == pytest.approx(held["maps/e_n"], rel=1e-12)  # a length, whatever mu is
         assert values["maps/S"] == held["maps/S"]

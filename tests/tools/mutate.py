@@ -1,10 +1,12 @@
 """How many small random bugs the fast tests notice: ``python -m tests.tools.mutate --count 100 --out mutants.jsonl``.
 
 A mutant is the project with one change: an operator, a constant, a sign, an index or a condition of ``FOLDERS``. The
-seed fixes the sample. Each mutant meets the tests of its own folder first, then all others of ``make test``, until the
-first fails. Before that all tests run without a change, which shows how long each file takes. The working tree is never
-touched: the files that git knows are copied, and the copy is changed. Each mutant adds one line of JSON; the same
-command again resumes.
+seed fixes the sample. First the tests of ``make test`` run without a change, which shows the files of tests that run
+each line, and their times. Then each mutant meets the files that run its line, the fastest first, until a test fails.
+What is compiled, or outside of functions, is not seen so: such mutants meet all files that run anything of their module
+or lie in the folder that mirrors its own. Those that pass meet the tests that start ranks. The working tree is never
+touched: the files that git knows are copied, and the copy is changed. Each mutant adds one line of JSON to the output;
+the same command again resumes. A test that fails without a change is named and left out.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import os
 import random
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,14 +29,16 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("fem", "friction", "lsfit", "scoring", "study/case", "study/result", "study/run")
 KINDS = ("operator", "constant", "sign", "index", "condition")
 OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.Pow: "*", ast.FloorDiv: "/", ast.Mod: "//"}
 COMPARISONS = {ast.Lt: ">", ast.LtE: ">=", ast.Gt: "<", ast.GtE: "<=", ast.Eq: "!=", ast.NotEq: "=="}
 COMPILED = re.compile(r"^\s*@(numba\.)?(njit|vectorize|guvectorize)|^\s*@\w*(kernel|compiled)", re.M)
-# mpirun answers, and the ranks of a test have their own limits; what takes longer hangs
-SECONDS_OF_A_MUTANT = 1500
+FAST, RANKS = "not long", "ranks and not long"
+LIMIT_S = 1500  # of a mutant; what takes longer hangs
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,10 @@ class Copy:
     """A copy of the project in which one file at a time is changed."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.durations = folder, dict[str, float]()
+        self.folder = folder
+        self.failing: list[str] = []
+        self.durations: dict[str, float] = {}
+        self.covered: dict[str, dict[str, list[str]]] = {}
         listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
         for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines():
             if (ROOT / name).exists():
@@ -142,67 +150,76 @@ class Copy:
         for file in self.folder.rglob("__pycache__/*.nb[ic]"):
             file.unlink()
 
-    def tests_of(self, file: str) -> list[str]:
-        """Test files of the file's folder, the nearest folder and the fastest first."""
-        ordered: list[str] = []
-        for parent in [p for p in Path(file).parents if p.name]:
-            here = self.folder / "tests" / parent
-            names = [str(p.relative_to(self.folder)) for p in here.rglob("test_*.py")]
-            nearest = [n for n in names if n not in ordered]
-            ordered += sorted(nearest, key=lambda n: (self.durations.get(n, 1.0), n))
-        return ordered
+    def tests_of(self, mutation: Mutation) -> list[str]:
+        """Test files that run a line, or else anything of its file, the fastest first."""
+        of_file = self.covered.get(mutation.file, {})
+        names = set(of_file.get(str(mutation.line), []))
+        if not names:
+            mirrored = (self.folder / "tests" / Path(mutation.file).parent).rglob("test_*.py")
+            names = {str(path.relative_to(self.folder)) for path in mirrored}.union(*of_file.values())
+        return sorted(names, key=lambda name: (self.durations.get(name, 1.0), name))
 
-    def all_tests(self) -> list[str]:
-        names = [str(p.relative_to(self.folder)) for p in (self.folder / "tests").rglob("test_*.py")]
-        return sorted(names, key=lambda n: (self.durations.get(n, 1.0), n))
-
-    def fails(self, files: list[str], report: Path, limit: float = SECONDS_OF_A_MUTANT) -> str:
-        """The first test that fails; empty when all pass."""
-        words = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not long", f"--junitxml={report}", *files]
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(self.folder)}
+    def failures(self, *words: str, marks: str = FAST, limit: float = LIMIT_S, **variables: str) -> list[str]:
+        """The tests that fail, or why there is no answer."""
+        report = self.folder / "report.xml"
+        report.unlink(missing_ok=True)
+        left_out = [word for name in self.failing for word in ("--deselect", name)]
+        words = (sys.executable, "-m", "pytest", "-q", "-m", marks, f"--junitxml={report}", *left_out, *words)
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(self.folder), **variables}
         with subprocess.Popen(
             words, cwd=self.folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, start_new_session=True,
         ) as process:  # fmt: skip
             try:
                 output, _ = process.communicate(timeout=limit)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, 9)
-                process.communicate()
-                return f"no answer within {limit:.0f} s"
-        if process.returncode in (0, 5):
-            return ""
-        if report.exists():
-            for case in ElementTree.parse(report).iter("testcase"):
-                if case.find("failure") is not None or case.find("error") is not None:
-                    return f"{case.get('classname')}::{case.get('name')}"
-        return f"exit code {process.returncode}: {output[-200:]}"
+            except BaseException as error:
+                os.killpg(process.pid, signal.SIGKILL)
+                if not isinstance(error, subprocess.TimeoutExpired):
+                    raise
+                return [f"no answer within {limit:.0f} s"]
+        if process.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+            return []
+        cases = ElementTree.parse(report).iter("testcase") if report.exists() else ()
+        wrong = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
+        return [node_id(case) for case in wrong] or [f"exit code {process.returncode}: {output[-200:]}"]
 
     def killer(self, mutation: Mutation) -> str:
         """The test that notices the mutation; empty for a survivor."""
         target, original = self.folder / mutation.file, ROOT / mutation.file
         source = original.read_text()
         compiled = COMPILED.search(source) is not None
-        report = self.folder / "report.xml"
         try:
             target.write_text(mutated(source, mutation))
             if compiled:
                 self._drop_compiled()
-            near = self.tests_of(mutation.file)
-            rest = [file for file in self.all_tests() if file not in near]
-            return self.fails(near, report) or self.fails(rest, report) if near else self.fails(rest, report)
+            files = self.tests_of(mutation)
+            failures = (files and self.failures("-x", *files)) or self.failures("-x", marks=RANKS)
+            return failures[0] if failures else ""
         finally:
             shutil.copy2(original, target)
             if compiled:
                 self._restore_compiled()
 
+    def measure(self, kept: Path) -> None:
+        """Run all tests without a change, or take what an earlier run has measured."""
+        if not kept.exists():
+            covered = self.folder / "covered.json"
+            limit = 10 * LIMIT_S
+            failing = self.failures("-p", "tests.tools.covered", limit=limit, COVERED=str(covered))
+            seconds: Counter[str] = Counter()
+            for case in ElementTree.parse(self.folder / "report.xml").iter("testcase"):
+                seconds[node_id(case).partition("::")[0]] += float(case.get("time") or 0)
+            lines = json.loads(covered.read_text())
+            kept.write_text(json.dumps({"failing": failing, "durations": seconds, "covered": lines}))
+        measured = json.loads(kept.read_text())
+        self.failing, self.durations, self.covered = (measured[key] for key in ("failing", "durations", "covered"))
+        for name in self.failing:
+            print(f"fails without a change: {name}", flush=True)
 
-def measured(path: Path) -> dict[str, float]:
-    """Seconds of each test file in a report of pytest (``--junitxml``)."""
-    seconds: Counter[str] = Counter()
-    for case in ElementTree.parse(path).iter("testcase"):
-        seconds[f"{(case.get('classname') or '').replace('.', '/')}.py"] += float(case.get("time") or 0)
-    return dict(seconds)
+
+def node_id(case: ElementTree.Element) -> str:
+    """How pytest names a test of its report."""
+    return f"{(case.get('classname') or '').replace('.', '/')}.py::{case.get('name')}"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -222,12 +239,7 @@ def main(arguments: list[str] | None = None) -> int:
     tried = [json.loads(line) for line in options.out.read_text().splitlines()] if options.out.exists() else []
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
-        report = options.out.with_suffix(".xml").resolve()
-        if not report.exists() and (failed := copy.fails(copy.all_tests(), report)):
-            report.unlink(missing_ok=True)
-            print(f"without any change the tests fail: {failed}", file=sys.stderr)
-            return 1
-        copy.durations.update(measured(report))
+        copy.measure(options.out.with_suffix(".tests.json"))
         for m in mutants[len(tried) :]:
             begun = time.monotonic()
             row = asdict(m) | {"killed_by": copy.killer(m), "seconds": round(time.monotonic() - begun)}
