@@ -272,7 +272,7 @@ def _at_station(scene: Scene, station: float, angle: float | None) -> tuple[Scen
     angle = _number("angle", angle, "rad")
     stations, s = _joined(where.station_values_mm, converted(station, "m", "mm"))
     angles, a = _joined(where.angles_deg, converted(angle, "rad", "deg"))
-    table = {"stations_mm": stations, "angles_deg": angles, "roll_deg": where.roll_deg}
+    table = {"stations_mm": stations, "angles_deg": angles, "roll_deg": where.roll_deg, "shift_mm": where.shift_mm}
     return _with_candidates(scene, table), s * len(angles) + a
 
 
@@ -298,7 +298,7 @@ def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
     """The scene with these candidates; what names others by number or label changes no value of a case."""
     tables = scene.effective() | {"candidates": table}
     tables["limit_surface"] = tables["limit_surface"] | {"wrench_samples": "none"}
-    return Scene.of_tables({name: part for name, part in tables.items() if name != "uncertainty"})
+    return Scene.of_tables(tables)
 
 
 def _at_force(scene: Scene, force: float) -> tuple[Scene, int]:

@@ -19,7 +19,6 @@ from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.effects import Simulated, settled
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
 from softjaw.study.case.finer import stored, weight_of
-from softjaw.study.case.probing import Probing
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solving import PressedContact, Solved, state_flags
 from softjaw.study.case.topology import of_fingers
@@ -41,7 +40,7 @@ def solve_unit(
     settings = settings_of(scene, obj)
     fingers = [model.approach(obj, pose, scene.gripper) for pose in unit.candidate.poses]
     start = time.perf_counter()
-    solving, probing = Candidate(scene, fingers, unit.candidate.poses), Probing(unit)
+    solving = Candidate(scene, fingers, unit.candidate.poses)
     choosing = time.perf_counter() - start
     try:
         for k, outcome in _outcomes(solving, wanted):
@@ -49,10 +48,9 @@ def solve_unit(
                 yield k, outcome
             else:
                 result = _result(settings, solving, k, outcome)
-                yield k, _probed(result, probing, k, unit.candidate.note, choosing)
+                yield k, _with_note(result, unit.candidate.note, choosing)
                 choosing = 0.0  # counted once for all forces
     finally:
-        probing.close()
         solving.destroy()
 
 
@@ -94,17 +92,11 @@ def _notes(flags: int, contacts: Sequence[PressedContact], note: str) -> str:
     return "; ".join(text for text in (flag_sentences(flags), *own, note) if text)
 
 
-def _probed(result: CaseResult, probing: Probing, k: int, note: str, choosing: float) -> CaseResult:
-    """The result with what the further solves of a probe give, and a note on the candidate.
-
-    Their time counts, and that in which the effects were chosen [s].
-    """
-    start = time.perf_counter()
-    values = result.values | probing.values(k)
-    for name in ("rest", "total"):
-        values[f"work/seconds_{name}"] += choosing + time.perf_counter() - start
-    message = "; ".join(text for text in (result.message, note, *probing.failures) if text)
-    return replace(result, values=values, message=message)
+def _with_note(result: CaseResult, note: str, choosing: float) -> CaseResult:
+    """The result with a note on the candidate, and the time in which the effects were chosen [s]."""
+    times = {key: result.values[key] + choosing for key in ("work/seconds_rest", "work/seconds_total")}
+    message = "; ".join(text for text in (result.message, note) if text)
+    return replace(result, values=result.values | times, message=message)
 
 
 def _outcomes(candidate: Candidate, wanted: Collection[int] | None) -> Iterator[tuple[int, Solved | CaseFailure]]:

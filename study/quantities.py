@@ -21,13 +21,14 @@ STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips",
 MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
 NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
+REALISATION = "realisation"  # dimension of the samples of uncertain inputs; the first has the scene's own
 E_N_TARGET = 0.01  # relative error of e_n that is good enough where a scene names none
 ON_TARGET = 1e-6  # of the target: an error that is no further above it meets it
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "task", "wall", "finer meshes")
-HELD = ("cor grid", "samples", "probes", "patches")
+HELD = ("cor grid", "samples", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
     " ".join(f"{letter}^{k}" if k > 1 else letter for letter, k in zip("xyt", (i, j, 4 - i - j), strict=True) if k)
@@ -169,7 +170,7 @@ class Quantity:
         )  # fmt: skip
 
 
-SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect", "probes": "probe"}
+SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
 MESHES = "Error estimate, from the differences of the mesh to one with half as many elements per direction"
 AS_MAP = "As the map, for each finger."
@@ -392,12 +393,6 @@ ROWS = (
              "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
              " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
              needs=("samples",), among="sampled"),
-    *(
-        Quantity(name, ("variation",), unit, f"{name} of changed probes", "CCM, of the candidates in"
-                 " probes/candidate solved again with one thing changed; the dimension's attribute lists what.",
-                 "probes", needs=("probes",), among="probe")
-        for name, unit in (("e_n", "m"), ("quality", ""))
-    ),
     # effects: level, indicator and reason of each
     *(
         Quantity(f"{name}_{part}", (), "", f"{part} of the effect '{name}'", text, "effects", meanings=meanings)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -98,12 +97,10 @@ def has_wall(shape: Any) -> bool:
 
 
 def shapes_of(scene: Scene) -> list[Any]:
-    """The object at every point of the sweep, each once."""
-    swept = {key: values for key, values in scene.sweep.items() if key.startswith("object.")}
-    if not swept:
-        return [scene.object]
-    points = product(*swept.values())
-    return list(dict.fromkeys(scene.with_values(dict(zip(swept, p, strict=True))).object for p in points))
+    """The object at every point that is solved, each once."""
+    points = [{key: v for key, v in point.items() if key.startswith("object.")} for point in scene.points]
+    each = [point for i, point in enumerate(points) if point not in points[:i]]
+    return [scene.with_values(point).object if point else scene.object for point in each]
 
 
 def check_object(scene: Scene) -> None:
@@ -114,9 +111,11 @@ def check_object(scene: Scene) -> None:
 
     Raises
     ------
-    StudyError
+    StudyError, SceneError
         With the key and what is wrong with it.
     """
+    for inputs in scene.realisations[1:]:
+        scene.with_values(inputs)  # a sample that cannot be, such as a friction coefficient below 0
     for shape in shapes_of(scene):
         keys = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}
         key = keys.get(shape.shape)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.build import forces_apart, middle_of, own_frame, pad_shape
-from softjaw.study.quantities import MISSING
+from softjaw.study.quantities import MISSING, REALISATION
 from softjaw.study.scene import Option, Scene
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -52,16 +52,34 @@ def candidates(scene: Scene) -> list[Candidate]:
     if where.poses:
         placed = own_frame(scene.object)
         return [
-            Candidate(float(i), 0.0, 0.0, explicit_poses(pose, placed), label)
+            Candidate(float(i), 0.0, 0.0, moved(explicit_poses(pose, placed), where.shift, where.roll), label)
             for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
     middle, half = middle_of(scene), in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
     notes = {s: middle.remark(s, half) if middle else "" for s in where.station_values}
     places = product(where.station_values, where.angles)
     return [
-        Candidate(station, angle, where.roll, axis_poses(station, angle, where.roll, middle), label, notes[station])
+        Candidate(
+            station, angle, where.roll, moved(axis_poses(station, angle, where.roll, middle), where.shift, 0.0),
+            label, notes[station],
+        )
         for (station, angle), label in zip(places, where.labels, strict=True)
-    ]
+    ]  # fmt: skip
+
+
+def moved(poses: tuple[Pose, Pose], shift: float, turn: float) -> tuple[Pose, Pose]:
+    """Both pads turned about the approach of the first [rad], then shifted along their long side [m]."""
+    if not shift and not turn:
+        return poses
+    axis, point = poses[0].rotation[:, 2], poses[0].origin
+    K = np.cross(np.eye(3), axis)  # K @ v is axis x v
+    turning = np.eye(3) + math.sin(turn) * K + (1 - math.cos(turn)) * K @ K
+
+    def placed(pose: Pose) -> Pose:
+        rotation = turning @ pose.rotation
+        return Pose(rotation, point + turning @ (pose.origin - point) + shift * rotation[:, 0])
+
+    return placed(poses[0]), placed(poses[1])
 
 
 def axis_poses(station: float, angle: float, roll: float, middle: CentreLine | None = None) -> tuple[Pose, Pose]:
@@ -223,8 +241,6 @@ class Unit:
         The candidates served, ``candidate`` first, and the angle about z that takes ``candidate`` to each [rad].
     cost : float
         Work, in element solves; only ratios mean something.
-    probe : bool
-        Whether it is solved again with inputs changed, as `study.case.probing` does.
     state, reason : int, str
         One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
     hopeless : bool
@@ -238,7 +254,6 @@ class Unit:
     served: tuple[Candidate, ...]
     turns: tuple[float, ...]
     cost: float
-    probe: bool = False
     state: int = MISSING
     reason: str = ""
     hopeless: bool = False
@@ -250,7 +265,7 @@ class Unit:
 
 
 def axes(scene: Scene) -> list[Axis]:
-    """The axes of the maps: those of the sweep in the scene's order, then station, angle and normal force."""
+    """The axes of the maps: those of the sweep in the scene's order, samples, station, angle and normal force."""
     where = scene.candidates
     if where.poses:
         station = Axis("station", np.arange(len(where.poses), dtype=float), "", "number of the grasp candidate")
@@ -259,7 +274,16 @@ def axes(scene: Scene) -> list[Axis]:
         station = Axis("station", np.array(where.station_values), "m", "station along the object's axis")
         angle = Axis("angle", np.array(where.angles), "rad", "angle about the object's axis")
     force = Axis("normal_force", np.array(scene.load.normal_force), "N", "normal force per finger")
-    return [*_sweep_axes(scene.sweep), station, angle, force]
+    return [*_sweep_axes(scene.sweep), *_realisation_axis(scene), station, angle, force]
+
+
+def _realisation_axis(scene: Scene) -> list[Axis]:
+    """The scene's own inputs and every sample of the uncertain ones; no axis where none is uncertain."""
+    if len(realisations := scene.realisations) == 1:
+        return []
+    texts = (", ".join(f"{key} = {value:g}" for key, value in inputs.items()) for inputs in realisations[1:])
+    numbers = np.arange(len(realisations), dtype=float)
+    return [Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts))]
 
 
 def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
@@ -290,8 +314,8 @@ def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
     """
     made: list[Unit] = []
     forces, count = len(scene.load.normal_force_n), scene.candidates.total
-    for point, values in enumerate(product(*scene.sweep.values())):
-        here = scene.with_values(dict(zip(scene.sweep, values, strict=True)))
+    for point, values in enumerate(scene.points):
+        here = scene.with_values(values | {"uncertainty.spread": {}})
         places, cost = candidates(here), path_cost(here)
         for group in groups(places, axis_symmetry(here)):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))

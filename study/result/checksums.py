@@ -99,7 +99,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
     arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)
-    for name in (*arrays, *["probes/candidate"] * bool(layout.probes)):
+    for name in arrays:
         crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
     return crc
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from softjaw.study.quantities import BY_KEY, FIRST, MISSING, MODELS, Quantity, map_row
 
-MESSAGE = 2000  # bytes of a message: all flags of a case have room, and what its probes add
+MESSAGE = 2000  # bytes of a message: all flags of a case have room
 ROOT = "/study"
 SUMS = f"{ROOT}/checksums"  # a dataset for each part of a row, and these two:
 STATE, CLOSING = "code", "closing"  # of the states; of what is filled after all rows
@@ -97,8 +97,6 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         yield Dataset(f"{ROOT}/map/{name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
     if layout.sampled:
         yield from _sample_datasets(layout)
-    if layout.probes:
-        yield _numbers(f"{ROOT}/probes/candidate", "candidates that are solved again", len(layout.probes), "probe")
     lengths = dict(zip(layout.names, layout.shape, strict=True))
     for d in layout.derived:
         attributes = {"units": d.units, "long_name": d.long_name, "definition": d.definition}

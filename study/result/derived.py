@@ -5,7 +5,6 @@ The safe force range of a candidate is enough to hold the object's weight, and n
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import MARGIN
-from softjaw.study.result import interval
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
 
@@ -29,14 +27,13 @@ SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that
 
 def derived(scene: Scene) -> list[Derived]:
     """Everything that is derived for a scene."""
-    return [*_of_sweep(scene), *_of_force_range(scene), *interval.derived(scene)]
+    return [*_of_sweep(scene), *_of_force_range(scene)]
 
 
 def finalise(writer: ResultWriter, scene: Scene) -> None:
     """Fill it, by one rank, after all cases."""
     _fill_sweep(writer, scene)
     _fill_force_range(writer, scene)
-    interval.finalise(writer, scene)
 
 
 def _of_sweep(scene: Scene) -> list[Derived]:
@@ -61,7 +58,7 @@ def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
     """Fill the axes of curvature studies."""
     if not _of_sweep(scene):
         return
-    points = [scene.with_values(dict(zip(scene.sweep, v, strict=True))).object for v in product(*scene.sweep.values())]
+    points = [scene.with_values(values).object for values in scene.points]
     shape = writer.layout.shape[:-3]
     a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
     writer.write_derived("b_over_a", b / a)

@@ -18,8 +18,7 @@ from softjaw.study.result.store import open_result
 
 SESSIONS = f"{ROOT}/provenance/sessions"
 # What a new file has of its own, or what is filled again once nothing is missing.
-OWN = (f"{ROOT}/derived/", f"{SUMS}/{CLOSING}", f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate",
-       f"{ROOT}/probes/candidate")  # fmt: skip
+OWN = (f"{ROOT}/derived/", f"{SUMS}/{CLOSING}", f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate")
 
 
 def grow(path: Path, layout: Layout, header: Header) -> None:

@@ -77,9 +77,8 @@ class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
-    for the candidates ``sampled``, counted over stations and angles, and the values of the ``variations`` for the
-    candidates ``probes``. ``added`` is what each round of a refinement added to the scene: stations [mm], or poses as
-    `study.run.pattern.Place`.
+    for the candidates ``sampled``, counted over stations and angles. ``added`` is what each round of a refinement added
+    to the scene: stations [mm], or poses as `study.run.pattern.Place`.
     """
 
     axes: tuple[Any, ...]
@@ -92,8 +91,6 @@ class Layout:
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
-    probes: tuple[int, ...] = ()
-    variations: tuple[str, ...] = ()
     added: tuple[tuple[Any, ...], ...] = ()
 
     @cached_property
@@ -115,7 +112,7 @@ class Layout:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """All quantities of the cases of this file."""
-        held = zip(HELD, (self.cor_grid, self.sampled, self.probes, self.patches), strict=True)
+        held = zip(HELD, (self.cor_grid, self.sampled, self.patches), strict=True)
         return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *(name for name, size in held if size)))
 
     @property
@@ -157,8 +154,6 @@ class Layout:
             parts["wall_place"] = AROUND * ALONG
         if self.sampled:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
-        if self.probes:
-            parts |= {"probe": len(self.probes), "variation": len(self.variations)}
         parts[CLOSING] = len(self.closing)
         return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
 
@@ -189,7 +184,7 @@ class Layout:
     @property
     def chosen(self) -> dict[str, tuple[int, ...]]:
         """Numbers of the candidates that some quantities are stored for alone."""
-        return {"sampled": self.sampled, "probe": self.probes}
+        return {"sampled": self.sampled}
 
     @cached_property
     def _slots(self) -> dict[str, dict[int, int]]:
@@ -212,7 +207,7 @@ class Layout:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
         names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled",
-                 "probes", "variations", *["added"] * bool(self.added))  # fmt: skip
+                 *["added"] * bool(self.added))  # fmt: skip
         return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
 
 
@@ -234,12 +229,8 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
-        probes, variations = tuple(map(int, options.get("probes", ()))), tuple(options.get("variations", ()))
-        if not len(set(probes)) == len(probes) < 10**6 or bool(probes) != bool(variations):
-            raise ValueError(f"probes {probes[:5]}, variations {variations[:5]}")
         added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
-        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, probes,
-                      variations, added)  # fmt: skip
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, added)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

@@ -13,7 +13,8 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
-from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, TABLE, Quantity
+from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, REALISATION, TABLE, Quantity
+from softjaw.study.result.intervals import with_intervals
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, StoredAxis, open_result
 
@@ -81,7 +82,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
     """
     with open_result(file) as result:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
-        rows = rows.isel(at)
+        rows = rows.isel(_as_given(result) | at)
         faces = [result.patch(int(row)) for row in rows.values.ravel()] if result.layout.patches else []
         found = {}
         for name in faces[0] if faces else ():
@@ -114,7 +115,12 @@ def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
         q = next((q for q in result.layout.quantities if q.key == path), None)
         if q is None:
             raise KeyError(f"{file}: found no dataset {path}")
-        return xr.DataArray(_variable(result, q), name=q.variable).isel(at)
+        return xr.DataArray(_variable(result, q), name=q.variable).isel(_as_given(result) | at)
+
+
+def _as_given(result: Result) -> dict[str, int | slice]:
+    """The position of the scene's own inputs, where a study has samples of uncertain ones."""
+    return {REALISATION: 0} if REALISATION in result.layout.names else {}
 
 
 def dataset(result: Result) -> xr.Dataset:
@@ -139,7 +145,8 @@ def dataset(result: Result) -> xr.Dataset:
     marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": tuple(flag.word for flag in known)}
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
-    return xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
+    ds = xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
+    return with_intervals(ds) if REALISATION in ds.dims else ds
 
 
 def axes_of(ds: xr.Dataset) -> tuple[StoredAxis, ...]:
@@ -214,8 +221,6 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
     known = {"finger": [*range(1, FINGERS + 1)], "model": [*MODELS], "component": [*XYZ], "component_2": [*XYZ]}
     used = {dim for variable in variables.values() for dim in variable.dims}
     found |= {name: values for name, values in known.items() if name in used}
-    if "probe" in used:
-        found |= {"probe": [*layout.probes], "variation": [*layout.variations]}
     return found
 
 

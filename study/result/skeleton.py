@@ -158,8 +158,6 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     if layout.sampled:
         study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
         study["wrenches/candidate"][...] = layout.sampled
-    if layout.probes:
-        study["probes/candidate"][...] = layout.probes
 
 
 def text_bytes(text: str, length: int) -> bytes:

@@ -15,7 +15,6 @@ from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_elements, pad_shape
 from softjaw.study.case.fit import decided
-from softjaw.study.case.variations import changes, probe_candidates, with_probes
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout
@@ -23,7 +22,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.estimate import START, estimated
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
-from softjaw.study.run.shares import by_cost, divisible
+from softjaw.study.run.shares import by_cost
 
 LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -56,7 +55,7 @@ class Plan:
     def in_parts(self, costs: Sequence[float]) -> list[float]:
         """Costs of the units that are tried, those of one whose forces ranks may divide as that of each force."""
         forces = self.layout.shape[-1]
-        each = [forces if divisible(unit) else 1 for unit in self.tried]
+        each = [forces if unit.apart else 1 for unit in self.tried]
         return [cost / n for cost, n in zip(costs, each, strict=True) for _ in range(n)]
 
     @property
@@ -76,8 +75,7 @@ def make_plan(
     check_object(scene)
     digest, text = scene.digest, scene.effective_toml()
     if rounds:
-        own = grasps.units(scene, lambda point: point.axis_symmetry) if scene.uncertainty.parts else []
-        scene = refined(scene, rounds, probe_candidates(scene, own))
+        scene = refined(scene, rounds)
     patches = scene.output.patches != "none"
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     axes = tuple(grasps.axes(scene))
@@ -87,7 +85,6 @@ def make_plan(
         from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
 
         units = chosen(scene, units)
-    probes = probe_candidates(scene, units)
     header = Header(
         digest=digest,
         scene=text,
@@ -109,11 +106,9 @@ def make_plan(
         has(scene),
         scene.limit_surface.samples,
         scene.sampled,
-        probes,
-        changes(scene) if probes else (),
         rounds,
     )
-    return Plan(layout, header, with_probes(scene, units, probes))
+    return Plan(layout, header, tuple(units))
 
 
 def has(scene: Any) -> tuple[str, ...]:
@@ -243,9 +238,8 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     on = f"on {ranks} rank{'s' * (ranks > 1)}"
     times = _wall_seconds(plan, scene)
     if not times:
-        repeats = 1 + len(plan.layout.variations)
-        seconds = [t * (repeats if u.probe else 1) for t, u in zip(estimated(plan.tried), plan.tried, strict=True)]
-        return f"about {duration(START + makespan(plan.in_parts(seconds), ranks))} {on}, estimated on a bed of springs"
+        seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
+        return f"about {duration(START + seconds)} {on}, estimated on a bed of springs"
     paths = [plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)] * len(plan.tried)
     low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
     if low == high:

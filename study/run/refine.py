@@ -32,13 +32,13 @@ FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would o
 TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
 
 
-def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
-    """The scene with what all rounds added as its own; ``probes`` are the numbers that the scene gives them."""
+def refined(scene: Scene, rounds: Rounds) -> Scene:
+    """The scene with what all rounds added as its own."""
     if not rounds:
         return scene
     where, given = scene.candidates, scene.candidates.station_values_mm
     if where.poses:
-        return _with_poses(scene, rounds, probes)
+        return _with_poses(scene, rounds)
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
     numbers = _Renumbered(given, stations, len(where.angles_deg))
     fixed: dict[str, Any] = {"stations": None, "station_range_mm": None, "stations_mm": stations, "refine": None}
@@ -48,20 +48,15 @@ def refined(scene: Scene, rounds: Rounds, probes: Sequence[int] = ()) -> Scene:
     if not isinstance(names := scene.limit_surface.wrench_samples, str):
         samples = numbers(where.numbers(names))
         parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
-    if probes:
-        parts["uncertainty"] = scene.uncertainty.model_copy(update={"probes": numbers(probes)})
     return scene.model_copy(update=parts)
 
 
-def _with_poses(scene: Scene, rounds: Rounds, probes: Sequence[int]) -> Scene:
+def _with_poses(scene: Scene, rounds: Rounds) -> Scene:
     where = scene.candidates
     poses = with_places(where.poses, rounds)
     # What was left out as not among the best stays so in the file; the added poses are all solved.
     fixed = {"poses": poses, "refine": None, "solve_best": None}
-    parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
-    if probes:
-        parts["uncertainty"] = scene.uncertainty.model_copy(update={"probes": tuple(probes)})
-    return scene.model_copy(update=parts)
+    return scene.model_copy(update={"candidates": where.model_copy(update=fixed)})
 
 
 @dataclass(frozen=True)

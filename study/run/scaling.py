@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.run.plan import Plan, measured_seconds
 from softjaw.study.run.progress import duration
-from softjaw.study.run.shares import by_cost, divisible
+from softjaw.study.run.shares import by_cost
 
 STATE_WRITES = 5  # of a case besides its values: begun, state, its checksum, and the maps that are seen first
 NOTHING = 0.05  # share of the time below which something does not count as the limit
@@ -117,7 +117,7 @@ def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
     for unit in plan.tried:
         times = seconds[list(unit.rows[0])]
         taken = tuple(map(float, times[np.isfinite(times)]))  # the forces above a failed one were not tried
-        if divisible(unit):
+        if unit.apart:
             found += [LoadPath((t,), unit.cost / len(times), len(unit.rows)) for t in taken]
         elif taken:
             found.append(LoadPath(taken, unit.cost, len(unit.rows)))

@@ -35,11 +35,6 @@ class Share:
         return [replace(self, forces=self.forces[i::parts]) for i in range(min(parts, len(self.forces)))]
 
 
-def divisible(unit: Any) -> bool:
-    """Whether ranks may divide the forces of a unit: of a probe not, whose further solves follow one load path."""
-    return unit.apart and not unit.probe
-
-
 def by_cost(costs: Sequence[float]) -> list[int]:
     """Positions with the most expensive first; equal costs keep their order.
 
@@ -64,7 +59,7 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     for own in waiting:
         left -= own.cost
         # what follows keeps the others busy meanwhile
-        whole = not divisible(own.unit) or left >= ranks * own.cost
+        whole = not own.unit.apart or left >= ranks * own.cost
         found += [own] if whole or ranks == 1 else own.divided(ranks)
     return _in_order(found)
 

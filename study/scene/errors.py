@@ -21,6 +21,13 @@ MOST_LISTED = 50  # problems in one message
 MOVED = {  # keys of the last version, and what stands for them
     "accuracy.e_n": "write `accuracy.target`, with `accuracy.target_of = \"e_n\"`",
     "accuracy.cost_file": "write `accuracy.target`: no file of costs is needed",
+    "uncertainty.probes": "remove it: all candidates are solved with every sample",
+    "uncertainty.mesh": "write `accuracy.meshes = 2`",
+    "uncertainty.mu": "write it as `\"friction.mu\"` in `uncertainty.spread`",
+    "uncertainty.shear_modulus_percent": "write kPa as `\"gripper.shear_modulus_kpa\"` in `uncertainty.spread`",
+    "uncertainty.wall_thickness_percent": "write mm as `\"object.wall_mm\"` in `uncertainty.spread`",
+    "uncertainty.pose_mm": "write it as `\"candidates.shift_mm\"` in `uncertainty.spread`",
+    "uncertainty.pose_deg": "write it as `\"candidates.roll_deg\"` in `uncertainty.spread`",
 }
 HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")

@@ -19,7 +19,8 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
 EXAMPLE = "for example `stations = 35` with `station_range_mm = [25, 175]`"
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
-OF_EVERY_KIND = ("refine", "solve_best", "skip_hopeless")  # keys that stations, poses and a sampler share
+# keys that stations, poses and a sampler share
+OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "solve_best", "skip_hopeless")
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
@@ -110,8 +111,9 @@ class Candidates(SceneSection):
         tuple[Angle, ...], Field(strict=False, min_length=1, max_length=3600), AfterValidator(once_and_rising)
     ] = Field((0.0, 90.0), description="angles about the axis", examples=[[0, 90]])
     roll_deg: Angle = Field(
-        0.0, description="turn of the gripper about the approach; 0 has the long side along the axis"
+        0.0, description="turn of the gripper about the approach; 0 has the long side along the axis, or as in poses"
     )
+    shift_mm: float = Field(0.0, ge=-200, le=200, description="shift of the gripper along the pads' long side")
     poses: tuple[GraspPose, ...] = Field(
         (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
     )
@@ -131,6 +133,7 @@ class Candidates(SceneSection):
     )
     skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
+    shift: ClassVar[Any] = si("shift_mm")
 
     @property
     def station_values_mm(self) -> tuple[float, ...]:
@@ -179,7 +182,6 @@ class Candidates(SceneSection):
             key, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
             yield wrong(getattr(self, key), f"{missing} beside it, {EXAMPLE}", key)
         needs = {"count": self.sampler, "seed": self.sampler, "angles_deg": not (self.poses or self.sampler)}
-        needs["roll_deg"] = needs["angles_deg"]
         for key, met in needs.items():
             if not met and (value := getattr(self, key)) != Candidates.model_fields[key].default:
                 way = "stations" if key.endswith("deg") else 'sampler = "antipodal"'

@@ -22,6 +22,7 @@ from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (
     LEVELS,
+    UNCERTAIN,
     Accuracy,
     Effects,
     Friction,
@@ -68,10 +69,7 @@ JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
         (lambda surface, c: c.name_rules("wrench_samples", surface.wrench_samples), ("candidates",)),
     ),
     "petsc": ((petsc_rules, ()),),
-    "uncertainty": (
-        (lambda u, c: c.name_rules("probes", u.probes), ("candidates",)),
-        (Uncertainty.input_rules, ("object", "friction", "sweep")),
-    ),
+    "uncertainty": ((Uncertainty.spread_rules, UNCERTAIN),),
 }
 
 
@@ -184,8 +182,27 @@ class Scene(SceneSection):
 
     @property
     def cases(self) -> int:
-        """Number of cases: candidates x forces x points of the sweep."""
-        return self.candidates.total * len(self.load.normal_force_n) * math.prod(map(len, self.sweep.values()))
+        """Number of cases: candidates x forces x points of the sweep x samples of uncertain inputs."""
+        points = math.prod(map(len, self.sweep.values()))
+        points *= 1 + self.uncertainty.samples if self.uncertainty.spread else 1
+        return self.candidates.total * len(self.load.normal_force_n) * points
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """Values by dotted key of every point that is solved: those of the sweep, and for each all `realisations`."""
+        grid = [dict(zip(self.sweep, values, strict=True)) for values in product(*self.sweep.values())]
+        return [point | inputs for point in grid for inputs in self.realisations]
+
+    @property
+    def realisations(self) -> list[dict[str, float]]:
+        """Values of the uncertain inputs by dotted key: the scene's own, which are none, then those of the samples."""
+        if not self.uncertainty.spread:
+            return [{}]
+        from softjaw.study.scene.samples import latin_hypercube  # scipy, which most scenes are read without
+
+        tables = {key: getattr(getattr(self, key.partition(".")[0]), key.partition(".")[2])
+                  for key in self.uncertainty.spread}  # fmt: skip
+        return [{}, *latin_hypercube(tables, self.uncertainty.spread, self.uncertainty.samples)]
 
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""
@@ -208,7 +225,7 @@ class Scene(SceneSection):
         """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[output]``, ``[run]``."""
         data = self.effective()
         del data["output"], data["run"], data["object"]["name"]
-        if not self.uncertainty.parts:  # files of scenes without it keep their digest
+        if not self.uncertainty.spread:  # files of scenes without it keep their digest
             del data["uncertainty"]
         if isinstance(self.object, Mesh):
             # By content: a mesh that was moved or copied is the same one.
@@ -216,8 +233,8 @@ class Scene(SceneSection):
         if self.candidates.poses:
             data["candidates"] = [(p.point_mm, p.approach, p.long_side) for p in self.candidates.poses]
         else:
-            where = self.candidates
-            data["candidates"] = [where.station_values_mm, where.angles_deg, where.roll_deg]
+            data["candidates"] = [self.candidates.station_values_mm, self.candidates.angles_deg]
+        data["candidates"] += [self.candidates.roll_deg, self.candidates.shift_mm]
         # Options that only watch the solver change no result.
         data["petsc"] = {k: v for k, v in self.petsc.items() if not any(word in k for word in WATCHING)}
         data["sweep"] = list(self.sweep.items())  # the order of the axes counts

@@ -15,6 +15,7 @@ from softjaw.study.messages import shown
 from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
+from softjaw.study.scene.text import flat
 from softjaw.study.units import si
 
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -28,8 +29,8 @@ Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
-Share = Annotated[float, Field(ge=0, le=50)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
+UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 MOST_MESHES = 4  # of a case, each 1.4 times as fine in every direction as the one before; each costs 3 times as much
 ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
 LEVELS = {  # level of the effect: models of [limit_surface]
@@ -335,40 +336,35 @@ class Accuracy(SceneSection):
 
 
 class Uncertainty(SceneSection):
-    """Uncertainty of inputs (0: none), as half-widths of their 95 % intervals.
+    """Inputs that are uncertain: the study is solved again for samples of them, which gives maps an interval.
 
-    Errors that no formula gives are found by solving a few candidates, the probes, again with the input changed.
+    The samples are a Latin hypercube of normal distributions about the scene's own values.
     """
 
-    probes: Annotated[int, Field(ge=2, le=1000)] | Names = Field(
-        5, description="how many candidates are solved again, or which ones, by number or label"
+    samples: int = Field(20, ge=8, le=1000, description="how often the study is solved again")
+    spread: dict[str, Annotated[float, Field(gt=0)]] = Field(
+        default_factory=dict,
+        description="half-widths of 95 % intervals by dotted key, in the key's unit",
+        examples=[{"friction.mu": 0.08}],
     )
-    mesh: bool = Field(False, description="the error of the mesh, from one with half as many elements per direction")
-    shear_modulus_percent: Share = Field(0.0, description="half-width of the pads' shear modulus")
-    wall_thickness_percent: Share = Field(0.0, description="half-width of the thickness of a thin wall")
-    mu: float = Field(0.0, ge=0, le=5, description="half-width of the friction coefficient")
-    pose_mm: float = Field(0.0, ge=0, le=50, description="half-width of the gripper's place along the pads' long side")
-    pose_deg: float = Field(0.0, ge=0, le=30, description="half-width of the gripper's turn about the approach")
-    pose, pose_turn = si("pose_mm"), si("pose_deg")
 
-    @property
-    def parts(self) -> tuple[str, ...]:
-        """What is asked for, of ``mesh, mu, modulus, wall, pose``."""
-        asked = {
-            "mesh": self.mesh, "mu": self.mu, "modulus": self.shear_modulus_percent,
-            "wall": self.wall_thickness_percent, "pose": self.pose_mm or self.pose_deg,
-        }  # fmt: skip
-        return tuple(name for name, wanted in asked.items() if wanted)
+    @model_validator(mode="before")
+    @classmethod
+    def _dotted(cls, data: Any) -> Any:
+        """Dotted keys mean the same with and without quotes."""
+        if isinstance(data, dict) and isinstance(data.get("spread"), dict):
+            return data | {"spread": flat(data["spread"])}
+        return data
 
-    def input_rules(self, shape: Shape, friction: Friction, sweep: Mapping[str, Any]) -> Errors:
-        """A friction coefficient that may be negative, a missing wall, and a sweep, which has no intervals."""
-        if self.mu and self.mu >= friction.mu:
-            expected = f"less than friction.mu, which is {friction.mu:g}"
-            yield wrong(self.mu, f"{expected}: the half-width of mu itself", "mu")
-        if self.wall_thickness_percent and getattr(shape, "wall", None) is None:
-            yield wrong(self.wall_thickness_percent, "0 for an object without a wall", "wall_thickness_percent")
-        if self.parts and sweep:
-            yield wrong(self.parts, f"a scene without a sweep, not one over {', '.join(sweep)}")
+    def spread_rules(self, *sections: SceneSection) -> Errors:
+        """Only single numbers of the sections in `UNCERTAIN` can be uncertain."""
+        by_name = dict(zip(UNCERTAIN, sections, strict=True))
+        for key in self.spread:
+            section, _, name = key.partition(".")
+            known = section in by_name and name in type(by_name[section]).model_fields
+            if type(value := getattr(by_name[section], name) if known else None) not in (int, float):
+                expected = f"a key that has a single number, of {', '.join(UNCERTAIN)}"
+                yield wrong(value, expected, "spread", key)
 
 
 class Output(SceneSection):

@@ -50,7 +50,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
             served = tuple(rows[i] for i in a)
             unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
             unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
-            unit.apart, unit.probe = apart, False
+            unit.apart = apart
             units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"

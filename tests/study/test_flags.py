@@ -85,7 +85,7 @@ def test_words_fit_their_column_and_sentences_their_message():
         assert 0 < len(flag.word) <= FLAGS_WIDTH
         assert flag.sentence
         assert ";" not in flag.sentence + flag.word
-    assert len(flag_sentences(OF_FILE).encode()) < MESSAGE - 400  # probes may add theirs
+    assert len(flag_sentences(OF_FILE).encode()) < MESSAGE - 400
 
 
 def test_the_definition_in_the_file_tells_every_bit_of_a_file_and_no_other():

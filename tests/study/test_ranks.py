@@ -49,11 +49,6 @@ target_of = "e_n"
 
 [effects]
 friction_pressure_coupling = "none"
-
-[uncertainty]
-probes = ["30 mm, 5 deg"]
-mu = 0.05
-pose_mm = 1
 """
 CASES = 12
 BOX, CUP = (
@@ -127,7 +122,6 @@ def test_two_ranks_divide_the_forces_of_a_candidate():
 @pytest.mark.parametrize("name", ["box", "cup"])
 def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_path, scene, ranks, name):
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
-               "uncertainty.mu=0", "uncertainty.pose_mm=0", "uncertainty.probes=2",
                "limit_surface.wrench_samples='none'", "effects.friction_pressure_coupling='auto'")  # fmt: skip
     if name == "cup":
         changes += ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",

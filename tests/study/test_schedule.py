@@ -93,7 +93,7 @@ def units_of(costs, forces=6, apart=True):
     """Units that serve two candidates each."""
     rows = np.arange(len(costs) * 2 * forces).reshape(len(costs), 2, forces).tolist()
     return [
-        SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, probe=False, hopeless=False, state=0)
+        SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, hopeless=False, state=0)
         for i, (own, cost) in enumerate(zip(rows, costs, strict=True))
     ]
 
@@ -127,12 +127,9 @@ def test_one_candidate_is_divided_evenly_and_many_only_at_the_end():
     assert divided(units_of([100.0, 1.0]), 2)[:2] == [(0, (0, 2, 4)), (0, (1, 3, 5))]
 
 
-def test_load_paths_and_probes_are_not_divided():
+def test_load_paths_are_not_divided():
     whole = (0, 1, 2, 3, 4, 5)
     assert divided(units_of([1.0], apart=False), 2) == [(0, whole)]
-    probe, other = units_of([4.0, 1.0])
-    probe.probe, other.hopeless = True, True
-    assert divided([other, probe], 2) == [(0, whole), (1, (0, 2, 4)), (1, (1, 3, 5))]
 
 
 @pytest.mark.parametrize("ranks", [2, 3, 4, 8])

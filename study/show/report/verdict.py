@@ -50,8 +50,8 @@ CAVEAT = (
 ESTIMATED = "± is the error estimate from two meshes, in per cent of the value; the error is usually smaller."
 NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
 WITH_INTERVALS = (
-    "± is the half-width of the interval within which about 95 of 100 cases lie, in per cent of the value; it has the"
-    " parts that [uncertainty] in the scene asks for."
+    "± is the half-width of the interval in which 95 % of the samples of the uncertain inputs lie, in per cent of the"
+    " value; [uncertainty] in the scene lists these inputs."
 )
 VALUES = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 # of the plain text in the file

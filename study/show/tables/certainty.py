@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
-from softjaw.study.result.read import mesh_error
+from softjaw.study.quantities import REALISATION
+from softjaw.study.result.intervals import half_width
+from softjaw.study.result.read import mesh_error, values_of
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
-MOVES = {"mu": "mu", "modulus": "the shear modulus", "wall": "the wall's thickness"}  # all grasps at once
 
 
 @dataclass(frozen=True)
@@ -23,55 +25,46 @@ class Sure:
 
     Attributes
     ----------
-    value : (n,) array
-    own : (n,) array
-        Half-width of what is each grasp's own, or whose sign is not known; NaN where nothing is.
-    common : dict of (n,) arrays
-        Changes by inputs that move all grasps at once, each with its sign.
-    unsigned : tuple of str
-        Inputs that do so too, but with a sign that is known at the probes only, so they are part of ``own``.
+    value, error : (n,) arrays
+        ``error`` is that of the mesh; NaN where it is not known.
+    samples : (n, m) array
+        Values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
     """
 
     value: FloatArray
-    own: FloatArray
-    common: dict[str, FloatArray]
-    unsigned: tuple[str, ...] = ()
+    error: FloatArray
+    samples: FloatArray
 
     @property
     def half_width(self) -> FloatArray:
         """All of it together, ``(n,)``."""
-        return np.sqrt(self.own**2 + sum((change**2 for change in self.common.values()), np.zeros(self.value.shape)))
+        return np.hypot(self.error, _half_width(self.samples))
 
     def apart(self, i: int, j: int) -> bool | None:
         """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
 
-        A difference within `TIE` of the values is none, also where nothing is said to be in error.
+        Inputs move all grasps at once, so it is the difference that has an interval. A difference within `TIE` of the
+        values is none, also where nothing is said to be in error.
         """
-        both = np.array([change[i] - change[j] for change in self.common.values()])
-        error = np.sqrt(self.own[i] ** 2 + self.own[j] ** 2 + np.sum(both**2))
+        error = np.hypot(np.hypot(self.error[i], self.error[j]), _half_width(self.samples[i] - self.samples[j]))
         least = TIE * max(abs(self.value[i]), abs(self.value[j]))
         return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
 
 
+def _half_width(samples: FloatArray) -> FloatArray:
+    if not samples.shape[-1]:
+        return np.zeros(samples.shape[:-1])
+    return half_width(xr.DataArray(samples, dims=[*(f"dim_{i}" for i in range(samples.ndim - 1)), REALISATION])).values
+
+
 def sure(ds: Any, name: str, k: int) -> Sure | None:
-    """``quality`` or ``e_n`` (CCM) of all candidates at a force level; None where a file knows no error of it."""
-    values = ds[name].sel(model="ccm").values[..., k].ravel()
-    shares = {full: full.removeprefix(f"{name}_") for full in ds.attrs["derived"]}
-    own, common = np.zeros(values.shape), dict[str, FloatArray]()
-    if f"{name}_interval" in shares:
-        for full, short in shares.items():
-            kind, _, of = short.partition("_")
-            if full == short or not of:
-                continue
-            change = ds[full].values[..., k].ravel() * values
-            if kind == "change":
-                common[of] = change
-            else:
-                own = own + change**2
-        unsigned = tuple(of for of in MOVES if f"{name}_interval_{of}" in shares)
-        return Sure(values, np.sqrt(own), common, unsigned)
-    error = mesh_error(ds, name)
-    return None if error is None else Sure(values, error[..., k].ravel(), common)
+    """A map (CCM) of all candidates at a force level; None where a file knows no error of it."""
+    values, error, samples = values_of(ds, name)[..., k].ravel(), mesh_error(ds, name), ds.get(f"{name}_samples")
+    if error is None and samples is None:
+        return None
+    own = np.zeros(values.shape) if error is None else error[..., k].ravel()
+    inputs = np.empty((len(values), 0)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
+    return Sure(values, own, inputs)
 
 
 def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:
@@ -93,26 +86,16 @@ def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int,
     if len(grasps) < 2:
         return ""
     judged = [found.apart(grasps[0], other) for other in grasps[1:]]
-    if not np.isfinite(found.own[grasps]).any():
-        return "errors are not known: not all cases are solved yet, or the probes could not be solved again"
+    if not np.isfinite(found.half_width[grasps]).any():
+        return "errors are not known: not all cases are solved yet, or not with all samples of the uncertain inputs"
     if judged[0] is None:
         return "whether the best grasp is better than the second is not known: one of them has no error"
     alike = max((i for i, apart in enumerate(judged, start=1) if apart is False), default=0)
     one, other = (_text(found, i, units) for i in (grasps[0], grasps[alike or 1]))
-    also = _moved(found)
     if not alike:
-        return f"the best grasp is better than the second beyond the errors ({one} against {other}){also}"
+        return f"the best grasp is better than the second beyond the errors ({one} against {other})"
     between = "" if all(apart is False for apart in judged[:alike]) else ", though some between them can"
-    return f"the first {alike + 1} grasps cannot be distinguished ({one} to {other}){between}{also}"
-
-
-def _moved(found: Sure) -> str:
-    """What is said of inputs that move all grasps at once."""
-    both = [of for of, change in found.common.items() if np.any(change)]
-    words = [" and ".join(MOVES[of] for of in names) for names in (both, found.unsigned)]
-    text = f"; {words[0]} move{'s' * (len(both) == 1)} all grasps at once" if both else ""
-    count = "counts" if len(found.unsigned) == 1 else "count"
-    return text + (f"; {words[1]} {count} for each grasp by itself, which is cautious" if found.unsigned else "")
+    return f"the first {alike + 1} grasps cannot be distinguished ({one} to {other}){between}"
 
 
 def _without_images(value: FloatArray, order: Sequence[int], place: Sequence[tuple[int, ...]]) -> list[int]:

@@ -67,15 +67,9 @@ def limits_text(run: Any) -> str:
 
 def _intervals(scene: Any) -> str:
     """What the uncertainty intervals are made of, and what they take; empty where none are asked for."""
-    own = scene.uncertainty
-    if not own.parts:
-        return ""
-    from softjaw.study.case.variations import changes
-
-    more = len(changes(scene))
-    count = own.probes if isinstance(own.probes, int) else len(own.probes)
-    cost = f"{count} candidates are solved {more} more time{'s' * (more > 1)}" if more else "no further solves"
-    return f"of e_n and quality, from {', '.join(own.parts)}; {cost}"
+    spread, samples = scene.uncertainty.spread, scene.uncertainty.samples
+    inputs = ", ".join(f"{key} +- {width:g}" for key, width in spread.items())
+    return f"from {inputs}; every case is solved {samples} more times" if spread else ""
 
 
 def wall_text(shape: Any) -> str:

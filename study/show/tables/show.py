@@ -29,7 +29,7 @@ RANGE = "force range"
 RANGE_MEANS = "normal forces that hold the object, if its mass is given, and leave its wall undamaged; as far as solved"
 ERROR, ERROR_MEANS = "+-", "error estimate of the column before it, from two meshes"
 INTERVAL_MEANS = (
-    "half-width of the uncertainty interval (95 %) of the column before it; [uncertainty] in the scene lists its parts"
+    "half-width of the uncertainty interval (95 %) of the column before it, by the inputs in [uncertainty] of the scene"
 )
 MISALIGNMENT = "misalignment"  # its flag is told with the angle
 PAD_ELEMENTS = "pad_elements"

@@ -125,8 +125,7 @@ def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,),
-                   probes=(1,), variations=("mu", "pose"))  # fmt: skip
+    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,))
     create(tmp_path / "whole.hdf", layout, HEADER)
     seen = set()
 

@@ -1,0 +1,189 @@
+"""Uncertain inputs: samples, the study that is solved with them, intervals, and whether grasps differ beyond them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import norm
+
+import softjaw
+from softjaw.study.case.candidates import axes, axis_poses, candidates, moved
+from softjaw.study.lookup import GraspMap
+from softjaw.study.result.intervals import half_width
+from softjaw.study.result.read import read_patch
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import parse_scene
+from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.samples import latin_hypercube
+from softjaw.study.show.tables.certainty import Sure
+from softjaw.study.show.tables.show import best
+
+BALL = """
+[object]
+shape = "sphere"
+radius_mm = 30
+[gripper]
+elements = [8, 4, 3]
+[candidates]
+stations_mm = [0, 10]
+angles_deg = [0]
+[load]
+normal_force_n = [2]
+[accuracy]
+meshes = 1
+[effects]
+friction_pressure_coupling = "none"
+sheet = "rigid"
+[uncertainty]
+samples = 8
+spread = { "friction.mu" = 0.08, gripper.shear_modulus_kpa = 4 }
+"""
+
+
+def scene(*overrides):
+    return parse_scene(BALL, "ball.toml", overrides)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ball") / "ball.hdf"
+    assert softjaw.run(scene(), path) == 0
+    return path
+
+
+# --- samples ----------------------------------------------------------------------------------------------------------
+
+
+def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
+    samples = latin_hypercube({"a": 1.0, "b": -5.0}, {"a": 0.2, "b": 3.0}, 16)
+    expected = norm.ppf((np.arange(16) + 0.5) / 16) / norm.ppf(0.975)
+    for key, mean, width in (("a", 1.0, 0.2), ("b", -5.0, 3.0)):
+        assert np.sort([sample[key] for sample in samples]) == pytest.approx(mean + width * expected, rel=1e-8)
+    # the inputs are independent
+    assert abs(np.corrcoef([[s["a"], s["b"]] for s in samples], rowvar=False)[0, 1]) < 0.3
+    assert latin_hypercube({"a": 1.0, "b": -5.0}, {"a": 0.2, "b": 3.0}, 16) == samples
+
+
+def test_a_scene_is_solved_as_given_and_with_every_sample():
+    swept = scene("sweep.friction.model=['pcm', 'pcm_projected']")
+    assert [len(axis.values) for axis in axes(swept)] == [2, 9, 2, 1, 1]
+    assert len(axes(swept)[1].options) == 9
+    points = swept.points
+    assert (len(points), swept.cases) == (18, 36)
+    assert points[0] == {"friction.model": "pcm"}
+    assert points[9] == {"friction.model": "pcm_projected"}
+    assert [p["friction.mu"] for p in points[1:9]] == [p["friction.mu"] for p in points[10:]]
+    units = make_plan(scene()).units
+    assert [u.scene.friction.mu for u in units[::2]] == [0.8, *(p["friction.mu"] for p in scene().points[1:])]
+    assert {u.scene.gripper.shear_modulus_kpa for u in units[:2]} == {40.0}
+
+
+def test_other_inputs_are_another_study_and_no_inputs_none():
+    plain = parse_scene(BALL.partition("[uncertainty]")[0])
+    assert plain.points == [{}]
+    assert [a.name for a in axes(plain)] == ["station", "angle", "normal_force"]
+    digests = {plain.digest, scene().digest, scene("uncertainty.samples=9").digest,
+               scene("uncertainty.spread.friction.mu=0.07").digest}  # fmt: skip
+    assert len(digests) == 4
+    assert parse_scene(scene().effective_toml()).uncertainty == scene().uncertainty
+
+
+@pytest.mark.parametrize(
+    "key", ["friction.nu", "mu", "load.normal_force_n", "gripper.elements", "object.shape", "gripper.max_opening_mm"]
+)
+def test_only_a_single_number_can_be_uncertain(key):
+    with pytest.raises(SceneError) as error:
+        scene(f'uncertainty.spread={{"{key}" = 1.0}}')
+    assert key in str(error.value)
+
+
+def test_a_sample_out_of_range_is_refused_before_any_work(tmp_path):
+    with pytest.raises(SceneError, match="mu"):
+        softjaw.run(scene("friction.mu=0.05"), tmp_path / "never.hdf")
+    assert not list(tmp_path.iterdir())
+
+
+# --- the gripper's place ----------------------------------------------------------------------------------------------
+
+
+def test_moved_pads_still_face_each_other():
+    before = axis_poses(0.03, 0.4, 0.2)
+    one, two = moved(before, 0.002, 0.1)
+    for pose, old in zip((one, two), before, strict=True):
+        assert pose.rotation[:, 2] == pytest.approx(old.rotation[:, 2], abs=1e-14)  # the same approach
+        assert pose.rotation[:, 0] @ old.rotation[:, 0] == pytest.approx(np.cos(0.1))
+        assert pose.origin - old.origin == pytest.approx(0.002 * pose.rotation[:, 0], abs=1e-12)
+    assert one.rotation[:, 0] == pytest.approx(two.rotation[:, 0])
+    assert np.cross(before[0].rotation[:, 0], one.rotation[:, 0]) @ one.rotation[:, 2] == pytest.approx(np.sin(0.1))
+
+
+def test_a_shift_along_the_axis_is_another_station_and_poses_are_turned_too():
+    shifted, there = (candidates(scene(f"candidates.{key}"))[0] for key in ("shift_mm=10", "stations_mm=[10, 20]"))
+    for one, other in zip(shifted.poses, there.poses, strict=True):
+        assert one.origin == pytest.approx(other.origin, abs=1e-15)
+    assert (shifted.station, there.station) == (0.0, 0.01)
+    pose = "poses = [{point_mm = [0, 0, 0], approach = [-1, 0, 0], long_side = [0, 0, 1]}]"
+    as_pose = BALL.replace("stations_mm = [0, 10]\nangles_deg = [0]", pose)
+    turned = candidates(parse_scene(as_pose, "ball.toml", ["candidates.roll_deg=30"]))
+    rolled = candidates(scene("candidates.roll_deg=30"))
+    assert turned[0].poses[0].rotation == pytest.approx(rolled[0].poses[0].rotation, abs=1e-12)
+
+
+# --- intervals --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [20, 60, 200])
+def test_the_interval_of_an_input_is_its_spread(count):
+    values = [sample["a"] for sample in latin_hypercube({"a": 7.0}, {"a": 0.5}, count)]
+    # between samples the range is taken along straight lines
+    assert float(half_width(xr.DataArray(values, dims="realisation"))) == pytest.approx(0.5, rel=0.02)
+    assert np.isnan(half_width(xr.DataArray([*values[1:], np.nan], dims="realisation")))
+
+
+def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tmp_path):
+    ds = softjaw.open(file)
+    plain = parse_scene(BALL.partition("[uncertainty]")[0])
+    assert softjaw.run(plain, tmp_path / "plain.hdf") == 0
+    given = softjaw.open(tmp_path / "plain.hdf")
+    assert ds.e_n.dims == given.e_n.dims
+    assert ds.quality.values.tobytes() == given.quality.values.tobytes()
+    values = ds.quality_samples.values
+    assert values.shape == (*given.status.shape, 8)
+    assert softjaw.press(plain.with_values(scene().points[3]), station=0.0, angle=0.0, force=2.0).value("quality") == (
+        pytest.approx(values[0, 0, 0, 2], rel=1e-12)
+    )
+    low, high = np.quantile(values, [0.025, 0.975], axis=-1, method="hazen")
+    assert ds.quality_interval.values == pytest.approx((high - low) / 2, rel=1e-12)
+    # at the middle of a ball pads face each other: e_n does not depend on mu, and quality goes with its fifth power
+    moduli = np.array([p["gripper.shear_modulus_kpa"] for p in scene().points[1:]])
+    mu = np.array([p["friction.mu"] for p in scene().points[1:]])
+    order = np.argsort(moduli)
+    assert (np.diff(ds.e_n_samples.values[0, 0, 0, order]) < 0).all()  # a stiffer pad has a smaller contact
+    scaled = ds.quality_samples.values[0, 0, 0] / mu**5
+    assert (np.diff(scaled[order]) < 0).all()
+
+
+def test_the_interval_is_told_where_the_maps_are(file):
+    table = best(softjaw.open(file))
+    assert "quality_interval" in [name for name, _ in table.columns]
+    row = dict(zip((name for name, _ in table.columns), table.rows[0], strict=True))
+    ds = softjaw.open(file)
+    assert row["quality_interval"] == float(ds.quality_interval.sel(station=row["station"]).squeeze())
+    look_up = GraspMap(file)
+    assert look_up.value("quality_interval", 0.0, 0.0, 2.0) == pytest.approx(float(ds.quality_interval[0, 0, 0]))
+    assert read_patch(file, station=0).pressure.dims == ("angle", "normal_force", "finger", "face")
+
+
+def test_grasps_that_inputs_move_alike_are_told_apart():
+    """Values of 1.1 and 1.0 that are both uncertain by a half, by one input, and by one input each."""
+    x = np.linspace(-0.5, 0.5, 40)
+    value, error = np.array([1.1, 1.0]), np.zeros(2)
+    assert Sure(value, error, np.array([1.1 + x, 1.0 + x])).apart(0, 1) is True
+    assert Sure(value, error, np.array([1.1 + x, 1.0 - x])).apart(0, 1) is False
+    assert Sure(value, np.array([0.08, 0.08]), np.array([1.1 + x, 1.0 + x])).apart(0, 1) is False
+    assert Sure(value, np.array([0.06, 0.06]), np.empty((2, 0))).apart(0, 1) is True
+    assert Sure(value, error, np.array([1.1 + x, np.full(40, np.nan)])).apart(0, 1) is None
+    assert Sure(value, np.array([3.0, 0.0]), np.array([1.1 + 8 * x, 1.0 + x])).half_width[0] == pytest.approx(
+        np.hypot(3.0, 4.0 * 0.95 * 40 / 39), rel=1e-2
+    )
