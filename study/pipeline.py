@@ -64,8 +64,8 @@ def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome:
     values |= _state_values(fine) | of_fingers(fine, fine[0].state.pad.shape.patch_faces)
     values["maps/flags"] |= state_flags(fine) | candidate.flags_at(k)
     values |= solving.wall_values(outcome)
-    if outcome.grips:
-        values["maps/flags"] |= wall_flags(scene, outcome.grips[0], values)
+    if fine[0].state.wall is not None:
+        values["maps/flags"] |= wall_flags(scene, fine[0].state, values)
     coarse = [c for _, *coarser in outcome.contacts for c in coarser]
     if len(coarse) == len(fine):
         views = list(zip(*(c.views for c in coarse), strict=True))

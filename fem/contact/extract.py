@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.press import Pressed
+from softjaw.fem.contact.path import Pressed
 from softjaw.fem.contact.problem import ContactPoints
 from softjaw.fem.pad.mesh import Pad, along_side, face_rule
 from softjaw.friction.patch import ContactPatch

@@ -20,25 +20,20 @@ path.
 
 from __future__ import annotations
 
-import time
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
-from copy import copy
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import BALANCE, NEAR
 from softjaw.fem.contact.problem import ContactProblem, Control
-from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
-from softjaw.fem.petsc import NonlinearSolver, Seconds
+from softjaw.fem.contact.rigid import RigidProblem
+from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
+from softjaw.fem.petsc import NonlinearSolver
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
-Start = TypeVar("Start", bound="PathState")
-Result = TypeVar("Result")
 MOST_STEPS = 60  # under displacement control, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
 MOST_FAILURES = 20  # under displacement control, for one force
@@ -57,11 +52,6 @@ FIRST = 0.25  # closing displacement at which the first contact is looked for, a
 MOST_NEAR = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
 ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
-
-
-def at_once(reached: float, force: float) -> tuple[float, ...]:
-    """Forces to go through from one to the next [N] where the load path does not matter."""
-    return (force,)
 
 
 def falls(forces: Sequence[float]) -> bool:
@@ -95,92 +85,15 @@ class Work:
     halvings: int = 0
 
 
-class PathState(Protocol):
-    """A state of a load path."""
-
-    @property
-    def path_dependent(self) -> bool:
-        """Whether the path has jumped before."""
-
-
-class LoadPath(ABC):
-    """What follows a load path with one solver, and may continue with another problem where it has no solution."""
-
-    solver: NonlinearSolver
-
-    def __post_init__(self) -> None:
-        """Set up the solver."""
-        self._set_up()
-
-    @abstractmethod
-    def _set_up(self) -> None:
-        """Make `solver` for the problem as it is now."""
-
-    def _near(self, coarse: Iterable[Start], state: Callable[[Start], Result]) -> Result | None:
-        """What ``state`` finds from the first of a coarser mesh's states that leads to one on the path; else None."""
-        for start in coarse:
-            # beyond a jump the finer mesh may still be before it
-            if start.path_dependent:
-                continue
-            try:
-                return state(start)
-            except (ConvergenceError, CheckError):
-                continue
-        return None
-
-    def _start_again(self) -> None:
-        """Set up another solver after a change of the problem; clock and iterations that are left go on."""
-        seconds, left = self.solver.seconds, self.solver.left
-        self.solver.destroy()
-        self._set_up()
-        self.solver.seconds, self.solver.left = seconds, left
-
-    def _stopwatch(self) -> Callable[[], Seconds]:
-        """Where the time goes from now on."""
-        before, start = copy(self.solver.seconds), time.perf_counter()
-
-        def elapsed() -> Seconds:
-            now, total = self.solver.seconds, time.perf_counter() - start
-            return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
-
-        return elapsed
-
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
-        self.solver.destroy()
-
-
-class DrivenProblem(Protocol):
-    """A contact problem that is driven by its backing plate."""
-
-    control: Control
-
-    def normal_force(self, x: FloatArray) -> float:
-        """Normal force on the backing plate [N]."""
-
-    def closing(self, x: FloatArray) -> float:
-        """Closing displacement of the backing plate [m]."""
-
-
 @dataclass
 class Stepping:
     """Steps of one problem.
 
     Parameters
     ----------
-    problem : DrivenProblem
+    problem : ContactProblem
     solver : NonlinearSolver
     settings : Settings
-    thickness : float
-        Of the pad; steps along the closing displacement are parts of it [m].
-    share : float
-        Part of the pad that is meshed.
-    guess : callable
-        Closing displacement to a vector of unknowns to start from.
-    force_scale : callable
-        Closing displacement to the force that a residual there is judged by [N].
-    floor : float
-        Norm of the residual that rounding leaves [N].
     most : int, optional
         Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
     watch : callable
@@ -191,14 +104,9 @@ class Stepping:
         Closing displacement at which the backing plate would be in a rigid object [m].
     """
 
-    problem: DrivenProblem
+    problem: ContactProblem
     solver: NonlinearSolver
     settings: Settings
-    thickness: float
-    share: float
-    guess: Callable[[float], FloatArray]
-    force_scale: Callable[[float], float]
-    floor: float = 0.0
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
     near: Callable[[FloatArray], bool] = lambda x: False
@@ -210,17 +118,18 @@ class Stepping:
     def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
         self.problem.control = control
-        scale = control.force if control.force is not None else self.force_scale(control.closing)
-        self.solver.thrifty = self.floor <= BALANCE * scale * self.share  # or states would fail their checks
+        scale = control.force if control.force is not None else self.problem.force_scale(control.closing)
+        scale, floor = scale * self.problem.share, self.problem.rounding
+        self.solver.thrifty = floor <= BALANCE * scale  # or states would fail their checks
         work.steps += 1
         self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
-            x, iterations = self.solver.solve(x, max(self.settings.residual * scale * self.share, self.floor), most)
+            x, iterations = self.solver.solve(x, max(self.settings.residual * scale, floor), most)
             work.iterations += iterations
         except ConvergenceError as error:
             x, self.off = error.end or (x, np.inf)
-            self.off /= scale * self.share
+            self.off /= scale
             # `not <=`: a residual that is not a number is not near
             if not self.off <= NEAR or not self.near(x):
                 work.halvings += 1
@@ -280,9 +189,9 @@ class Stepping:
         """
         problem, failures, self.closed = self.problem, 0, True
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
-        step, low = min(0.02 * self.thickness, longest), (x, problem.normal_force(x))
+        step, low = min(0.02 * self.problem.thickness, longest), (x, problem.normal_force(x))
         peak = low[1], problem.closing(x)
-        least = max(1e-5 * self.thickness, shortest * longest if np.isfinite(longest) else 0.0)
+        least = max(1e-5 * self.problem.thickness, shortest * longest if np.isfinite(longest) else 0.0)
         for _ in range(MOST_STEPS):
             try:
                 ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
@@ -336,7 +245,7 @@ class Stepping:
         # too deep a start does not converge, too shallow a one has no force: look in between
         for _ in range(FIRST_TRIES):
             try:
-                x = self.solve(self.guess(closing), Control(closing=closing), work)
+                x = self.solve(self.problem.guess(closing), Control(closing=closing), work)
             except ConvergenceError as error:
                 if best:
                     return best
@@ -375,12 +284,12 @@ class _Place:
 class Following(Stepping):
     """Steps that stay on the path; parameters and attributes as for `fem.contact.load_stepping.Stepping`."""
 
-    problem: ContactProblem
+    problem: RigidProblem
     _last: _Place | None = None
 
     def first(self, closing: float, force: float, work: Work) -> State:
         """As `Stepping.first`, not further in than where a first contact is certain to be on the path."""
-        return super().first(min(closing, FIRST * self.thickness), force, work)
+        return super().first(min(closing, FIRST * self.problem.thickness), force, work)
 
     def step_to(
         self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
@@ -480,14 +389,16 @@ class Following(Stepping):
 
     def _foretold(self, here: _Place, step: float) -> float:
         """Closing displacement over thickness that the tangent foretells for a step [N]; NaN if unknown."""
-        return np.nan if here.tangent is None else abs(self.problem.closing(here.tangent) * step) / self.thickness
+        if here.tangent is None:
+            return np.nan
+        return abs(self.problem.closing(here.tangent) * step) / self.problem.thickness
 
     def _leaves(self, here: _Place, ahead: _Place) -> bool:
         """Whether the state ``ahead`` is not the one that the path leads to from ``here``."""
         if here.tangent is not None:
             # displacements and closing only: the bound is a distance in space, which pressures are not
             off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
-            if np.abs(off).max() > STRAY * self.thickness:
+            if np.abs(off).max() > STRAY * self.problem.thickness:
                 return True
         # strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
         grown = ahead.strain - here.strain
@@ -502,6 +413,6 @@ class Following(Stepping):
     def _past_limit(self, here: _Place, force: float, work: Work) -> FloatArray:
         """State at ``force`` by displacement control; the force may fall in between, which it does beyond a limit."""
         forces = [here.force]
-        x = self.displacement_control(here.x, force, work, STRAY * self.thickness, forces)
+        x = self.displacement_control(here.x, force, work, STRAY * self.problem.thickness, forces)
         self.jumped |= falls(forces)
         return x

@@ -20,7 +20,8 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.spatial import cKDTree
 
 from softjaw.fem.contact.load_stepping import Settings
-from softjaw.fem.contact.press import Press, Pressed
+from softjaw.fem.contact.path import Pressed
+from softjaw.fem.contact.press import Press
 from softjaw.fem.objects.gap import FloatArray, Gap, NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace
 from softjaw.fem.pad.mesh import Pad

@@ -1,53 +1,61 @@
-"""Frictionless contact of a pad with a rigid object as a mixed complementarity problem.
+"""Contact of pads with an object as one mixed complementarity problem, whether the object is rigid or a wall gives way.
 
-Unknowns ``x = [q | delta | l]``: free displacements, closing of the backing plate, and one pressure
-``p_i = kappa l_i`` per node of the contact face, with ``kappa = E / thickness`` so that all unknowns are lengths. The
-residual is::
+Unknowns ``x = [q | pad 1 | pad 2]``: those of the wall, if there is one (``fem.shell.wall_problem``), and per pad
+``[u | delta | l]``: free displacements, closing displacement of the backing plate, and one pressure ``p_i = kappa l_i``
+per node of the contact face, with ``kappa = E / thickness`` so that all unknowns are lengths. The residual is::
 
-    R_q     = r_int(u) - int N_a p n dA                       u = u(q, delta), p = sum N_i p_i, n = grad g
-    R_delta = sum of r_int over the bonded back - F           (force)  or  s (delta - closing)   (closing)
+    R_u     = r_int(u) - int N_a (p n - t) dA                 p = sum N_i p_i, t: friction that acts back, if any
+    R_delta = force on the backing plate - F                  (force)
+              s (mean closing - its goal), and the difference of both plates' forces   (closing displacement)
     R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
               kappa G_i   with   l_i >= 0                     (complementarity)
 
 All rows are forces [N].  ``A_i = int N_i dA``, all integrals are over the reference area, and ``p`` is the nominal
-pressure.
+pressure. Both pads press with the same force, each with a closing displacement of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.assembly import Pattern, add_up, gather, pairs, shifted
-from softjaw.fem.pad import foam as kernel
+from softjaw.fem.assembly import Pattern, gather, shifted
+from softjaw.fem.contact.friction import Anchor, Friction, stick_or_slip
+from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.shell.facing import FAR
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 IDLE = 1e-9  # of the largest pressure: a node that bears less is taken as idle
-NO_DIRECTIONS = np.empty((0, 3))
-BISECTIONS = 60
 STIFF_VOLUME = 0.45  # Poisson's ratio above which shortened columns are a worse start than columns that only move
+IN_PLACE = Pose(np.eye(3), np.zeros(3))
 
 
 def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
     """Nodal pressures ``(n,)`` [Pa] without what is none: of idle nodes, and what rounding leaves of active ones.
 
     Whether a node below `IDLE` of the largest pressure bears anything is not decided by the solve, whose tolerance is
-    about as large. Tension is kept, for the checks to see.
+    about as large. Tension stays, for the checks to see.
     """
-    some = active & (pressure > IDLE * pressure.max(initial=0.0))
-    return np.where(some, pressure, np.minimum(pressure, 0.0))
+    return np.where(active & bearing(pressure), pressure, np.minimum(pressure, 0.0))
+
+
+def bearing(pressure: FloatArray) -> NDArray[np.bool_]:
+    """Where pressures are more than rounding."""
+    return pressure > IDLE * pressure.max(initial=0.0)
 
 
 @dataclass
 class Control:
-    """What drives the pad: the normal force on the whole pad [N], or the closing displacement [m] without ``force``."""
+    """What drives the pads: the normal force on each whole pad [N], or the mean closing [m] without ``force``."""
 
     force: float | None = None
     closing: float = 0.0
@@ -83,18 +91,25 @@ class ContactPoints:
         return -normal if self.friction is None else -normal - self.friction.sum(axis=(0, 1))
 
 
-class PressedPad:
-    """A pad whose contact face touches something, and which unknowns of the whole problem are its own.
+class Finger:
+    """One pad: where it stands, what it can touch, and which unknowns of the whole problem belong to it.
 
     Parameters
     ----------
     pad : Pad
+    gap : callable
+        Points ``(n, 3)`` of the pad's frame at first touch to signed distance, gradient and Hessian of the undeformed
+        object.
     offset : int
         Its first unknown.
+    pose : Pose
+        The pad's frame at first touch; the points of a rigid object are taken in the pad's frame.
+    wall : Wall, optional
+        The part of the outer face of a wall that it can touch.
 
     Attributes
     ----------
-    own, pressures : slice
+    unknowns, pressures : slice
         Its unknowns, and those of them that are pressures over ``kappa`` [m].
     nodes : (facets, k) array
         Number, among the nodes of the contact face, of the nodes of every facet.
@@ -102,9 +117,10 @@ class PressedPad:
         Displacements of these nodes, numbered by the pad and in the whole problem; -1 is fixed.
     """
 
-    def __init__(self, pad: Pad, offset: int = 0) -> None:
-        self.pad, self.foam, self.offset = pad, Foam(pad), offset
-        self.own = slice(offset, offset + pad.size)
+    def __init__(self, pad: Pad, gap: Gap, offset: int = 0, pose: Pose = IN_PLACE, wall: Any = None) -> None:
+        self.pad, self.foam, self.offset, self.gap, self.pose, self.wall = pad, Foam(pad), offset, gap, pose, wall
+        self.R, self.bed = np.ascontiguousarray(pose.rotation), SpringBed(pad, gap)
+        self.unknowns = slice(offset, offset + pad.size)
         self.closing_dof = offset + pad.closing_dof
         self.pressures = slice(self.closing_dof + 1, offset + pad.size)
         self.kappa, self.area = pad.modulus_per_thickness, pad.node_area
@@ -112,9 +128,10 @@ class PressedPad:
         self.local_dofs = np.ascontiguousarray(pad.dofs[pad.face_nodes].transpose(0, 2, 1))
         self.dofs = shifted(self.local_dofs, offset)
         self.pressure_dofs = shifted(pad.closing_dof + 1 + self.nodes, offset)
+        self.foam_entries = shifted(self.foam.rows, offset), shifted(self.foam.columns, offset)
 
     def pressure(self, x: FloatArray) -> FloatArray:
-        """Nominal pressures of the contact face's nodes at the whole state ``x`` [Pa]."""
+        """Nominal pressures of the contact face's nodes at the state ``x`` of the whole problem [Pa]."""
         return self.kappa * x[self.pressures]
 
     def points(self, x: FloatArray, N: FloatArray | None = None) -> FloatArray:
@@ -122,247 +139,278 @@ class PressedPad:
 
         ``N (points, k)`` are the facets' shape functions there; by default the points are those of the quadrature.
         """
-        corners = (self.pad.nodes + self.pad.displacement(x[self.own]))[self.pad.face_nodes]
+        corners = (self.pad.nodes + self.pad.displacement(x[self.unknowns]))[self.pad.face_nodes]
         return np.einsum("qa,fai->fqi", self.pad.face_N if N is None else N, corners)
 
     def nodal(self, values: FloatArray) -> FloatArray:
         """Sums ``(n,)`` over the facets of values ``(facets, k)`` at their nodes."""
         return np.asarray(np.bincount(self.nodes.ravel(), values.ravel(), len(self.area)), dtype=float)
 
-    def active(self, length: FloatArray, weighted_gap: FloatArray) -> NDArray[np.bool_]:
-        """Active set ``(n,)`` of the unknowns ``length = p / kappa`` [m] and the weighted gaps [m^3]."""
-        return self.area * length - weighted_gap > 0.0
+    def active(self, x: FloatArray, weighted_gap: FloatArray) -> NDArray[np.bool_]:
+        """Active set ``(n,)`` at the state ``x`` with these weighted gaps [m^3]."""
+        return self.area * x[self.pressures] - weighted_gap > 0.0
 
-    def contact_rows(self, length: FloatArray, weighted_gap: FloatArray) -> FloatArray:
+    def contact_rows(self, x: FloatArray, weighted_gap: FloatArray) -> FloatArray:
         """Residual of complementarity ``(n,)`` [N]: zero where pressure or gap is and the other is not negative."""
-        pressed = self.area * length
+        pressed = self.area * x[self.pressures]
         return self.kappa * (pressed - np.maximum(0.0, pressed - weighted_gap))
 
-    def loads(self, pressure: FloatArray) -> FloatArray:
-        """Pressure times reference area of the quadrature points ``(facets, points)`` [N]."""
-        return self.pad.face_area * (pressure[self.nodes] @ self.pad.face_N.T)
 
+@dataclass
+class Evaluated:
+    """The contact face of one finger at one state; vectors of the points in the frame of what it touches.
 
-class ContactProblem(PressedPad):
-    """Residual and tangent of one pad pressed on one object; ``gap`` takes points of the pad's frame.
-
-    Implements the protocol ``fem.petsc.Problem``.
+    Attributes
+    ----------
+    points, normal : (n, 3) arrays
+        Places of the quadrature points [m], and gradients of the gap there.
+    gap : (n,) array
+        Their gaps [m]; `FAR` where a point faces nothing.
+    lam : (facets, k) array
+        Nodal pressures [Pa].
+    weighted, active : (nodes,) arrays
+        Weighted gaps [m^3], active set.
+    force : (facets, 3, k) array
+        Forces on the pad's nodes in its own frame [N].
+    surface : Any
+        Derivatives: the Hessian of a rigid object's gap, or what the points face on a wall.
+    traction : (n, 3) array, optional
+        Of friction on the pad [Pa].
     """
 
-    symmetric, condensed = True, False
+    points: FloatArray
+    gap: FloatArray
+    normal: FloatArray
+    lam: FloatArray
+    weighted: FloatArray
+    active: NDArray[np.bool_]
+    force: FloatArray
+    surface: Any
+    traction: FloatArray | None = None
 
-    def __init__(self, pad: Pad, gap: Gap) -> None:
-        super().__init__(pad)
-        self.gap, self.control, self.complementarity = gap, Control(closing=0.0), False
-        self.size, self.non_negative = pad.size, self.pressures
-        # makes the closing row a force like all others, so that one norm judges them
-        self.closing_stiffness = self.kappa * self.area.sum()
+
+class ContactProblem(ABC):
+    """Residual of one or two pads on an object, driven by their backing plates; implements ``fem.petsc.Problem``.
+
+    Parameters
+    ----------
+    fingers : sequence of Finger
+    mu : float, optional
+        Friction coefficient; without it no friction acts back on the pressures.
+    """
+
+    complementarity, non_negative = False, slice(0)
+    pattern: Pattern
+    longest_closing: float  # change of closing displacement in one iteration [m]
+
+    def __init__(self, fingers: Sequence[Finger], mu: float | None) -> None:
+        self.fingers = tuple(fingers)
+        self.size = fingers[-1].unknowns.stop
+        self.control = Control(closing=0.0)
+        self.friction = None if mu is None else Friction(mu, self._damped())
+        # makes a closing row a force like all others, so that one norm judges them
+        self.closing_stiffness = sum(f.kappa * f.area.sum() for f in fingers)
         self._by_force: bool | None = None  # whether the last tangent was that under force control
-        self.closing_step = 0.1 * pad.shape.size[2]  # longest change of closing displacement in one iteration
-        self._build_pattern()
+        self._tangent_set: NDArray[np.bool_]
+        self.begin()
 
-    def _build_pattern(self) -> None:
-        """Work arrays, so that nothing is allocated in an iteration, and the place of every entry of the tangent."""
-        m, k = self.nodes.shape
-        self._weighted, self._force = np.empty((m, k)), np.empty((m, 3, k))
-        self._K_ul = np.empty((m, k, 3, k))
-        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
-        face, pressure = self.local_dofs, self.pressure_dofs
-        # the diagonal of closing and pressures: an idle node has nothing else in its row
-        own = np.arange(self.pad.closing_dof, self.size, dtype=np.int32)
-        parts = (
-            (self.foam.rows, self.foam.columns),
-            pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
-            pairs(face[:, None, :, :], pressure[:, :, None, None]),
-            pairs(pressure[:, :, None, None], face[:, None, :, :]),
-            (own, own),
-        )
-        rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
-        self.pattern = Pattern(self.size, rows, columns)
-        self._slots = self.pattern.slots(rows, columns)
-        self._ends = np.cumsum([len(part[0]) for part in parts])
-        self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
-        self._values = np.zeros(rows.size)
-        self._K_uu = self._parts()[1].reshape(m, 3, k, 3, k)
+    # -- evaluation ---------------------------------------------------------------------------------------------------
 
-    def _parts(self) -> list[FloatArray]:
-        """Views of the values: elements, face stiffness, force by pressure, gap by displacement, own diagonal."""
-        return np.split(self._values, self._ends[:-1])
+    @abstractmethod
+    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
+        """Contact faces of all fingers without friction; ``tangent``: with what the tangent needs."""
 
-    def _contact(self, x: FloatArray, tangent: bool) -> FloatArray:
-        """Evaluate the contact face at ``x``; returns the weighted gap of every node of the contact face [m^3]."""
-        points = self.points(x)
-        gap, normal, hessian = self.gap(points.reshape(-1, 3))
-        shape = points.shape[:2]
-        self._points, self._normal, self._gap = points, normal.reshape(*shape, 3), gap.reshape(shape)
-        self._hessian = hessian.reshape(*shape, 3, 3)
-        kernel.contact(
-            self.pad.face_N, self.pad.face_area, self.pressure(x)[self.nodes], self._gap,
-            self._normal, self._hessian, self._weighted, self._force,
-            *((self._K_uu, self._K_ul) if tangent else self._none),
-        )  # fmt: skip
-        return self.nodal(self._weighted)
+    def evaluate(self, x: FloatArray, tangent: bool = False) -> list[Evaluated]:
+        """Contact faces of all fingers at the state ``x``."""
+        faces = self._faces(x, tangent)
+        if self.friction is not None:
+            for k, (f, c) in enumerate(zip(self.fingers, faces, strict=True)):
+                area, c.traction = f.pad.face_area, self.traction(k, x, c)[0]
+                c.force -= np.einsum("fq,qa,fqi->fia", area, f.pad.face_N, (c.traction @ f.R).reshape(*area.shape, 3))
+        return faces
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
-        R, smallest = self.foam.force(x)
-        if not smallest > 0.0:
-            return np.full(self.size, np.nan)
-        weighted_gap, length = self._contact(x, tangent=False), x[self.pressures]
-        R += gather(self.dofs, self._force, self.size)
-        if self.control.force is None:
-            R[self.closing_dof] = self.closing_stiffness * (x[self.closing_dof] - self.control.closing)
-        else:
-            R[self.closing_dof] -= self.control.force * self.pad.share
-        # vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
-        if self.complementarity:
-            R[self.pressures] = self.kappa * weighted_gap
-        else:
-            self._active_set = self.active(length, weighted_gap)
-            R[self.pressures] = self.contact_rows(length, weighted_gap)
+        refused = np.full(self.size, np.nan)
+        if not np.isfinite(x).all():
+            return refused
+        foam = [f.foam.force(x[f.unknowns]) for f in self.fingers]
+        if not all(smallest > 0.0 for _, smallest in foam):
+            return refused
+        try:
+            contacts = self.evaluate(x)
+        # a point without a place on a wall: a shorter step will find it
+        except ArithmeticError:
+            return refused
+        R = np.zeros(self.size)
+        for f, c, (inner, _) in zip(self.fingers, contacts, foam, strict=True):
+            R[f.unknowns] = inner + gather(f.local_dofs, c.force, f.pad.size)
+            # vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
+            R[f.pressures] = f.kappa * c.weighted if self.complementarity else f.contact_rows(x, c.weighted)
+        self._active_set = np.concatenate([c.active for c in contacts])
+        self._drive(x, R)
         return R
 
+    def _drive(self, x: FloatArray, R: FloatArray) -> None:
+        """Rows of the closing displacements; they hold the forces on the backing plates so far."""
+        first, last = self.fingers[0], self.fingers[-1]
+        if self.control.force is not None:
+            for f in self.fingers:
+                R[f.closing_dof] -= self.control.force * f.pad.share
+            return
+        if last is not first:
+            # forces of whole pads, whatever part of each is meshed
+            R[last.closing_dof] = R[last.closing_dof] / last.pad.share - R[first.closing_dof] / first.pad.share
+        R[first.closing_dof] = self.closing_stiffness * (self.closing(x) - self.control.closing)
+
+    @abstractmethod
     def tangent(self, x: FloatArray) -> None:
-        """Fill ``pattern.values`` with the tangent at ``x``, or its symmetric form if ``condensed``."""
-        self._evaluate_entries(x)
-        if self.condensed:
-            self._closing_column = self._condense()
-        self._add_up(self.pattern.values)
-
-    def _add_up(self, values: FloatArray) -> None:
-        values[:] = 0.0
-        add_up(self._slots, self._values, values)
-
-    def _evaluate_entries(self, x: FloatArray) -> None:
-        """Entries of the tangent, not added up yet."""
-        elements, _, by_pressure, by_displacement, own = self._parts()
-        self.foam.stiffness(x, elements)
-        weighted_gap = self._contact(x, tangent=True)
-        by_pressure[:] = -self.kappa * self._K_ul.ravel()
-        own[:] = 0.0
-        if self.complementarity:
-            by_displacement[:] = self.kappa * self._K_ul.ravel()
-        else:
-            active = self._tangent_set = self.active(x[self.pressures], weighted_gap)
-            by_displacement[:] = (self.kappa * active[self.nodes][:, :, None, None] * self._K_ul).ravel()
-            own[1:] = np.where(active, 0.0, self.kappa * self.area)
-        self._by_force = self.control.force is not None
-        if not self._by_force:
-            # this row holds the control instead of the foam's force on the backing plate
-            elements[self.foam.closing_entries] = 0.0
-            own[0] = self.closing_stiffness
-
-    def _condense(self) -> FloatArray:
-        """Make the entries symmetric; returns what was the column of the closing displacement, 0 under force control.
-
-        Rows of nodes in contact change their sign. Idle pressures, and a closing that is given, have nothing but a
-        diagonal in their rows, so their part of a step is known beforehand (`right_side`) and their columns go.
-        """
-        elements, _, by_pressure, by_displacement, _ = self._parts()
-        by_displacement *= -1.0
-        by_pressure[~np.repeat(self._tangent_set[self.nodes], by_pressure.size // self.nodes.size)] = 0.0
-        if self._by_force:
-            return np.zeros(self.size)
-        rows, column = self.foam.rows[self._closing_entries], elements[self._closing_entries]
-        elements[self._closing_entries] = 0.0
-        return gather(rows, column, self.size)
-
-    def right_side(self, R: FloatArray) -> FloatArray:
-        """Right-hand side ``(size,)`` with which the condensed tangent has the step that belongs to the residual."""
-        right, active = R.copy(), self._tangent_set
-        idle = np.where(active, 0.0, R[self.pressures] / (self.kappa * self.area))
-        if idle.any():
-            right += gather(self.dofs, self.kappa * np.einsum("faib,fa->fib", self._K_ul, idle[self.nodes]), self.size)
-        right[self.pressures] = np.where(active, -1.0, 1.0) * R[self.pressures]
-        if not self._by_force:
-            right -= self._closing_column * (R[self.closing_dof] / self.closing_stiffness)
-        return right
-
-    def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
-        """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
-
-        ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
-        force does not grow with the closing displacement, or a tangent under displacement control cannot tell.
-        """
-        if self._by_force is None:  # nothing has been factorised yet
-            return None
-        load = np.zeros(self.size)
-        load[self.closing_dof] = 1.0
-        change = answer(load)
-        # beyond a limit point the closing grows while the force falls: nothing can be foretold by force
-        if not change[self.closing_dof] > 0.0:
-            return None
-        if self._by_force:
-            return self.pad.share * change
-        # the factors are those of another control: they give the direction, and a central difference the force
-        along = change / change[self.closing_dof]
-        # small against the bends of the path, large against rounding of the force
-        h = 1e-6 * self.pad.shape.size[2]
-        rise = (self.normal_force(x + h * along) - self.normal_force(x - h * along)) / (2.0 * h)
-        return along / rise if rise > 0.0 else None
-
-    def symmetric_tangent(self, x: FloatArray) -> tuple[FloatArray, int]:
-        """Values of the symmetric tangent under force control, in ``pattern``, and the number of nodes in contact.
-
-        It is that of ``R_u`` with the rows ``-kappa G_i`` of these nodes, whose pressures are the multipliers; those of
-        the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
-        """
-        before = self.control, self._tangent_set, self._by_force  # the latter two belong to the factors at hand
-        # any force will do: the kind of control enters the tangent, its value does not
-        self.control = Control(force=1.0)
-        self._evaluate_entries(x)
-        # pressures are multipliers with the sign that makes the matrix symmetric
-        self._condense()
-        active = self._tangent_set
-        self.control, self._tangent_set, self._by_force = before
-        # not into the pattern's own values, which stay those of the last tangent
-        values = np.empty_like(self.pattern.values)
-        self._add_up(values)
-        return values, int(np.count_nonzero(active))
-
-    def largest_strain(self, x: FloatArray) -> float:
-        """Largest principal strain of the foam."""
-        return self.foam.strains(x, NO_DIRECTIONS)[1]
+        """Fill ``pattern.values`` with the tangent at ``x``."""
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """Whether the last tangent may serve once more (see ``fem.petsc.Problem``).
 
-        Not after a change of control or of the active set: that would leave pressures that are not quite zero.
+        Not after a change of control or of the active set: that would leave pressures that are not quite zero. With
+        friction every accepted state changes the tangent.
         """
-        same_control = self._by_force == (self.control.force is not None)
-        return same_control and np.array_equal(self._active_set, self._tangent_set)
+        if self._by_force != (self.control.force is not None) or (first and self.friction is not None):
+            return False
+        return np.array_equal(self._active_set, self._tangent_set)
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
-        """Factor that keeps the change of closing displacement and the compression of every element within reason."""
-        return self.foam.shorten(x, step, self.closing_step)
+        """Factor that keeps the change of closing displacements and the compression of every element within reason."""
+        longest = self.longest_closing
+        factor = min(f.foam.shorten(x[f.unknowns], step[f.unknowns], longest) for f in self.fingers)
+        return factor if self.friction is None else self.friction.damping.shortened(x, step, factor)
+
+    # -- friction that acts back --------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _damped(self) -> Any:
+        """Index of the displacements by which steps with friction are judged."""
+
+    def begin(self) -> None:
+        """Begin another load path; without friction it does not matter."""
+        if self.friction is not None:
+            self.friction.begin([self._untouched(f) for f in self.fingers])
 
     def forget(self) -> None:
-        """Begin another load path; without friction it does not matter."""
+        """Be as a new problem, so that not a bit of what follows depends on what was evaluated before."""
+        self.begin()
 
     def accept(self, x: FloatArray) -> None:
-        """Note a state that the next one starts from; without friction the load path does not matter."""
+        """Note a state that the next one starts from; later friction is measured from its points and tractions."""
+        # stick is measured from accepted states, not from iterates: a step that is repeated starts from the same place
+        if self.friction is not None:
+            contacts = zip(self.fingers, self.evaluate(x), strict=True)
+            self.friction.accept(x, [self._anchor(f, x, c) for f, c in contacts])
 
     def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
-        """States that ``x`` depends on, the first one first."""
-        return ()
+        """States that ``x`` depends on, the first one first; none without friction."""
+        return () if self.friction is None else self.friction.leading_to(x)
+
+    def _untouched(self, f: Finger) -> Anchor:
+        """What friction is measured from where nothing has touched yet."""
+        nowhere = np.zeros((f.pad.face_area.size, 3))
+        return Anchor(nowhere, nowhere, np.zeros(len(nowhere), dtype=bool))
+
+    def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
+        """What friction is measured from after the state ``x``."""
+        assert c.traction is not None
+        return Anchor(c.points, c.traction, bearing(self.point_pressure(f, c)) & (c.gap < FAR))
+
+    def point_pressure(self, f: Finger, c: Evaluated) -> FloatArray:
+        """Nominal pressures of the points ``(n,)`` [Pa], negative ones of quadratic faces cut off."""
+        return np.maximum(c.lam @ f.pad.face_N.T, 0.0).ravel()
+
+    def traction(self, k: int, x: FloatArray, c: Evaluated, derivatives: bool = False) -> tuple[FloatArray, ...]:
+        """Traction on the points of one pad ``(n, 3)`` [Pa], and its derivatives.
+
+        They are those by what the point has moved along the object ``(n, 3, 3)`` [Pa/m], by the normal ``(n, 3, 3)``
+        [Pa] and by the pressure ``(n, 3)`` [-].
+        """
+        assert self.friction is not None
+        f, anchor, mu = self.fingers[k], self.friction.anchors[k], self.friction.mu
+        stick = self.friction.stick * f.kappa
+        # a point that was open has stuck nowhere that its motion could be measured from
+        sticks = (anchor.closed & (c.gap < FAR))[:, None]
+        d = np.where(sticks, anchor.traction - stick * self._moved(x, c, anchor), 0.0)
+        t, *changes = stick_or_slip(self._unit_normal(c), d, mu, self.point_pressure(f, c), derivatives)
+        if not derivatives:
+            return (t,)
+        by_d, by_normal, by_pressure = changes
+        return t, np.where(sticks[..., None], -stick * by_d, 0.0), by_normal, by_pressure
+
+    def _moved(self, x: FloatArray, c: Evaluated, anchor: Anchor) -> FloatArray:
+        """How far the points have moved along the object ``(n, 3)`` since the last accepted state [m]."""
+        return c.points - anchor.at
+
+    def _unit_normal(self, c: Evaluated) -> FloatArray:
+        return c.normal
+
+    # -- states -------------------------------------------------------------------------------------------------------
+
+    def contact_state(self, x: FloatArray, k: int = 0) -> tuple[FloatArray, FloatArray, ContactPoints]:
+        """Of one finger, in its pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
+        f, c = self.fingers[k], self.evaluate(x)[k]
+        place = f.points(x)
+        # a point that faces no wall gets the approach, so that the patch has no face without a normal
+        normal = np.where(c.gap[:, None] < FAR, c.normal @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
+        pressure = borne(f.pressure(x), c.active)
+        # a node may carry load over the rim, but its points beyond it press on nothing
+        load = f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T)
+        load = np.where(c.gap.reshape(load.shape) < FAR, load, 0.0)
+        friction = None if c.traction is None else f.pad.face_area[..., None] * (c.traction @ f.R).reshape(place.shape)
+        points = ContactPoints(place, normal, max(0.0, -self._lowest_gap(f, x, c)), load, friction)
+        return pressure, c.weighted / f.area, points
+
+    def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:
+        return float(c.gap.min())
 
     def normal_force(self, x: FloatArray) -> float:
-        """Normal force on the whole pad that the backing plate must exert at ``x`` [N]."""
-        return self.foam.normal_force(x)
+        """Normal force on a whole pad that the backing plates must exert at ``x`` [N], mean of the fingers."""
+        return float(np.mean([f.foam.normal_force(x[f.unknowns]) for f in self.fingers]))
 
     def closing(self, x: FloatArray) -> float:
-        """Closing displacement of the backing plate [m]."""
-        return float(x[self.closing_dof])
+        """Closing displacement of the backing plates [m], mean of the fingers."""
+        return float(np.mean([x[f.closing_dof] for f in self.fingers]))
 
-    def contact_state(self, x: FloatArray) -> tuple[FloatArray, FloatArray, ContactPoints]:
-        """Nodal pressures ``(n,)`` [Pa], mean gaps of the nodes ``(n,)`` [m] and the state of the quadrature points."""
-        weighted_gap = self._contact(x, tangent=False)
-        pressure = borne(self.pressure(x), self.active(x[self.pressures], weighted_gap))
-        # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
-        between = self.gap(self.points(x, self.pad.between_N).reshape(-1, 3))[0]
-        depth = max(0.0, -float(between.min()))
-        points = ContactPoints(self._points, self._normal, depth, self.loads(pressure))
-        return pressure, weighted_gap / self.area, points
+    # -- starts and scales --------------------------------------------------------------------------------------------
+
+    @property
+    def rule(self) -> str:
+        """How the gaps are collocated, see ``fem.pad.mesh.RULES``."""
+        return self.fingers[0].pad.contact
+
+    @property
+    def thickness(self) -> float:
+        """Of the pads [m]."""
+        return self.fingers[0].pad.shape.size[2]
+
+    @property
+    def share(self) -> float:
+        """Smallest part of a pad that is meshed."""
+        return min(f.pad.share for f in self.fingers)
+
+    @property
+    def rounding(self) -> float:
+        """Norm of the residual that rounding leaves [N]."""
+        return sum(f.pad.rounding for f in self.fingers)
+
+    def guess(self, closing: float) -> FloatArray:
+        """Unknowns to start from at a closing displacement [m]: pads as beds of springs, the object undeformed."""
+        x = np.zeros(self.size)
+        for f in self.fingers:
+            x[f.unknowns] = f.bed.guess(closing)
+        return x
+
+    def force_scale(self, closing: float) -> float:
+        """Force that a residual at this closing displacement is judged by [N]."""
+        return min(f.bed.force_scale(closing) for f in self.fingers)
+
+    def closing_of_bed(self, force: float) -> float:
+        """Closing displacement at which pads that are beds of springs carry a force [m]."""
+        return float(np.mean([f.bed.closing(force) for f in self.fingers]))
 
 
 class SpringBed:
@@ -396,7 +444,7 @@ class SpringBed:
         while self.force(high) < force and high < 10 * self.pad.shape.size[2]:
             high *= 2.0
         # bisection: the bed's force is monotonous but has kinks wherever a column touches
-        for _ in range(BISECTIONS):
+        for _ in range(60):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.force(middle) < force else (low, middle)
         return high

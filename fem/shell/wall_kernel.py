@@ -192,3 +192,64 @@ def changes(N, gap, nodes, wall_N, H, G, A, R, D, dn, dA):
                 dn[d, j] += wall_N[b] * G[d, c]
                 for a in range(4):
                     dA[a, d, j] += wall_N[a] * wall_N[b] * G[d, c]
+
+
+@njit(cache=True)
+def friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure, kappa, gap, normal, nodes, wall_N, H,
+                      G, A, old_nodes, old_N, R, pad_dofs, pressures, first, second, start, column,
+                      values):  # fmt: skip
+    """Add what friction on one pad adds to the tangent; whether all entries had a place.
+
+    Parameters as in `contact_tangent`; ``held (n,)`` are the points whose traction counts, and
+    ``old_nodes``, ``old_N`` where their material points lie on the wall.
+    """
+    points, k = N.shape
+    t = 3 * k  # local order: pad (component, node), wall first, wall second, pressures, old place first, second
+    old = t + 24 + k
+    M, change = np.empty((t + 12, t + 48 + k)), np.empty((3, t + 48 + k))
+    dof = np.empty(t + 48 + k, np.int64)
+    D, dn, dA = np.empty((3, t + 24)), np.empty((3, t + 24)), np.empty((4, 3, t + 24))
+    complete = True
+    for m in range(held.size):
+        if not held[m]:
+            continue
+        f, q = m // points, m % points
+        changes(N[q], gap[m], nodes[m], wall_N[m], H[m], G[m], A[m], R, D, dn, dA)
+        change[:] = 0.0
+        for d in range(3):
+            for j in range(t + 24):
+                for c in range(3):
+                    change[d, j] += by_normal[m, d, c] * dn[c, j]
+                    if j < t:
+                        change[d, j] += by_motion[m, d, c] * D[c, j]
+            for a in range(4):
+                for c in range(3):
+                    dragged = -old_N[m, a] * by_motion[m, d, c]
+                    change[d, old + 3 * a + c] = change[d, old + 12 + 3 * a + c] = dragged
+            for i in range(k):
+                change[d, t + 24 + i] = kappa * N[q, i] * by_pressure[m, d]
+        w = area[f, q]
+        for j in range(t + 48 + k):
+            for c in range(3):
+                own = R[0, c] * change[0, j] + R[1, c] * change[1, j] + R[2, c] * change[2, j]
+                for b in range(k):
+                    M[c * k + b, j] = -w * N[q, b] * own
+            for a in range(4):
+                share = 0.0
+                if j < t + 24:
+                    for c in range(3):
+                        share += normal[m, c] * dA[a, c, j]
+                for c in range(3):
+                    M[t + 3 * a + c, j] = w * (wall_N[m, a] * change[c, j] + share * traction[m, c])
+        number(pad_dofs[f], pressures[f], first, second, nodes[m], dof)
+        for a in range(4):
+            for c in range(3):
+                dof[old + 3 * a + c] = first[old_nodes[m, a], c]
+                dof[old + 12 + 3 * a + c] = second[old_nodes[m, a], c]
+        for r in range(t + 24):
+            if dof[r] < 0:
+                continue
+            # what moves the outer face carries the same force
+            local = r if r < t + 12 else r - 12
+            complete &= add_row(dof[r], M[local], dof, start, column, values)
+    return complete

@@ -94,7 +94,7 @@ class Finer:
         # of two fingers that are images only the first is solved
         states = [path.at(force, [c.state]) for path, c in zip(own.paths, before, strict=False)]
         fine = own.contacts(states)
-        return Solved([list(pair) for pair in zip(fine, before, strict=True)], [*states, *found.spent], [])
+        return Solved([list(pair) for pair in zip(fine, before, strict=True)], [*states, *found.spent])
 
     def destroy(self) -> None:
         """Give the factors' memory back."""

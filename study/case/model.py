@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
-from softjaw.fem.contact.load_stepping import Settings, Stepping
+from softjaw.fem.contact.load_stepping import Settings
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.materials import Material, material
@@ -197,10 +196,8 @@ def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     """Pad on its object, with friction where the scene wants it to act back."""
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
-    if scene.effects.friction_pressure_coupling == "tangential":
-        problem = partial(CoupledProblem, mu=scene.friction.mu)
-        return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene), problem, load_steps, Stepping)
-    return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene))
+    mu = scene.friction.mu if scene.effects.friction_pressure_coupling == "tangential" else None
+    return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene), mu)
 
 
 def check_poses(scene: Scene, points: list[Scene]) -> None:

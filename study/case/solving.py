@@ -8,21 +8,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import numpy as np
 
 from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.fem.contact.extract import extract, turned
-from softjaw.fem.contact.friction_coupling import load_steps
-from softjaw.fem.contact.load_stepping import at_once
-from softjaw.fem.contact.press import Press, Pressed
+from softjaw.fem.contact.path import LoadPath, Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.shell.coupled_grip import CoupledGripProblem
-from softjaw.fem.shell.grip import Grip, Gripped
-from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
+from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import forces_apart, pad_shape
@@ -181,13 +178,11 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
 class Solved:
     """Contacts of one force: for every finger that on each mesh, the finest first.
 
-    ``spent`` are the states whose work was done for it; ``grips`` those of both fingers on the wall, if it has one.
-    ``note`` says why a coarser mesh has no state at this force, if so.
+    ``spent`` are the states whose work was done for it; ``note`` says why a coarser mesh has no state there, if so.
     """
 
     contacts: list[list[PressedContact]]
     spent: list[Pressed]
-    grips: list[Gripped]
     note: str = ""
 
 
@@ -329,9 +324,7 @@ class Solver(ABC):
     ) -> Solved:
         """Contacts of both fingers on each mesh from the states of what is pressed by itself; ``seen``: coarse ones."""
         each = [self.contacts(fine), *([] if seen is None else [seen])]
-        states = [*fine, *coarse]
-        spent = [own.fingers[0] if isinstance(own, Gripped) else own for own in states]
-        return Solved([list(c) for c in zip(*each, strict=True)], spent, [s for s in states if isinstance(s, Gripped)])
+        return Solved([list(c) for c in zip(*each, strict=True)], [*fine, *coarse])
 
     @abstractmethod
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
@@ -373,12 +366,12 @@ class OnRigid(Solver):
 class _Followed:
     """States on a load path, from the lowest force upward, as far as they are asked for."""
 
-    def __init__(self, press: Press | Grip, forces: Sequence[float]) -> None:
+    def __init__(self, press: LoadPath[Any], forces: Sequence[float]) -> None:
         self._path, self._states = followed(press.load_path, forces), list[Any]()
         self._errors: dict[int, Exception] = {}
         self.ended = ""  # why there are no more
 
-    def state(self, k: int) -> Pressed | Gripped | None:
+    def state(self, k: int) -> Pressed | None:
         """State at the ``k``-th force; None where the path ends before."""
         while len(self._states) <= k and (found := next(self._path, None)) is not None:
             ends = isinstance(found, Exception)
@@ -424,7 +417,7 @@ class OnWall(Solver):
         """See `Solver`."""
         own = self.coarse if mesh else self
         assert isinstance(own, OnWall)
-        return wall_values(self.scene, own.held, solved.grips[mesh], own.shell)
+        return wall_values(self.scene, own.held, solved.contacts[0][mesh].state, own.shell)
 
 
 def refuse_along_axis(fingers: Sequence[Finger]) -> None:
@@ -465,16 +458,15 @@ def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Gr
     coupled = scene.effects.friction_pressure_coupling == "tangential"
     wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
 
-    def problem(rule: str) -> GripProblem:
-        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
-        pads = [(pad, pose, face) for pose, face in zip(held.poses, faces, strict=True)]
-        return CoupledGripProblem(wall, pads, scene.friction.mu) if coupled else GripProblem(wall, pads)
-
     gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
-    first, *others = contact_rules(scene, walled=True)
-    fallback = (lambda: problem(others[0])) if others else None
-    steps = load_steps if coupled else at_once
-    return Grip(problem(first), gaps, held.mirrors, dict(scene.petsc), settings(scene), fallback, steps)
+
+    def problem(rule: str) -> WallProblem:
+        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
+        pads = [(pad, *where) for where in zip(gaps, held.poses, faces, strict=True)]
+        return WallProblem(wall, pads, scene.friction.mu if coupled else None)
+
+    problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]
+    return Grip(problems, dict(scene.petsc), settings(scene))
 
 
 def _gap(finger: Finger, turned: bool):

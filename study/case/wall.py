@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
-from softjaw.fem.shell.grip import Gripped
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
 from softjaw.fem.shell.wall_stress import faces
 from softjaw.study.case.build import outer_surface
@@ -90,7 +90,7 @@ def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     return -np.einsum("ki,ki->k", v - drift, normal)
 
 
-def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict[str, Any]:
+def wall_values(scene: Scene, held: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
     """What the wall bears in one case, keyed as in ``study.quantities``."""
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
@@ -103,7 +103,7 @@ def wall_values(scene: Scene, held: Grasp, state: Gripped, shell: Shell) -> dict
     }
 
 
-def wall_flags(scene: Scene, state: Gripped, values: dict[str, Any]) -> Flag:
+def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
     found = Flag.SNAPPED * state.wall.snapped
     found |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))

@@ -8,9 +8,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from softjaw.fem.contact.problem import ContactProblem
+from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.petsc import PETSc
-from softjaw.fem.shell.grip_problem import GripProblem
+from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.study import pipeline
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import load_scene
@@ -39,7 +39,7 @@ def _without(plan) -> tuple[float, int, np.ndarray]:
     def never(self, x, first) -> bool:
         return False
 
-    with patch.object(ContactProblem, "keep", never), patch.object(GripProblem, "keep", never):
+    with patch.object(RigidProblem, "keep", never), patch.object(WallProblem, "keep", never):
         return _solve(plan)
 
 

@@ -5,18 +5,16 @@ from functools import cache
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.contact.friction_coupling import load_steps
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.fem.shell.coupled_grip import CoupledGripProblem
 from softjaw.fem.shell.grip import Grip
-from softjaw.fem.shell.grip_problem import GripProblem
 from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 
@@ -63,14 +61,13 @@ def grip(
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
     pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)
-    pads = [(pad, p, wall) for p, wall in zip(held.poses, walls, strict=True)]
-    gaps = [_gap(p) for p in held.poses]
-    if mu is None:
-        return Grip(GripProblem(model, pads), gaps, held.mirrors)
-    return Grip(CoupledGripProblem(model, pads, mu), gaps, held.mirrors, load_steps=load_steps)
+    pads = [(pad, gap_at(p), p, wall) for p, wall in zip(held.poses, walls, strict=True)]
+    return Grip([lambda: WallProblem(model, pads, mu)])
 
 
-def _gap(at: Pose):
+def gap_at(at: Pose):
+    """Gap of the can in the frame of a pad."""
+
     def gap(x):
         g, normal, hessian = can().gap(at.to_object(x))
         return g, normal @ at.rotation, at.rotation.T @ hessian @ at.rotation
@@ -85,12 +82,12 @@ def e_n(finger):
     return friction_limits(local, 1.0, "pcm").e_n
 
 
-def stirred(problem: GripProblem, rng: np.random.Generator) -> np.ndarray:
+def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:
     """Unknowns of pads that are pressed 1.5 mm into the wall, all of them moved at random."""
     x = np.zeros(problem.size)
     x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
     for f in problem.fingers:
-        own, pad = x[f.own], f.pad
+        own, pad = x[f.unknowns], f.pad
         u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
         own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
         own[pad.closing_dof] = 1.5e-3

@@ -193,6 +193,6 @@ def dense(problem, x=None, values=None):
 
 def at_closing(press, closing, x=None):
     """State at a prescribed closing displacement [m] and the normal force it takes [N], from ``x`` or from scratch."""
-    start = press._bed.guess(closing) if x is None else x
+    start = press.problem.guess(closing) if x is None else x
     x = press._stepping.solve(start, Control(closing=closing), Work())
     return x, press.problem.normal_force(x)

@@ -15,8 +15,9 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.contact.checks import refuse_fall
-from softjaw.fem.contact.friction_coupling import GROWTH, CoupledProblem, Damping, load_steps
+from softjaw.fem.contact.friction import GROWTH, load_steps
 from softjaw.fem.contact.load_stepping import falls
+from softjaw.fem.contact.problem import bearing, borne
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_check import MeshError, crossing_pairs, sound_mesh
@@ -353,8 +354,6 @@ def test_a_frame_is_one_up_to_rounding(seed):
 @given(seeds)
 def test_a_node_bears_something_or_nothing(seed):
     """What rounding leaves of a pressure is none; tension is kept for the checks, idle or not."""
-    from softjaw.fem.contact.problem import borne
-
     scale = np.random.default_rng(seed).uniform(1e2, 1e6)
     noise = scale * np.random.default_rng(seed + 1).uniform(1e-18, 1e-11, 3)
     pressure = np.concatenate([moved(scale * np.array([1.0, 0.5, 1e-8, -1e-3, -1e-3, 0.5]), seed), noise])
@@ -393,14 +392,8 @@ def test_a_closing_that_stays_is_no_fall(seed):
 @given(seeds)
 def test_a_point_is_closed_where_it_bears_something(seed):
     """Tractions go on from there at the next state; elsewhere they begin anew."""
-    pressure = np.array([[1.0, 0.5, 1e-8], [1e-13, 1e-17, 0.0]]) * np.random.default_rng(seed).uniform(1e2, 1e6)
-    problem = object.__new__(CoupledProblem)
-    problem._contact, problem.size = (lambda x, tangent: None), 0
-    problem._traction = lambda x: (np.zeros((2, 3, 3)),)
-    problem._path, problem._damping = (), Damping(slice(0))
-    problem._points, problem._pressure = np.zeros((2, 3, 3)), lambda x: np.maximum(moved(pressure, seed), 0.0)
-    problem.accept(np.zeros(0))
-    assert problem._closed.tolist() == [[True] * 3, [False] * 3]
+    pressure = np.array([1.0, 0.5, 1e-8, 1e-13, 1e-17, 0.0]) * np.random.default_rng(seed).uniform(1e2, 1e6)
+    assert bearing(np.maximum(moved(pressure, seed), 0.0)).tolist() == [True] * 3 + [False] * 3
 
 
 # --- grids ------------------------------------------------------------------------------------------------------------

@@ -1,14 +1,13 @@
 """Friction that acts back on the contact: limits, Coulomb's law, tangent, and independence of the steps."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from softjaw.fem.contact import friction_coupling as coupling
-from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
+from softjaw.fem.contact import friction as coupling
+from softjaw.fem.contact.friction import load_steps
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
+from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
@@ -26,7 +25,7 @@ def pad_of(symmetry=(True, True), elements=(8, 4, 3), law=FOAM):
 
 
 def press(gap, mu, pad=None):
-    return Press(pad or pad_of(), gap, problem_of=partial(CoupledProblem, mu=mu), load_steps=load_steps)
+    return Press(pad or pad_of(), gap, mu=mu)
 
 
 def test_way_grows_evenly():
@@ -103,7 +102,7 @@ def test_a_gradient_that_is_no_unit_vector_balances_too():
 def test_tangent_by_finite_differences(control, gap):
     """From a state with a history: some points stick, some slip, some are open."""
     pad = pad_of((True, False), (6, 4, 2))
-    problem = CoupledProblem(pad, gap, 0.2)
+    problem = RigidProblem(pad, gap, 0.2)
     problem.control = control
     bed = SpringBed(pad, BALL)
     rng = np.random.default_rng(3)
@@ -112,8 +111,8 @@ def test_tangent_by_finite_differences(control, gap):
     problem.accept(before)
     problem.accept(before + 0.5 * (x - before))
     K = reference.dense(problem, x)
-    size = np.linalg.norm(problem._traction(x)[0], axis=-1)
-    slips = np.isclose(size, 0.2 * problem._pressure(x), rtol=1e-9) & (size > 0)
+    size = np.linalg.norm((contact := problem.evaluate(x)[0]).traction, axis=-1)
+    slips = np.isclose(size, 0.2 * problem.point_pressure(problem.finger, contact), rtol=1e-9) & (size > 0)
     assert slips.any()
     assert ((size > 0) & ~slips).any()
     d, h = rng.normal(size=pad.size) * 1e-8, 1e-2
@@ -140,7 +139,7 @@ def test_a_force_by_itself_remembers_the_load_path_of_a_coarser_mesh(gap):
 
 
 def test_newton_steps_to_and_fro_are_damped_and_others_are_not():
-    problem = CoupledProblem(pad_of(), BALL, 0.4)
+    problem = RigidProblem(pad_of(), BALL, 0.4)
     x, step = np.zeros(problem.size), np.full(problem.size, 1e-7)
     assert problem.shorten(x, step) == 1.0
     x = x - step

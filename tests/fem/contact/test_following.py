@@ -124,9 +124,13 @@ class Curve:
     """One unknown, the closing displacement; strained by ``strain(x)``."""
 
     complementarity, closing_dof, control = False, 0, Control(closing=0.0)
+    thickness, share, rounding = 5 * MM, 1.0, 0.0
 
     def __init__(self, strain=lambda x: 0.0):
         self.strain = strain
+
+    def force_scale(self, closing):
+        return 1.0
 
     def normal_force(self, x):
         return float(force(x[0] / MM))
@@ -178,7 +182,7 @@ class Crossings:
 
 def following(problem):
     solver = Crossings(problem)
-    return Following(problem, solver, Settings(), 5 * MM, 1.0, lambda t: None, lambda t: 1.0)
+    return Following(problem, solver, Settings())
 
 
 @pytest.mark.parametrize("forces", [[3.0], [2.4, 3.0], [0.3, 1.1, 2.49, 2.51, 3.0]])
@@ -228,7 +232,7 @@ def test_a_maximum_of_the_force_is_named_and_the_plate_stays_out_of_the_object()
 
 
 def test_a_force_that_takes_too_many_iterations_is_given_up(monkeypatch):
-    monkeypatch.setattr("softjaw.fem.contact.press.MOST_ITERATIONS", 8)
+    monkeypatch.setattr(Press, "MOST_ITERATIONS", 8)
     with pytest.raises(ConvergenceError, match=r"of 60 N: given up after 8 Newton iterations"):
         last(press_of(), [60])
 
@@ -247,7 +251,7 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
         error.end = known.unknowns * (1 + scatter), 1e-5
         raise error
 
-    press.solver.solve, press._left = stalls, ()
+    press.solver.solve, press._others = stalls, ()
     if passes:
         state = last(press, [5])
         assert state.closing == pytest.approx(known.closing, rel=1e-6)
@@ -289,12 +293,12 @@ def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():
     press = press_of()
     tried = []
 
-    def step_to(x, reached, goal, work):
-        tried.append((press.pad.contact, not press._left))
+    def step_to(here, goal, work):
+        tried.append((press.pad.contact, not press._others))
         if len(tried) < 3:
             raise ConvergenceError("the pad jumps at 7 N")
         press._stepping.jumped = True
-        return proper(x, reached, goal, work)
+        return proper(here, goal, work)
 
     proper, press._step_to = press._step_to, step_to
     (state,) = press.load_path([10.0])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.press import Press
-from softjaw.fem.contact.problem import ContactProblem, Control, SpringBed
+from softjaw.fem.contact.problem import Control, SpringBed
+from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.backing_plate import back_stiffness, relative_compliance
@@ -111,7 +112,7 @@ def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
 @pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.002)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control):
     pad = pad_of(PLASTIC, (True, False), (4, 2, 2))
-    problem = ContactProblem(pad, BALL)
+    problem = RigidProblem(pad, BALL)
     problem.control = control
     x = SpringBed(pad, BALL).guess(0.003)
     K = reference.dense(problem, x)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.press import Press
-from softjaw.fem.contact.problem import ContactProblem, Control, SpringBed
+from softjaw.fem.contact.problem import Control, SpringBed
+from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
@@ -79,7 +80,7 @@ def test_a_pad_that_is_pressed_in_its_middle_does_not_tilt_and_half_of_it_says_t
 
 def test_the_tangent_is_that_of_differences():
     pad = Pad(PadShape(SIZE, (4, 2, 2)), FOAM, (False, False), "weighted", TiltingMount(0.5, GLUE))
-    problem = ContactProblem(pad, beside(0.002))
+    problem = RigidProblem(pad, beside(0.002))
     problem.control = Control(force=2.0)
     x = SpringBed(pad, beside(0.002)).guess(0.002)
     K = reference.dense(problem, x)

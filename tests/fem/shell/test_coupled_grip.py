@@ -1,18 +1,17 @@
 """Friction that acts back on a thin wall: tangent, Coulomb's law, balance, and the limits without friction or give."""
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softjaw.fem.contact.friction_coupling import CoupledProblem, load_steps
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import wall_material
-from tests.fem.grips import _gap, e_n, grip, pose, stirred, thin
+from tests.fem.grips import e_n, gap_at, grip, pose, stirred, thin
 
 MU = 0.4
 
@@ -37,20 +36,20 @@ def test_tangent_by_finite_differences(allowed, level, control):
     x = stirred(problem, rng)
     problem.accept(x)
     for size in (3e-6, 1e-6):
-        x = x + size * rng.normal(size=problem.size) * np.isin(np.arange(problem.size), problem._damping.moved)
+        x = x + size * rng.normal(size=problem.size) * np.isin(np.arange(problem.size), problem.friction.damping.moved)
         if size == 3e-6:
             problem.accept(x)
     problem.control = control
     problem.tangent(x)
     pattern = problem.pattern
     K = sp.csr_matrix((pattern.values.copy(), pattern.column, pattern.start), shape=(problem.size,) * 2)
-    for k, c in enumerate(problem._contact(x, problem._no_force())):
+    for k, c in enumerate(problem.evaluate(x)):
         f = problem.fingers[k]
-        size, most = np.linalg.norm(problem._traction(k, x, c)[0], axis=1), 0.2 * problem._pressure(f, c)
+        size, most = np.linalg.norm(problem.traction(k, x, c)[0], axis=1), 0.2 * problem.point_pressure(f, c)
         slips = np.isclose(size, most, rtol=1e-9) & (size > 0)
         assert slips.any()
         assert ((size > 0) & ~slips).any()
-    parts = [slice(0, problem.model.size), *(f.own for f in problem.fingers)]
+    parts = [slice(0, problem.model.size), *(f.unknowns for f in problem.fingers)]
     for moved in parts:
         step = np.zeros(problem.size)
         step[moved] = rng.normal(size=step[moved].size)
@@ -74,7 +73,7 @@ def test_coulombs_law_and_balance_hold(level):
         assert (size <= MU * points.load * (1 + 1e-9)).all()
         assert np.abs(np.einsum("fqi,fqi->fq", points.friction, points.normal)).max() < 1e-9 * points.load.max()
         assert size.sum() > 0.05 * points.load.sum()
-        rubbed = state.poses[0].rotation @ points.force
+        rubbed = state.pose.rotation @ points.force
         np.testing.assert_allclose(rubbed, state.wall.load.sum(axis=0), atol=1e-9 * state.force)
 
 
@@ -88,8 +87,8 @@ def test_quarter_half_and_full_give_the_same():
 
 def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
     problem = grip(thin(), mu=MU).problem
-    gap = _gap(pose(0.0, 0.075))
-    press = Press(problem.fingers[0].pad, gap, problem_of=partial(CoupledProblem, mu=MU), load_steps=load_steps)
+    gap = gap_at(pose(0.0, 0.075))
+    press = Press(problem.fingers[0].pad, gap, mu=MU)
     rigid = list(press.load_path((0.5, 2.0)))
     stiff = thin(1e-3, replace(wall_material("pet"), young_modulus=3e10))
     for one, other, smooth in zip(
@@ -118,9 +117,9 @@ def test_what_a_step_in_vain_went_through_is_forgotten():
     problem = grip(thin(), elements=(4, 2, 2), mu=MU).problem
     first, in_vain, second = (stirred(problem, np.random.default_rng(seed)) for seed in range(3))
     problem.accept(first)
-    kept = problem.memory
+    memory = problem.friction.memory
     problem.accept(in_vain)
-    problem.memory = kept
+    problem.friction.memory = memory
     problem.accept(second)
     problem.accept(second)
     (before,) = problem.history(second)

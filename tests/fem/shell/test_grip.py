@@ -7,12 +7,12 @@ import pytest
 import scipy.sparse as sp
 
 from softjaw.fem.contact.load_stepping import Work
+from softjaw.fem.contact.path import OnPath
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.shell.grip import _OnPath
 from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial
-from tests.fem.grips import _gap, e_n, grip, pose, stirred, thin
+from tests.fem.grips import e_n, gap_at, grip, pose, stirred, thin
 
 FORCES = (0.5, 2.0)
 FINE = WallMesh(0.00085, 0.0025, 0.005)
@@ -42,7 +42,7 @@ def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
     problem.tangent(x)
     pattern = problem.pattern
     K = sp.csr_matrix((pattern.values.copy(), pattern.column, pattern.start), shape=(problem.size,) * 2)
-    parts = [slice(0, problem.model.size), *(f.own for f in problem.fingers)]
+    parts = [slice(0, problem.model.size), *(f.unknowns for f in problem.fingers)]
     for moved in parts:
         step = np.zeros(problem.size)
         step[moved] = rng.normal(size=step[moved].size)
@@ -87,7 +87,7 @@ def test_a_very_stiff_wall_is_a_rigid_object():
     stiff = thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")
     soft = list(grip(stiff).load_path(FORCES))
     pad = soft[0].fingers[0].pad
-    press = Press(pad, _gap(pose(0.0, 0.075)))
+    press = Press(pad, gap_at(pose(0.0, 0.075)))
     for a, b in zip(soft, press.load_path(FORCES), strict=True):
         assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
@@ -129,6 +129,6 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
         if expected:
             F = held.problem.normal_force(x)
             assert F == pytest.approx(expected[0], rel=0.035)
-            finger = held._gripped(_OnPath(x, F, 0.0, False, False), work, held.solver.seconds).fingers[0]
+            finger = held._pressed(OnPath(x, F), work, held.solver.seconds)
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)
     assert work.halvings == 0

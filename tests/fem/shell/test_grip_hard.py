@@ -7,10 +7,10 @@ import pytest
 
 from softjaw.fem.contact.extract import extract, turned
 from softjaw.fem.contact.load_stepping import Work
+from softjaw.fem.contact.path import OnPath
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.grip import _OnPath
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
@@ -70,10 +70,10 @@ def test_a_wall_creeps_to_the_state_that_its_load_path_leads_to():
     start = held._last
     expected = next(path).fingers[0].closing
     held._last, held.opening.last = start, (1.0, 1.0)
-    here = _OnPath(start, 1.0, held.problem.closing(start), False, False)
+    here = OnPath(start, 1.0, compliance=held.problem.closing(start))
     found = held._creep(here, 1.5, Work())
     assert held.problem.closing(found.x) == pytest.approx(expected, rel=1e-6)
-    assert not found.fell
+    assert not found.jumped
 
 
 @pytest.mark.long

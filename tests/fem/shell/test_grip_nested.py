@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.shell.thin_walled import WallMesh
-from softjaw.fem.shell.wall_interpolation import interpolated
-from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
+from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, interpolated
 from tests.fem.grips import grip, thin
 
 FORCES = (0.5, 2.0)
@@ -103,13 +102,12 @@ def test_not_a_bit_depends_on_what_was_solved_before():
 )
 def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contact(start):
     low, good = starts()
-    finger = good.fingers[0]
-    far = finger.unknowns + np.eye(finger.pad.size)[finger.pad.closing_dof] * 9e-3
+    far = good.unknowns + np.eye(good.pad.size)[good.pad.closing_dof] * 9e-3
     given = {
         "none": [], "lower": [low],
-        "jumped": [replace(good, fingers=(replace(finger, path_dependent=True),)), low],
-        "far off": [replace(good, fingers=(replace(finger, unknowns=far),), wall=replace(good.wall, q=0 * low.wall.q))],
-        "broken": [replace(good, fingers=(replace(finger, unknowns=np.full(len(far), np.nan)),)), low],
+        "jumped": [replace(good, path_dependent=True), low],
+        "far off": [replace(good, unknowns=far, wall=replace(good.wall, q=0 * low.wall.q))],
+        "broken": [replace(good, unknowns=np.full(len(far), np.nan)), low],
     }  # fmt: skip
     found = pressed().at(2.0, given[start])
     assert found.fingers[0].steps > 1

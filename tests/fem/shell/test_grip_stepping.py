@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
+from softjaw.fem.contact.path import OnPath
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.shell.grip import Grip, _OnPath
+from softjaw.fem.shell.grip import Grip
 
 MM = 1e-3
 
@@ -27,13 +28,20 @@ def crossings(F):
 class Curve:
     """One unknown, the closing displacement."""
 
-    control, memory = Control(closing=0.0), None
+    control, friction = Control(closing=0.0), None
+    thickness, share, rounding = 20 * MM, 1.0, 0.0
 
     def begin(self):
         """Nothing has touched yet."""
 
     def accept(self, x):
         """Without friction the path does not matter."""
+
+    def force_scale(self, closing):
+        return 1.0
+
+    def closing_of_bed(self, force):
+        return 0.1 * MM
 
     def normal_force(self, x):
         return float(force(x[0] / MM))
@@ -59,7 +67,7 @@ class Jumping:
 
 def stepping(**choices):
     problem = Curve()
-    return Stepping(problem, Jumping(problem, **choices), Settings(), 20 * MM, 1.0, lambda t: None, lambda t: 1.0)
+    return Stepping(problem, Jumping(problem, **choices), Settings())
 
 
 @pytest.mark.parametrize("wanted", [0.3, 1.9, 2.1, 2.4, 2.45, 3.5])
@@ -125,12 +133,11 @@ def test_a_first_force_above_the_limit_does_not_jump_there_unseen(slope):
     grip = climbing()
     first = np.array([0.1 * MM])
     grip._stepping.first = lambda closing, F, work: (first, grip.problem.normal_force(first))
-    grip._beds = [SimpleNamespace(closing=lambda F: 0.1 * MM)]
     grip._stepping.problem.closing = lambda x: float(x[0])
     grip._compliance = lambda: slope
-    found = grip._climb(None, 6.0, Work())
+    found = grip._step_on(None, 6.0, Work())
     assert found.x[0] / MM == pytest.approx(crossings(6.0)[0], abs=1e-9)
-    assert found.fell
+    assert found.jumped
     assert found.snapped
 
 
@@ -151,8 +158,8 @@ def test_steps_that_keep_failing_end_the_walk():
 def test_a_state_at_which_more_force_would_open_the_fingers_is_beyond_a_limit(slope, beyond):
     grip, start = climbing(), np.array([crossings(1.0)[0] * MM])
     grip._compliance = lambda: slope
-    found = grip._climb(_OnPath(start, 1.0, 0.2 * MM, False, False), 2.2, Work())
-    assert (found.fell, found.snapped) == (beyond, beyond)
+    found = grip._step_on(OnPath(start, 1.0, compliance=0.2 * MM), 2.2, Work())
+    assert (found.jumped, found.snapped) == (beyond, beyond)
 
 
 @pytest.mark.parametrize(("shut", "snaps"), [(0.25, False), (0.35, True)])
@@ -160,18 +167,15 @@ def test_a_wall_that_closes_far_more_than_in_proportion_has_snapped(shut, snaps)
     """In proportion to the force 0.1 at 1 N becomes 0.22 at 2.2 N; twice that growth is 0.34."""
     grip, start = climbing(), np.array([crossings(1.0)[0] * MM])
     grip._compliance, grip._shut = (lambda: 1e-9), (lambda x: 0.1 if x is start else shut)
-    found = grip._climb(_OnPath(start, 1.0, 0.2 * MM, False, False), 2.2, Work())
+    found = grip._step_on(OnPath(start, 1.0, compliance=0.2 * MM), 2.2, Work())
     assert found.snapped == snaps
 
 
 @pytest.mark.parametrize(("ends", "code"), [((3.74, 3.72), CheckError), ((3.74, 2.9), ConvergenceError)])
 def test_a_path_that_ends_at_one_force_with_either_kind_of_gaps_is_ended_by_the_wall(ends, code):
     grip, left = climbing(), iter(ends)
-    grip.opening, grip.fallback, grip._start_again = (
-        SimpleNamespace(last=(0.82, 3.7)),
-        lambda: grip.problem,
-        lambda: None,
-    )
+    grip.opening, grip._others = SimpleNamespace(last=(0.82, 3.7)), (lambda: grip.problem,)
+    grip._switch = lambda problem: None
 
     def level(here, F, work):
         grip._peak = next(left)

@@ -1,0 +1,188 @@
+"""Friction that acts back on the contact: tangential traction while the pad is pressed, with stick and slip.
+
+At every quadrature point of the contact face a traction ``t`` resists what the point moves along the object's surface
+(on a wall: along the material point that it faced in the last accepted state)::
+
+    d = t_0 - k (x - x_0)             x_0, t_0: of the last accepted state, k: stiffness of the regularised stick
+    t = P d                where |P d| <= mu p, P = I - n n^T     (stick)
+    t = mu p P d / |P d|   elsewhere                              (slip)
+
+A point that was open at the last state starts without traction. So the result depends on the load path, as friction
+does; `load_steps` divides the forces finely enough. The tangent is exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+# Stiffness of stick in units of E / thickness: three times as much moves e_n by up to 0.05 % and takes a third more
+# Newton iterations.
+STICK = 30.0
+# Of the force from step to step, and of the first force at the first step: steps of 1.2 from 0.01 move e_n by up to
+# 0.5 %, in a waist by 1 %. Growth by 2 moves it by up to 2 % there, a start at 0.1 by 0.3 %.
+GROWTH, START = 1.5, 0.02
+BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
+MOST_DAMPED = 0.125  # of a step of Newton's method
+
+
+def load_steps(reached: float, force: float) -> list[float]:
+    """Forces to go through from ``reached`` (0: nothing yet) to ``force`` [N], each at most `GROWTH` times the last.
+
+    >>> load_steps(2.0, 4.0)
+    [2.8284271247461903, 4.0]
+    """
+    low = reached or START * force
+    # a tiny part less, or rounding of the logarithms would add a step where the ratio is an exact power
+    steps = max(1, math.ceil(math.log(force / low) / math.log(GROWTH) - 1e-9))
+    between = [low * (force / low) ** (k / steps) for k in range(1, steps)]
+    return [*([] if reached else [low]), *between, force]
+
+
+def stick_or_slip(
+    normal: FloatArray, d: FloatArray, mu: float, pressure: FloatArray, derivatives: bool
+) -> tuple[FloatArray, ...]:
+    """Traction of points and, if wanted, its derivatives; see the module's formulas.
+
+    Parameters
+    ----------
+    normal, d : (..., 3) arrays
+        Unit normals, and tractions that would stick [Pa].
+    mu : float
+    pressure : (...) array
+        Nominal pressures, none negative [Pa].
+
+    Returns
+    -------
+    t : (..., 3) array
+        Traction [Pa].
+    by_d, by_normal : (..., 3, 3) arrays
+        Its derivatives [-], [Pa].
+    by_pressure : (..., 3) array
+        [-]
+    """
+    most = mu * pressure
+    across = np.einsum("...i,...i->...", normal, d)[..., None]
+    trial = d - across * normal
+    size = np.linalg.norm(trial, axis=-1)
+    # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
+    slips = (size > most)[..., None]
+    along = trial / np.where(size > 0.0, size, 1.0)[..., None]
+    t = np.where(slips, most[..., None] * along, trial)
+    if not derivatives:
+        return (t,)
+    share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
+    eye = np.eye(3)
+
+    def kept(D: FloatArray) -> FloatArray:
+        # the length of a slipping point's traction is given, so only the change across it counts
+        return share * np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
+
+    by_d = kept(eye - normal[..., :, None] * normal[..., None, :])
+    # the tangent plane turns as the point slides, wherever the surface is curved
+    by_normal = kept(-across[..., None] * eye - normal[..., :, None] * d[..., None, :])
+    return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
+
+
+class Damping:
+    """Shortens steps of Newton's method that take most of the last one back.
+
+    A point that slips to and fro beyond its place would make the method alternate for ever, with the same nodes in
+    contact and the same points slipping.
+
+    Parameters
+    ----------
+    moved : index
+        The unknowns that are displacements.
+    """
+
+    def __init__(self, moved: Any) -> None:
+        self.moved = moved
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin another solve."""
+        # the last step and where it led to: nowhere yet
+        self._step: FloatArray = np.zeros(0)
+        self._reached: FloatArray | None = None
+        self._damping = 1.0
+
+    def shortened(self, x: FloatArray, step: FloatArray, factor: float) -> float:
+        """Factor of the step from ``x``, at most the one given."""
+        if self._reached is None or not np.array_equal(x, self._reached):  # another solve has begun
+            self._damping = 1.0
+        else:
+            before, now = self._step, step[self.moved]
+            back = before @ now < -BACKWARDS * (before @ before)
+            self._damping = max(0.5 * self._damping, MOST_DAMPED) if back else min(2.0 * self._damping, 1.0)
+        factor = min(factor, self._damping)
+        self._step, self._reached = factor * step[self.moved], x - factor * step
+        return factor
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """Last accepted state of one finger's points, in the frame of what it touches.
+
+    Attributes
+    ----------
+    at, traction : (n, 3) arrays
+        Places of the points [m], and tractions [Pa].
+    closed : (n,) array of bool
+        Whether the point pressed.
+    wall : (n, 3) array, optional
+        Displacements of the wall's material points that they faced [m].
+    nodes, N : (n, 4) arrays, optional
+        Where these lie on the wall.
+    """
+
+    at: FloatArray
+    traction: FloatArray
+    closed: NDArray[np.bool_]
+    wall: FloatArray | None = None
+    nodes: NDArray[np.int32] | None = None
+    N: FloatArray | None = None
+
+
+class Friction:
+    """What friction knows of the load path: where it is measured from, and the states that have led there.
+
+    Attributes
+    ----------
+    mu, stick : float
+        Friction coefficient; stiffness of stick in units of E / thickness.
+    memory : (tuple of Anchor, tuple of (size,) arrays)
+        Of each finger, and all accepted states, the first one first. It is replaced, never changed, so that whoever
+        keeps it can put it back.
+    damping : Damping
+    """
+
+    def __init__(self, mu: float, moved: Any) -> None:
+        self.mu, self.stick, self.damping = mu, STICK, Damping(moved)
+
+    @property
+    def anchors(self) -> tuple[Anchor, ...]:
+        """Last accepted state of each finger."""
+        return self.memory[0]
+
+    def begin(self, anchors: Sequence[Anchor]) -> None:
+        """Begin another load path."""
+        self.memory: tuple[tuple[Anchor, ...], tuple[FloatArray, ...]] = tuple(anchors), ()
+        self.damping.forget()
+
+    def accept(self, x: FloatArray, anchors: Sequence[Anchor]) -> None:
+        """Measure what follows from the state ``x``."""
+        _, path = self.memory
+        # a state is accepted as the end of one step, and again as the start of the next
+        self.memory = tuple(anchors), path if path and np.array_equal(x, path[-1]) else (*path, x.copy())
+        self.damping.forget()
+
+    def leading_to(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """The accepted states before ``x``: what its tractions depend on."""
+        return tuple(state for state in self.memory[1] if not np.array_equal(state, x))

@@ -1,0 +1,298 @@
+"""Follow the load path of pads on an object: states at growing normal forces, each started from the one before.
+
+Or each from the states of a coarser mesh. What is done where one step does not reach a force depends on the object:
+`fem.contact.press` is for rigid ones, `fem.shell.grip` for walls that give way. Every state that is passed on has
+converged and has been checked.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from softjaw.fem.contact.checks import NEAR, Checks, check
+from softjaw.fem.contact.friction import load_steps
+from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, FloatArray, Settings, Stepping, Work
+from softjaw.fem.contact.problem import ContactPoints, ContactProblem
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.objects.gap import Pose
+from softjaw.fem.pad.interpolation import interpolated
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.petsc import NonlinearSolver, Seconds
+
+ProblemT = TypeVar("ProblemT", bound=ContactProblem)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A pad in equilibrium on the object at one normal force, with the wall and the other pad that it shares it with.
+
+    Parameters
+    ----------
+    force, closing : float
+        Normal force [N] and closing displacement of the backing plate from first touch [m].
+    unknowns : (n,) array
+        State of the solver.
+    pad : Pad
+        The pad it was solved with: the fallback where the pad itself had no solution.
+    pose : Pose
+        Its frame at first touch; a rigid object is seen from there.
+    pressure : (contact nodes,) array
+        Nominal contact pressure, in the order of ``Pad.contact_nodes`` [Pa].
+    contact_face : (contact nodes, 3) array
+        Deformed nodes of the contact face, in the pad's frame at first touch [m].
+    points : ContactPoints
+        Position, normal and load of the quadrature points of the meshed contact face.
+    iterations, steps, halvings, seconds
+        Effort; that of two pads that are solved at once is counted with the first.
+    path_dependent : bool
+        Whether the pad, or the wall, has jumped before: another load path may lead to another state.
+    instead : bool
+        Whether a fallback was taken.
+    notes : tuple of str
+        Which means beside Newton's method on steps of the force it took.
+    history : tuple of (n,) arrays
+        Its states before this one that this one depends on; none without friction.
+    wall : WallState, optional
+        The wall that gives way.
+    other : Pressed, optional
+        The second pad on this wall.
+    """
+
+    force: float
+    closing: float
+    unknowns: FloatArray
+    pad: Pad
+    pose: Pose
+    pressure: FloatArray
+    contact_face: FloatArray
+    points: ContactPoints
+    checks: Checks
+    iterations: int
+    steps: int
+    halvings: int
+    seconds: Seconds
+    path_dependent: bool = False
+    instead: bool = False
+    notes: tuple[str, ...] = ()
+    history: tuple[FloatArray, ...] = ()
+    wall: Any = None
+    other: Pressed | None = None
+
+    @property
+    def fingers(self) -> tuple[Pressed, ...]:
+        """The pad, and the other one if there is one."""
+        return (self,) if self.other is None else (self, self.other)
+
+
+@dataclass(frozen=True)
+class OnPath:
+    """State on the load path: unknowns, force [N], and what is known of the path so far.
+
+    ``jumped`` is whether it has left the path of equilibria before; of a wall ``compliance`` is that of the last step
+    [m/N], and ``snapped`` is as in `fem.shell.grip.WallState`.
+    """
+
+    x: FloatArray
+    force: float
+    jumped: bool = False
+    compliance: float = 0.0
+    snapped: bool = False
+
+
+class LoadPath(ABC, Generic[ProblemT]):
+    """Pads on one object along a load path.
+
+    Parameters
+    ----------
+    problems : sequence of callables
+        They make the problem, and the same one with other gaps, the best first, for forces at which it has no solution.
+        All number their unknowns alike.
+    options : dict
+        PETSc options with the prefix ``contact_``.
+    settings : Settings
+    """
+
+    MOST_ITERATIONS: int  # of Newton's method for one force
+
+    def __init__(
+        self, problems: Sequence[Callable[[], ProblemT]], options: dict[str, Any] | None, settings: Settings | None
+    ) -> None:
+        self.options, self.settings = options or {}, settings or Settings()
+        self._fallbacks = self._others = tuple(problems[1:])  # the latter: those that have not been taken yet
+        self._wanted = self.problem = problems[0]()
+        self._begin()
+        self._set_up()
+
+    def _set_up(self) -> None:
+        """Make solver and steps for the problem as it is now."""
+        self.solver = NonlinearSolver(self.problem, self.options)
+        self._stepping = self._steps()
+
+    @abstractmethod
+    def _steps(self) -> Stepping:
+        """Steps of the problem as it is now, of which none has been made."""
+
+    def _switch(self, problem: ProblemT) -> None:
+        """Go on with another problem; clock and iterations that are left go on."""
+        seconds, left = self.solver.seconds, self.solver.left
+        self.solver.destroy()
+        self.problem = problem
+        self._set_up()
+        self.solver.seconds, self.solver.left = seconds, left
+
+    def _begin(self) -> None:
+        """Nothing has been solved on the load path yet."""
+
+    def _begin_afresh(self) -> None:
+        """Forget what was solved before, so that not a bit of what follows depends on it."""
+        self._begin()
+        self._others = self._fallbacks
+        self._wanted.forget()
+        if self.problem is self._wanted:
+            self.solver.forget()
+            self._stepping = self._steps()
+        else:
+            self._switch(self._wanted)
+        self.solver.left = self.MOST_ITERATIONS
+
+    def load_path(self, forces: Sequence[float]) -> Iterator[Pressed]:
+        """Equilibrium states at ascending normal forces on each whole pad [N].
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            At the first force without an acceptable state.
+        """
+        here = None
+        self._begin()
+        for force in forces:
+            work, elapsed = Work(), self._stopwatch()
+            self.solver.left = self.MOST_ITERATIONS
+            here = self._next(here, force, work)
+            yield self._pressed(here, work, elapsed())
+
+    def at(self, force: float, coarse: Sequence[Pressed]) -> Pressed:
+        """State at one normal force on each whole pad [N], whatever else has been solved.
+
+        ``coarse`` are states of a coarser mesh, the nearest first, none above this force. From each one Newton solve is
+        tried; from the first that leads to a state on the load path the force is approached, if it is lower. Where none
+        does, or the coarser mesh has jumped before, the force is approached from first contact.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If there is no acceptable state.
+        """
+        work, elapsed = Work(), self._stopwatch()
+        self._begin_afresh()
+        here = self._near(coarse, work)
+        if here is None or here.force < force:
+            here = self._next(here, force, work)
+        return self._pressed(here, work, elapsed())
+
+    @abstractmethod
+    def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+        """State at ``force`` from the one before, or from first contact."""
+
+    def _near(self, coarse: Sequence[Pressed], work: Work) -> OnPath | None:
+        """State at the force of the first of a coarser mesh's states that leads to one on the path, checked."""
+        for start in coarse:
+            # beyond a jump the finer mesh may still be before it
+            if not start.path_dependent:
+                try:
+                    here = self._from(start, work)
+                    self._pressed(here, work, Seconds())
+                    return here
+                except (ConvergenceError, CheckError):
+                    continue
+        return None
+
+    def _from(self, start: Pressed, work: Work) -> OnPath:
+        """State at the force of a coarser mesh's, by one Newton solve after the load path that led there."""
+        self.problem.begin()
+        for k in range(len(start.history)):
+            self.problem.accept(self._interpolated(start, k))
+        near = self._interpolated(start)
+        x = self._stepping.from_near(near, start.force, work)
+        # displacements and closing only: the bound is a distance in space, which pressures are not
+        moved = np.delete(x - near, np.concatenate([np.r_[f.pressures] for f in self.problem.fingers]))
+        if np.abs(moved).max() > STRAY * self.problem.thickness:
+            work.halvings += 1
+            raise ConvergenceError(ASTRAY.format(force=start.force))
+        return OnPath(x, start.force, self._stepping.jumped)
+
+    def _interpolated(self, start: Pressed, k: int | None = None) -> FloatArray:
+        """Unknowns of a coarser mesh's state, or of the ``k``-th one in its history."""
+        x, pads = np.zeros(self.problem.size), start.fingers
+        for number, f in enumerate(self.problem.fingers):
+            # where the coarser mesh has one finger, the other one is its image in x = 0
+            image = np.array([-1.0 if number >= len(pads) else 1.0, 1.0, 1.0])
+            pad = pads[min(number, len(pads) - 1)]
+            turn = np.einsum("ji,j,ji->i", pad.pose.rotation, image, f.pose.rotation).round()
+            x[f.unknowns] = interpolated(pad.pad, pad.unknowns if k is None else pad.history[k], f.pad, turn)
+        return x
+
+    def _load_steps(self, reached: float, force: float) -> Sequence[float]:
+        """Forces to go through from one (0: no contact yet) to the next [N]; without friction it does not matter."""
+        return (force,) if self.problem.friction is None else load_steps(reached, force)
+
+    def _given_up(self, reached: float, force: float) -> ConvergenceError:
+        """The error where no iterations are left, at ``reached`` [N]."""
+        spent = f"given up after {self.MOST_ITERATIONS} Newton iterations"
+        return ConvergenceError(f"stuck at {reached:.4g} N of {force:.4g} N: {spent}")
+
+    def _pressed(self, here: OnPath, work: Work, seconds: Seconds) -> Pressed:
+        """The state, checked."""
+        problem, x, steps = self.problem, here.x, self._stepping
+        residual = np.abs(problem.residual(x))
+        instead, slack, path = problem.rule != self._wanted.rule, NEAR if steps.off else 0.0, problem.history(x)
+        pads = []
+        for k, f in enumerate(problem.fingers):
+            state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
+            pressure, _, points = state
+            imbalance = float(residual[f.offset : f.closing_dof + 1].max()) / f.pad.share
+            checks = check(f.foam, unknowns, state, imbalance, here.force, self.settings.residual, slack)
+            effort = work if k == 0 else Work()
+            pads.append(Pressed(
+                here.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,
+                (f.pad.nodes + f.pad.displacement(unknowns))[f.pad.contact_nodes], points, checks, effort.iterations,
+                effort.steps, effort.halvings, seconds if k == 0 else Seconds(), here.jumped, instead, self._notes(),
+                tuple(before[f.unknowns] for before in path),
+            ))  # fmt: skip
+        return self._together(here, pads, residual)
+
+    def _together(self, here: OnPath, pads: list[Pressed], residual: FloatArray) -> Pressed:
+        """The first of the pads, which knows what it shares the state with."""
+        return pads[0]
+
+    def _notes(self) -> tuple[str, ...]:
+        """Which means beside Newton's method on steps of the force the last state took."""
+        steps, notes = self._stepping, []
+        if self.problem.rule != self._wanted.rule:
+            notes.append(f"solved with {self.problem.rule} gaps, {self._wanted.rule} ones did not converge")
+        if steps.closed:
+            notes.append("reached by displacement control")
+        if steps.off:
+            notes.append(f"the active set alternates, accepted at a residual of {steps.off:.1e} of the force")
+        return tuple(notes)
+
+    def _stopwatch(self) -> Callable[[], Seconds]:
+        """Where the time goes from now on."""
+        before, start = copy(self.solver.seconds), time.perf_counter()
+
+        def elapsed() -> Seconds:
+            now, total = self.solver.seconds, time.perf_counter() - start
+            return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
+
+        return elapsed
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self.solver.destroy()

@@ -1,0 +1,204 @@
+"""Contact of a pad with a rigid object: the tangent of `fem.contact.problem`, also in a symmetric form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from softjaw.fem.assembly import Pattern, add_up, gather, pairs
+from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, FloatArray, Gap
+from softjaw.fem.pad import foam as kernel
+from softjaw.fem.pad.mesh import Pad
+
+NO_DIRECTIONS = np.empty((0, 3))
+
+
+class RigidProblem(ContactProblem):
+    """One pad pressed on one rigid object; ``gap`` takes points of the pad's frame."""
+
+    condensed = False
+
+    def __init__(self, pad: Pad, gap: Gap, mu: float | None = None) -> None:
+        self.pad, self.closing_dof = pad, pad.closing_dof
+        self.longest_closing = 0.1 * pad.shape.size[2]
+        super().__init__([Finger(pad, gap)], mu)
+        [self.finger] = self.fingers
+        self.foam, self.non_negative = self.finger.foam, self.finger.pressures
+        self.symmetric = mu is None  # slip grows with the pressure, but no pressure with slip
+        self._build_pattern()
+
+    def _damped(self) -> slice:
+        return slice(0, self.closing_dof + 1)
+
+    def _build_pattern(self) -> None:
+        """Work arrays, so that nothing large is allocated in an iteration, and the place of every entry."""
+        m, k = self.finger.nodes.shape
+        self._K_ul = np.empty((m, k, 3, k))
+        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
+        face, pressure = self.finger.local_dofs, self.finger.pressure_dofs
+        # the diagonal of closing and pressures: an idle node has nothing else in its row
+        diagonal = np.arange(self.closing_dof, self.size, dtype=np.int32)
+        parts = (
+            (self.foam.rows, self.foam.columns),
+            pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
+            pairs(face[:, None, :, :], pressure[:, :, None, None]),
+            pairs(pressure[:, :, None, None], face[:, None, :, :]),
+            (diagonal, diagonal),
+        )
+        rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
+        self.pattern = Pattern(self.size, rows, columns)
+        self._slots = self.pattern.slots(rows, columns)
+        self._ends = np.cumsum([len(part[0]) for part in parts])
+        self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
+        self._values = np.zeros(rows.size)
+        self._K_uu = self._parts()[1].reshape(m, 3, k, 3, k)
+
+    def _parts(self) -> list[FloatArray]:
+        """Views of the values: elements, face stiffness, force by pressure, gap by displacement, diagonal."""
+        return np.split(self._values, self._ends[:-1])
+
+    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
+        f, area = self.finger, self.pad.face_area
+        points = f.points(x).reshape(-1, 3)
+        gap, normal, hessian = f.gap(points)
+        lam, weighted = f.pressure(x)[f.nodes], np.empty(f.nodes.shape)
+        force = np.empty((len(f.nodes), 3, f.nodes.shape[1]))
+        kernel.contact(
+            self.pad.face_N, area, lam, gap.reshape(area.shape), normal.reshape(*area.shape, 3),
+            hessian.reshape(*area.shape, 3, 3), weighted, force, *((self._K_uu, self._K_ul) if tangent else self._none),
+        )  # fmt: skip
+        gaps = f.nodal(weighted)
+        return [Evaluated(points, gap, normal, lam, gaps, f.active(x, gaps), force, hessian)]
+
+    def _unit_normal(self, c: Evaluated) -> FloatArray:
+        # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
+        return c.normal / np.linalg.norm(c.normal, axis=-1)[..., None]
+
+    def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:
+        # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
+        return float(f.gap(f.points(x, self.pad.between_N).reshape(-1, 3))[0].min())
+
+    def tangent(self, x: FloatArray) -> None:
+        """Fill ``pattern.values`` with the tangent at ``x``, or its symmetric form if ``condensed``."""
+        self._evaluate_entries(x)
+        if self.condensed:
+            self._closing_column = self._condense()
+        self._add_up(self.pattern.values)
+
+    def _add_up(self, values: FloatArray) -> None:
+        values[:] = 0.0
+        add_up(self._slots, self._values, values)
+
+    def _evaluate_entries(self, x: FloatArray) -> None:
+        """Entries of the tangent, not added up yet."""
+        elements, _, by_pressure, by_displacement, diagonal = self._parts()
+        self.foam.stiffness(x, elements)
+        [c], f = self.evaluate(x, tangent=True), self.finger
+        by_pressure[:] = -f.kappa * self._K_ul.ravel()
+        diagonal[:] = 0.0
+        self._tangent_set = c.active
+        if self.complementarity:
+            by_displacement[:] = f.kappa * self._K_ul.ravel()
+        else:
+            by_displacement[:] = (f.kappa * c.active[f.nodes][:, :, None, None] * self._K_ul).ravel()
+            diagonal[1:] = np.where(c.active, 0.0, f.kappa * f.area)
+        self._by_force = self.control.force is not None
+        if self.control.force is None:
+            # this row holds the control instead of the foam's force on the backing plate
+            elements[self.foam.closing_entries] = 0.0
+            diagonal[0] = self.closing_stiffness
+        if self.friction is not None:
+            self._add_friction(x, c)
+
+    def _add_friction(self, x: FloatArray, c: Evaluated) -> None:
+        """Add to the entries what friction changes."""
+        N, weight = self.pad.face_N, self.pad.face_area
+        (m, points), k = weight.shape, N.shape[1]
+        _, by_motion, by_normal, by_pressure = self.traction(0, x, c, derivatives=True)
+        length = np.linalg.norm(c.normal, axis=-1)[..., None]
+        n = c.normal / length
+        turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ c.surface / length[..., None]
+        by_place = by_motion + by_normal @ turns
+        # products of shape functions times what each point adds: two matrices, of which one is the same for all facets
+        NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
+        weight = weight.ravel()
+        K = (NN @ (weight[:, None, None] * by_place).reshape(m, points, 9)).reshape(m, k, k, 3, 3)
+        self._K_uu -= K.transpose(0, 3, 1, 4, 2)
+        # slip grows with the pressure, which makes the tangent unsymmetric
+        entries = self._parts()[2]
+        by_node = (NN @ (weight[:, None] * by_pressure).reshape(m, points, 3)).reshape(m, k, k, 3)
+        entries -= self.finger.kappa * by_node.transpose(0, 2, 3, 1).ravel()
+
+    def _condense(self) -> FloatArray:
+        """Make the entries symmetric; returns what was the column of the closing displacement, 0 under force control.
+
+        Rows of nodes in contact change their sign. Idle pressures, and a closing that is given, have nothing but a
+        diagonal in their rows, so their part of a step is known beforehand (`right_side`) and their columns go.
+        """
+        elements, _, by_pressure, by_displacement, _ = self._parts()
+        nodes = self.finger.nodes
+        by_displacement *= -1.0
+        by_pressure[~np.repeat(self._tangent_set[nodes], by_pressure.size // nodes.size)] = 0.0
+        if self.control.force is not None:
+            return np.zeros(self.size)
+        rows, column = self.foam.rows[self._closing_entries], elements[self._closing_entries]
+        elements[self._closing_entries] = 0.0
+        return gather(rows, column, self.size)
+
+    def right_side(self, R: FloatArray) -> FloatArray:
+        """Right-hand side ``(size,)`` with which the condensed tangent has the step that belongs to the residual."""
+        right, active, f = R.copy(), self._tangent_set, self.finger
+        idle = np.where(active, 0.0, R[f.pressures] / (f.kappa * f.area))
+        if idle.any():
+            right += gather(f.dofs, f.kappa * np.einsum("faib,fa->fib", self._K_ul, idle[f.nodes]), self.size)
+        right[f.pressures] = np.where(active, -1.0, 1.0) * R[f.pressures]
+        if not self._by_force:
+            right -= self._closing_column * (R[self.closing_dof] / self.closing_stiffness)
+        return right
+
+    def path_tangent(self, x: FloatArray, answer: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
+        """Change of the unknowns per normal force on the whole pad ``(size,)`` [m/N], along the path through ``x``.
+
+        ``answer`` solves with the factors of the last tangent, which is that at ``x`` or close to it. None where the
+        force does not grow with the closing displacement, or a tangent under displacement control cannot tell.
+        """
+        if self._by_force is None:  # nothing has been factorised yet
+            return None
+        load = np.zeros(self.size)
+        load[self.closing_dof] = 1.0
+        change = answer(load)
+        # beyond a limit point the closing grows while the force falls: nothing can be foretold by force
+        if not change[self.closing_dof] > 0.0:
+            return None
+        if self._by_force:
+            return self.pad.share * change
+        # the factors are those of another control: they give the direction, and a central difference the force
+        along = change / change[self.closing_dof]
+        # small against the bends of the path, large against rounding of the force
+        h = 1e-6 * self.pad.shape.size[2]
+        rise = (self.normal_force(x + h * along) - self.normal_force(x - h * along)) / (2.0 * h)
+        return along / rise if rise > 0.0 else None
+
+    def symmetric_tangent(self, x: FloatArray) -> tuple[FloatArray, int]:
+        """Values of the symmetric tangent under force control, in ``pattern``, and the number of nodes in contact.
+
+        It is that of ``R_u`` with the rows ``-kappa G_i`` of these nodes, whose pressures are the multipliers; those of
+        the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
+        """
+        before = self.control, self._tangent_set, self._by_force  # the latter two belong to the factors at hand
+        # any force will do: the kind of control enters the tangent, its value does not
+        self.control = Control(force=1.0)
+        self._evaluate_entries(x)
+        # pressures are multipliers with the sign that makes the matrix symmetric
+        self._condense()
+        active = self._tangent_set
+        self.control, self._tangent_set, self._by_force = before
+        # not into the pattern's own values, which stay those of the last tangent
+        values = np.empty_like(self.pattern.values)
+        self._add_up(values)
+        return values, int(np.count_nonzero(active))
+
+    def largest_strain(self, x: FloatArray) -> float:
+        """Largest principal strain of the foam."""
+        return self.foam.strains(x, NO_DIRECTIONS)[1]

@@ -1,0 +1,298 @@
+"""Contact of one or two pads with a wall that gives way: wall, pads' places on it, and the tangent.
+
+With the pads' points facing the deformed wall (``fem.shell.facing``) its rows in `fem.contact.problem` are::
+
+    R_q = r_int(q) + int N_a (p n - t) dA      on both numbers that move the outer face
+
+Friction drags a point along the material point of the wall that it faced in the last accepted state::
+
+    d = t_0 - k [(x - x_0) - sum N_a0 (v_a - v_a0)]       t from d by the law of stick and slip, along the director n
+
+so the motion is relative to a wall that moves, and linear in all unknowns. The wall bears ``-t`` where the point faces
+it now. The tangent is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.fem.assembly import Pattern, add_up, pairs
+from softjaw.fem.contact.friction import Anchor
+from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
+from softjaw.fem.objects.gap import FloatArray, Pose
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.fem.shell.wall_kernel import contact_forces, contact_tangent, friction_tangent
+from softjaw.fem.shell.wall_model import NonlinearWall
+
+IntArray = NDArray[np.int32]
+CARRIED = 0.3  # part of a node's area that must face the wall for the node to carry load
+ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
+
+
+class WallProblem(ContactProblem):
+    """One or two pads on a deformable wall.
+
+    Parameters
+    ----------
+    model : NonlinearWall or LinearWall
+        The wall; its unknowns come first.
+    pads : sequence of (Pad, Gap, Pose, Wall)
+        One where a plane of symmetry lies between the fingers, else two; see `fem.contact.problem.Finger`.
+    mu : float, optional
+        Friction coefficient; without it no friction acts back on the pressures.
+    """
+
+    longest_closing = 1e-3
+
+    def __init__(
+        self, model: NonlinearWall, pads: Sequence[tuple[Pad, Gap, Pose, Wall]], mu: float | None = None
+    ) -> None:
+        self.model = model
+        # stiffness (size,) [N/m] that ties displacements to those of a state (size,), see ``creep``
+        self.damping: tuple[FloatArray, FloatArray] | None = None
+        fingers: list[Finger] = []
+        for pad, gap, pose, wall in pads:
+            fingers.append(Finger(pad, gap, fingers[-1].unknowns.stop if fingers else model.size, pose, wall))
+        super().__init__(fingers, mu)
+        self._damped_by: tuple[FloatArray, FloatArray] | None = None  # of the last tangent
+        self._first_places = [f.wall.places(self._object_points(f, np.zeros(self.size))) for f in fingers]
+        self._bare = self._built()
+        self._values = [np.zeros(len(f.foam.rows)) for f in fingers]
+        self.forget()
+
+    def forget(self) -> None:
+        """See `ContactProblem`."""
+        super().forget()
+        # kept from call to call: where a point was is the best start for where it is now
+        self.places = [places.copy() for places in self._first_places]
+        pattern, self._wall_slots, self._foam_slots, self._balance_slots = self._bare
+        self.pattern = copy(pattern)
+
+    @property
+    def control(self) -> Control:
+        """What drives the fingers; setting it begins a new solve, whose first tangent of the wall is the plain one."""
+        return self._control
+
+    @control.setter
+    def control(self, control: Control) -> None:
+        self._control = control
+        self._before: FloatArray | None = None
+
+    @property
+    def rounding(self) -> float:
+        """See `ContactProblem`."""
+        return ROUNDING * self.model.shell.young_modulus + super().rounding
+
+    def _object_points(self, f: Finger, x: FloatArray) -> FloatArray:
+        """Quadrature points of a contact face in the object's frame ``(n, 3)`` [m]."""
+        return f.pose.to_object(f.points(x).reshape(-1, 3))
+
+    def _built(self) -> tuple[Pattern, IntArray, list[IntArray], IntArray]:
+        """Pattern of all but the couplings between pads and wall, which come as pads touch, and the parts' slots."""
+        rows, columns = zip(self.model.entries, *map(self._pad_entries, self.fingers), strict=True)
+        pattern = Pattern(self.size, np.concatenate(rows), np.concatenate(columns))
+        # the last finger holds the first one's back in the row of its own closing, if they are two
+        first, last = self.fingers[0], self.fingers[-1]
+        back = first.foam_entries[1][first.foam.closing_entries][: None if last is not first else 0]
+        balance = pattern.slots(np.full_like(back, last.closing_dof), back)
+        foams = [pattern.slots(*f.foam_entries) for f in self.fingers]
+        return pattern, pattern.slots(*self.model.entries), foams, balance
+
+    def _pad_entries(self, f: Finger) -> tuple[IntArray, IntArray]:
+        moved, pressed = pairs(f.dofs[:, :, :, None], f.pressure_dofs[:, None, None, :])
+        rows, columns = [f.foam_entries[0], moved, pressed], [f.foam_entries[1], pressed, moved]
+        if f is self.fingers[-1] and f is not self.fingers[0]:
+            # its closing row may hold the balance of both backing plates
+            first = self.fingers[0]
+            back = first.foam_entries[1][first.foam.closing_entries]
+            rows += [np.full_like(back, f.closing_dof), np.array([first.closing_dof], np.int32)]
+            columns += [back, np.array([f.closing_dof], np.int32)]
+        return np.concatenate(rows), np.concatenate(columns)
+
+    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
+        self._wall_force = np.zeros((len(self.model.first), 3))
+        v, w = self.model.outer(x[: self.model.size])
+        contacts = []
+        for f, places in zip(self.fingers, self.places, strict=True):
+            points, pad, lam = self._object_points(f, x), f.pad, f.pressure(x)[f.nodes]
+            facing = face(f.wall, points, places, v, w)
+            (weighted, part), force = np.empty((2, *f.nodes.shape)), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
+            contact_forces(
+                pad.face_N, pad.face_area, lam, facing.gap, facing.normal, facing.nodes, facing.N, f.R,
+                weighted, part, force, self._wall_force,
+            )  # fmt: skip
+            # a node that hangs over the rim with most of its area would put all of its pressure on the rest
+            gaps = np.where(f.nodal(part) > CARRIED * f.area, f.nodal(weighted), FAR * f.area)
+            contacts.append(Evaluated(points, facing.gap, facing.normal, lam, gaps, f.active(x, gaps), force, facing))
+        return contacts
+
+    def evaluate(self, x: FloatArray, tangent: bool = False) -> list[Evaluated]:
+        """See `ContactProblem`; the forces on the wall's nodes are noted."""
+        contacts = super().evaluate(x, tangent)
+        for f, c in zip(self.fingers, contacts, strict=True):
+            if c.traction is not None:
+                share = f.pad.face_area.ravel()[:, None] * c.surface.N
+                np.add.at(self._wall_force, c.surface.nodes, share[..., None] * c.traction[:, None, :])
+        return contacts
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """See `ContactProblem`."""
+        R = super().residual(x)
+        if np.isnan(R[-1]):
+            return R
+        R[: self.model.size] = self.model.residual(x[: self.model.size], self._wall_force)
+        if self.damping is not None:
+            stiffness, before = self.damping
+            R += stiffness * (x - before)
+        return R
+
+    def tangent(self, x: FloatArray) -> None:
+        """Fill ``pattern.values`` with the tangent at ``x``; the pattern grows by what newly touches."""
+        q = x[: self.model.size].copy()
+        wall = self.model.tangent(q, self._before)
+        self._before, self._by_force, self._damped_by = q, self.control.force is not None, self.damping
+        contacts = self.evaluate(x)
+        self._tangent_set = np.concatenate([c.active for c in contacts])
+        for f, values in zip(self.fingers, self._values, strict=True):
+            f.foam.stiffness(x[f.unknowns], values)
+        # adding the contact may find entries without a place; the pattern grows and all is filled once more
+        while True:
+            self._fill(wall, contacts)
+            if all([self._add_contact(k, x, c) for k, c in enumerate(contacts)]):
+                return
+            self._grow(contacts)
+
+    def keep(self, x: FloatArray, first: bool) -> bool:
+        """See `ContactProblem`."""
+        keeps = self._damped_by is self.damping and super().keep(x, first)
+        if keeps and first:
+            self._before = x[: self.model.size].copy()  # the wall's next tangent counts its step from here
+        return keeps
+
+    def _fill(self, wall: FloatArray, contacts: list[Evaluated]) -> None:
+        """Entries of wall, foam, idle pressures and control."""
+        values = self.pattern.values
+        values[:] = 0.0
+        add_up(self._wall_slots, wall, values)
+        if self.damping is not None:
+            tied = np.flatnonzero(self.damping[0])
+            values[self.pattern.slots(tied, tied)] += self.damping[0][tied]
+        for f, slots, foam, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
+            add_up(slots, foam, values)
+            idle = np.flatnonzero(~c.active)
+            index = f.closing_dof + 1 + idle
+            values[self.pattern.slots(index, index)] += f.kappa * f.area[idle]
+        if self.control.force is None:
+            self._fill_closing_rows(values)
+
+    def _fill_closing_rows(self, values: FloatArray) -> None:
+        """Under displacement control the first row holds the mean closing, the second the balance of both plates."""
+        first, last = self.fingers[0], self.fingers[-1]
+        back = self._foam_slots[0][first.foam.closing_entries]
+        if last is not first:
+            values[self.pattern.start[last.closing_dof] : self.pattern.start[last.closing_dof + 1]] /= last.pad.share
+            add_up(self._balance_slots, -self._values[0][first.foam.closing_entries] / first.pad.share, values)
+        values[back[back >= 0]] = 0.0
+        closings = np.array([f.closing_dof for f in self.fingers])
+        mean = self.pattern.slots(np.full_like(closings, first.closing_dof), closings)
+        values[mean] = self.closing_stiffness / len(closings)
+
+    def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
+        """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
+        f, facing = self.fingers[k], c.surface
+        pad, rows = f.pad, (self.model.first, self.model.second, self.pattern.start, self.pattern.column)
+        complete = contact_tangent(
+            pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
+            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressure_dofs, *rows,
+            self.pattern.values,
+        )  # fmt: skip
+        if self.friction is None:
+            return complete
+        anchor = self.friction.anchors[k]
+        return complete & friction_tangent(
+            pad.face_N, pad.face_area, self._dragged(k, f, c), *self.traction(k, x, c, derivatives=True), f.kappa,
+            facing.gap, facing.normal, facing.nodes, facing.N, facing.H, facing.G, facing.A, anchor.nodes, anchor.N,
+            f.R, f.dofs, f.pressure_dofs, *rows, self.pattern.values,
+        )  # fmt: skip
+
+    def _grow(self, contacts: list[Evaluated]) -> None:
+        """Couple the faces that press with the wall's nodes that they face."""
+        each = [self._couplings(k, f, c) for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True))]
+        rows, columns = zip(*(part for couplings in each for part in couplings), strict=True)
+        moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
+        if moved is None:
+            raise AssertionError("the contact has entries that its pattern cannot hold; this is a bug")
+
+        def move(slots: IntArray) -> IntArray:
+            return np.where(slots >= 0, moved[slots], -1).astype(np.int32)
+
+        self._wall_slots, self._foam_slots = move(self._wall_slots), [move(slots) for slots in self._foam_slots]
+        self._balance_slots = move(self._balance_slots)
+
+    def _couplings(self, k: int, f: Finger, c: Evaluated) -> list[tuple[IntArray, IntArray]]:
+        """Rows and columns of the entries that the contact of the ``k``-th finger may have."""
+        facets = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0])
+        # facets that already press, or that the next iteration may close
+        pick = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)[facets] & (c.gap < FAR)
+        on_pad = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[facets[pick]]
+        on_wall = self.wall_dofs(c.surface.nodes[pick])
+        pair = pairs(on_pad[:, :, None], on_wall[:, None, :])
+        couplings = [pair, (pair[1], pair[0]), pairs(on_wall[:, :, None], on_wall[:, None, :])]
+        if self.friction is not None:
+            # and the nodes of the wall that points are dragged along
+            dragged, nodes = self._dragged(k, f, c), self.friction.anchors[k].nodes
+            assert nodes is not None
+            now, before = self.wall_dofs(c.surface.nodes[dragged]), self.wall_dofs(nodes[dragged])
+            rows = np.concatenate([f.dofs.reshape(len(f.nodes), -1)[facets[dragged]], now], axis=1)
+            couplings.append(pairs(rows[:, :, None], before[:, None, :]))
+        return couplings
+
+    def wall_dofs(self, nodes: IntArray) -> IntArray:
+        """Unknowns ``(n, 24)`` that move the outer face at nodes ``(n, 4)`` of the wall, -1 where fixed."""
+        both = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2)
+        return both.reshape(len(nodes), 24)
+
+    # -- friction that acts back --------------------------------------------------------------------------------------
+
+    def _damped(self) -> NDArray[np.int64]:
+        pads = (np.arange(f.offset, f.closing_dof) for f in self.fingers)
+        return np.concatenate([np.arange(self.model.size), *pads])
+
+    def _untouched(self, f: Finger) -> Anchor:
+        open_face = super()._untouched(f)
+        n = len(open_face.at)
+        return replace(open_face, wall=open_face.at, nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
+
+    def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
+        nodes, N = c.surface.nodes, c.surface.N
+        wall = np.einsum("na,nai->ni", N, self.model.outer(x[: self.model.size])[0][nodes])
+        return replace(super()._anchor(f, x, c), wall=wall, nodes=nodes, N=N)
+
+    def _moved(self, x: FloatArray, c: Evaluated, anchor: Anchor) -> FloatArray:
+        assert anchor.N is not None
+        assert anchor.nodes is not None
+        v, _ = self.model.outer(x[: self.model.size])
+        return super()._moved(x, c, anchor) - np.einsum("na,nai->ni", anchor.N, v[anchor.nodes]) + anchor.wall
+
+    def _dragged(self, k: int, f: Finger, c: Evaluated) -> NDArray[np.bool_]:
+        """Points whose traction changes with anything."""
+        assert self.friction is not None
+        return self.friction.anchors[k].closed & (c.gap < FAR) & (self.point_pressure(f, c) > 0.0)
+
+    # -- states -------------------------------------------------------------------------------------------------------
+
+    def wall_load(self, x: FloatArray) -> FloatArray:
+        """Contact forces on the wall's nodes ``(k, 3)`` [N]."""
+        self.evaluate(x)
+        # the kernel adds what enters the residual, the negative of the load
+        return -self._wall_force
+
+    def wall_state(self, x: FloatArray) -> FloatArray:
+        """State of the whole shell ``(6 k,)`` [m]."""
+        return self.model.state(x[: self.model.size])
