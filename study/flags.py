@@ -74,6 +74,7 @@ class Flag(IntFlag):
     OBLIQUE = 1 << 24, "oblique", "a contact normal lies oblique to the approach", (
         "the force along it differs from the one that the gripper commands by 5 % or more: see force_excess"
     )  # fmt: skip
+    MESH_HOLE = 1 << 25, "mesh hole", "a hole of the mesh lies under a pad, where nothing is known of the object"
     # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"

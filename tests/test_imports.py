@@ -27,7 +27,7 @@ ALLOWED = {
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
-    "fem/objects/mesh_object.py",
+    "fem/objects/triangles.py",
     "study/show/view/solids.py",
     "study/show/view/window.py",
     "study/show/vtk.py",

@@ -20,8 +20,7 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray, Pose
+from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.objects.smooth_triangles import SmoothTriangles
 from softjaw.fem.objects.spline_grid import coefficients, evaluate
 from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
@@ -48,11 +47,14 @@ def lines_of_sight(pose: Pose) -> FloatArray:
 
 
 @njit(cache=True)
-def _seen(which, normals, directions, spacing, rotation, origin, lower, upper, lift, nodes):
-    """How each triangle is seen at some place in the box: 2 straight, 1 on a slant, 0 not at all."""
+def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, upper, lift, nodes):
+    """How each triangle is seen at some place in the box: 2 straight, 1 on a slant, 0 not at all; negative: its back.
+
+    ``sides`` is 2 where backs of triangles can be seen, too.
+    """
     corners, order, low, high, start, count = nodes
     stack, spot, y = np.empty(DEPTH, np.int64), np.empty(3), np.empty(3)
-    found = np.zeros(len(which), np.int64)
+    seen = np.zeros(len(which), np.int64)
     for m in range(len(which)):
         p, normal = corners[which[m]], normals[which[m]]
         longest = 0.0
@@ -62,42 +64,44 @@ def _seen(which, normals, directions, spacing, rotation, origin, lower, upper, l
         n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), MOST_SPOTS)
         for i in range(n * n):
             b, c = (i // n + 1.0 / 3.0) / n, (i % n + 1.0 / 3.0) / n
-            if found[m] == 2 or b + c >= 1.0:
+            if abs(seen[m]) == 2 or b + c >= 1.0:
                 continue
-            for d in range(3):
-                spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + lift * normal[d]
-            inside = True
-            for d in range(3):
-                y[d] = 0.0
-                for e in range(3):
-                    y[d] += (spot[e] - origin[e]) * rotation[e, d]
-                inside = inside and lower[d] <= y[d] <= upper[d]
-            if not inside:
-                continue
-            for k in range(len(directions)):
-                # seen on a slant already: only the straight line, which comes first, can tell more
-                if found[m] == 1 and k > 0:
-                    break
-                if (normal * directions[k]).sum() > -GRAZING:
+            for s in range(sides):
+                sign = 1.0 - 2.0 * s
+                for d in range(3):
+                    spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + sign * lift * normal[d]
+                inside = True
+                for d in range(3):
+                    y[d] = 0.0
+                    for e in range(3):
+                        y[d] += (spot[e] - origin[e]) * rotation[e, d]
+                    inside = inside and lower[d] <= y[d] <= upper[d]
+                if not inside or abs(seen[m]) == 2:
                     continue
-                hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
-                                stack)[1]  # fmt: skip
-                if hit < 0:
-                    found[m] = 2 if k == 0 else 1
-                    break
-    return found
+                for k in range(len(directions)):
+                    # seen on a slant already: only the straight line, which comes first, can tell more
+                    if seen[m] != 0 and k > 0:
+                        break
+                    if sign * (normal * directions[k]).sum() > -GRAZING:
+                        continue
+                    hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
+                                    stack)[1]  # fmt: skip
+                    if hit < 0:
+                        seen[m] = sign * (2 if k == 0 else 1)
+                        break
+    return seen
 
 
 @njit(cache=True)
 def _behind(which, normals, lift, nodes):
-    """Triangle that the line from each triangle's middle into the object meets first, and how far away."""
+    """Triangle that the line from each triangle's middle against its normal meets first, and how far away."""
     corners, order, low, high, start, count = nodes
     stack = np.empty(DEPTH, np.int64)
     hit, distance = np.full(len(which), -1), np.full(len(which), np.inf)
     for m in range(len(which)):
         p = corners[which[m]]
         middle = (p[0] + p[1] + p[2]) / 3.0
-        distance[m], hit[m] = first_hit(middle, -normals[which[m]], lift, which[m], False, corners, order, low, high,
+        distance[m], hit[m] = first_hit(middle, -normals[m], lift, which[m], False, corners, order, low, high,
                                         start, count, stack)  # fmt: skip
     return hit, distance
 
@@ -184,27 +188,22 @@ def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
 
 
 def facing_sheet(
-    smooth: SmoothTriangles, whole: TriangleTree, lids: IntArray, pose: Pose, box: FloatArray, step: float
+    smooth: SmoothTriangles, whole: TriangleTree, closed: bool, pose: Pose, box: FloatArray, step: float
 ) -> FacingSheet:
-    """What a finger at ``pose`` sees of a mesh in the ``box (2, 3)`` of its frame, and a little beside it.
+    """What a finger at ``pose`` sees of triangles in the ``box (2, 3)`` of its frame, and a little beside it.
 
     Parameters
     ----------
     smooth, whole
-        The mesh.
-    lids : (l,) array of int
-        Triangles that close a hole of the mesh and stand for nothing.
+        The triangles.
+    closed : bool
+        Whether they are closed surfaces that are turned outwards; the backs of others count as well.
     pose : Pose
         The pad's frame.
     box : (2, 3) array
         Lower and upper corner [m].
     step : float
         Step of the grid on which the distance is to be sampled [m].
-
-    Raises
-    ------
-    MeshError
-        If the finger looks into a hole of the mesh.
     """
     depth = box[1, 2] - box[0, 2]
     lower, upper = box[0] - MARGIN * depth, box[1] + MARGIN * depth
@@ -212,29 +211,23 @@ def facing_sheet(
     near = np.flatnonzero(((y.max(axis=1) >= lower) & (y.min(axis=1) <= upper)).all(axis=1))
     normals = whole.face_normals
     lines, lift = lines_of_sight(pose), LIFT * float(np.ptp(whole.points, axis=0).max())
-    spacing = 2 * step
-
-    def seen(which: IntArray, corner: FloatArray, other: FloatArray) -> IntArray:
-        R = np.ascontiguousarray(pose.rotation)
-        return _seen(which, normals, lines, spacing, R, pose.origin, corner, other, lift, whole.nodes)
-
-    open_here = seen(np.intersect1d(near, lids), box[0], box[1]) > 0
-    if open_here.any():
-        place = whole.points[whole.triangles[np.intersect1d(near, lids)[open_here][0]]].mean(axis=0)
-        raise MeshError(
-            f"the mesh has a hole under the pad, near ({', '.join(f'{1e3 * v:.4g}' for v in place)}) mm of the "
-            "object's frame; fill it in a mesh editor, or grasp elsewhere"
-        )
-    how = seen(near, lower, upper)
+    R = np.ascontiguousarray(pose.rotation)
+    how = _seen(
+        near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, whole.nodes
+    )
+    side = np.ones(len(normals))
+    side[near[how < 0]] = -1.0
     straight = np.zeros(len(normals), dtype=bool)
-    straight[near[how == 2]] = True
-    slanted = near[how == 1]
-    hit, far = _behind(slanted, normals, lift, whole.nodes)
+    straight[near[np.abs(how) == 2]] = True
+    slanted = near[np.abs(how) == 1]
+    hit, far = _behind(slanted, side[slanted, None] * normals[slanted], lift, whole.nodes)
     # without a hit the index is -1, which does no harm: the distance is infinite then
     slanted = slanted[~(straight[hit] & (far < THIN * depth))]
     chosen = np.union1d(np.flatnonzero(straight), slanted)
     # nothing faces the finger here, and the whole mesh keeps the distance defined
     if not len(chosen):
         return FacingSheet(whole, whole, lines)
-    x, small = smooth.refined(chosen, smooth.pieces_for(chosen, FOLLOWED * step))
-    return FacingSheet(TriangleTree(x, small), whole, lines)
+    pieces = smooth.pieces_for(chosen, FOLLOWED * step)
+    x, small = smooth.refined(chosen, pieces)
+    back = np.repeat(side[chosen] < 0, pieces**2)
+    return FacingSheet(TriangleTree(x, np.where(back[:, None], small[:, ::-1], small)), whole, lines)

@@ -70,6 +70,10 @@ class GapObject(GapFunction, Protocol):
         """Lower and upper corner of the object, ``(2, 3)`` [m]."""
         ...
 
+    def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
+        """Distance [m] along the approach at which the first of the pad's ``points (n, 3)`` meets the object."""
+        ...
+
     @property
     def axis_symmetry(self) -> int:
         """Order of the rotational symmetry about z; 0 means every angle, 1 means none."""
@@ -84,8 +88,12 @@ class GapObject(GapFunction, Protocol):
         ...
 
 
-class Analytic:
+class Analytic(GapFunction):
     """Shapes whose gap function costs the same everywhere."""
+
+    def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
+        """See `first_touch`."""
+        return first_touch(self, pose, points, reach)
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> Self:
         """Return the shape itself: a closed form needs no region."""

@@ -2,19 +2,19 @@
 
 A file is judged before trimesh sees it (what it is, how large, how many faces it declares) and after (how many faces
 came out): a damaged file is refused with one sentence, never half read. Nothing is merged, dropped or turned here;
-`fem.objects.mesh_check` does that. numpy and trimesh are loaded when a mesh is read: `check` needs the limits alone.
-
-glTF is not read: its nodes may turn and scale what they hold, which rounds, and its buffers may be other files.
+`fem.objects.triangles` does that. numpy and trimesh are loaded when a mesh is read: `check` needs the limits alone.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import math
 import re
 import warnings
+import zipfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from softjaw.fem.errors import MeshError
 
@@ -25,10 +25,14 @@ if TYPE_CHECKING:
 
 # Each unit is ``times / over`` metres, so that converting rounds once.
 LENGTHS = {"mm": (1, 1000), "cm": (1, 100), "m": (1, 1), "inch": (0.0254, 1)}
-ENDINGS = (".stl", ".obj", ".ply", ".off")
-LARGEST_FILE = 200 * 2**20  # bytes
-MOST_TRIANGLES = 500_000
-MOST_POINTS = 3 * MOST_TRIANGLES  # as many as an STL file has, where every triangle has its own
+ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".3mf")
+SCENES = (".glb", ".gltf", ".3mf")  # several bodies, each with a place of its own
+LARGEST_FILE = 250 * 2**20  # bytes
+MOST_FACES = 5_000_000
+MOST_POINTS = 3 * MOST_FACES  # as many as an STL file has, where every triangle has its own
+MOST_NODES = 10_000  # places of bodies in a scene
+NUMBERS = 8  # kinds of numbers at a point of a scene, at most: place, normal, colours, ...
+GLB_HEAD = 20  # bytes before the description of a binary glTF file
 STL_HEAD, STL_FACET = 84, 50  # bytes of a binary STL file
 FOLDED = math.pi - 1e-3  # angle between the normals of two triangles that lie on each other
 # Points and faces that a text declares, by its lines or in its head.
@@ -42,7 +46,7 @@ DECLARED = {
 def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
     """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of a mesh file.
 
-    Faces of more corners are cut into triangles where they are convex.
+    The bodies of a scene come in their places. Faces of more corners are cut into triangles where they are convex.
 
     Raises
     ------
@@ -56,10 +60,10 @@ def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
         data = _whole_binary_stl(path, data)
     if kind == ".obj":
         data = _plain_obj(path, data)
-    points, faces = _declared(kind, data)
-    if points > MOST_POINTS or faces > MOST_TRIANGLES:
+    points, faces = _declared(path, kind, data)
+    if points > MOST_POINTS or faces > MOST_FACES:
         raise MeshError(
-            f"{path}: the mesh has {points} points and {faces} faces, more than {MOST_POINTS} and {MOST_TRIANGLES}; "
+            f"{path}: the mesh has {points} points and {faces} faces, more than {MOST_POINTS} and {MOST_FACES}; "
             "decimate it, to about a tenth of the pad's element size nothing is lost"
         )
     if not faces:
@@ -72,7 +76,7 @@ def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
             "export it again"
         )
     # polygons are cut into fans, which fold over where a polygon is not convex
-    if len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
+    if kind not in SCENES and len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
         raise MeshError(
             f"{path}: has faces of more than three corners that are not convex, expected triangles; triangulate the "
             "mesh when you export it"
@@ -130,11 +134,13 @@ def _plain_obj(path: Path, data: bytes) -> bytes:
     return data
 
 
-def _declared(kind: str, data: bytes) -> tuple[int, int]:
+def _declared(path: Path, kind: str, data: bytes) -> tuple[int, int]:
     """Points and faces that a file says it has, which are counted or read from its head."""
     if kind == ".stl":
         faces = data.lower().count(b"endfacet") if _is_text(data) else (len(data) - STL_HEAD) // STL_FACET
         return 3 * faces, faces
+    if kind in SCENES:
+        return _declared_in_scene(path, kind, data), 1
     found = [re.findall(pattern, data, re.MULTILINE) for pattern in DECLARED[kind]]
     if kind == ".obj":
         return len(found[0]), len(found[1])
@@ -142,22 +148,70 @@ def _declared(kind: str, data: bytes) -> tuple[int, int]:
     return points, faces
 
 
+def _declared_in_scene(path: Path, kind: str, data: bytes) -> int:
+    """Numbers that a scene's reader would make room for, with every body counted at each of its places."""
+    try:
+        if kind == ".3mf":
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                size = sum(entry.file_size for entry in archive.infolist())
+            return MOST_POINTS + 1 if size > LARGEST_FILE else 1
+        length = int.from_bytes(data[GLB_HEAD - 8 : GLB_HEAD - 4], "little")
+        tree = json.loads(data[GLB_HEAD : GLB_HEAD + length] if kind == ".glb" else data)
+        counts = [int(accessor["count"]) for accessor in tree.get("accessors", ())]
+        parents = sum(len(node.get("children", ())) for node in tree.get("nodes", ()))
+        if min(counts, default=0) < 0 or parents >= max(len(tree.get("nodes", ())), 1) or parents > MOST_NODES:
+            raise ValueError("its nodes are no tree, or a count is negative")
+        return sum(counts) // NUMBERS
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, zipfile.BadZipFile) as problem:
+        raise _damaged(path, problem) from problem
+
+
+def _damaged(path: Path, problem: BaseException) -> MeshError:
+    reason = ascii(f"{type(problem).__name__}: {problem}")[1:200]
+    return MeshError(f"{path}: is damaged or not what its ending says ({reason}); export it again")
+
+
+class _Beside:
+    """Files beside a mesh file, which it may name: buffers of glTF. Nothing else is opened."""
+
+    def __init__(self, path: Path) -> None:
+        self._folder = path.parent.resolve()
+
+    def get(self, name: str) -> bytes:
+        """Contents of a regular file in the folder of the mesh, of a plausible size."""
+        file = (self._folder / name).resolve()
+        if file.parent != self._folder or not file.is_file() or file.stat().st_size > LARGEST_FILE:
+            raise ValueError(f"it names '{name!a}', expected a file beside it")
+        return file.read_bytes()
+
+    __getitem__ = get
+
+
+def _geometries(scene: Any) -> list[str]:
+    """Names of a scene's bodies, once for each place."""
+    return [scene.graph[node][1] for node in scene.graph.nodes_geometry]
+
+
 def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
     """The mesh as trimesh reads it: no other file is opened, nothing is changed."""
     import numpy as np
     import trimesh  # a third of a second, and most scenes have no mesh
 
+    kind = path.suffix[1:].lower()
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("error", "string or file could not be read")  # numpy would leave the rest out
-            mesh = trimesh.load_mesh(
-                io.BytesIO(data), file_type=path.suffix[1:].lower(), process=False, maintain_order=True,
-                skip_materials=True,
-            )  # fmt: skip
+            options = {"resolver": _Beside(path)} if kind == "gltf" else {}
+            scene = trimesh.load_scene(
+                io.BytesIO(data), file_type=kind, process=False, maintain_order=True, skip_materials=True, **options
+            )
+            placed = sum(len(getattr(scene.geometry[name], "faces", ())) for name in _geometries(scene))
+            if placed > MOST_FACES:
+                raise ValueError(f"its bodies have {placed} faces, expected at most {MOST_FACES}")
+            mesh = scene.to_mesh()
             points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     except Exception as problem:  # whatever a damaged file makes of the reader
-        reason = ascii(f"{type(problem).__name__}: {problem}")[1:200]
-        raise MeshError(f"{path}: is damaged or not what its ending says ({reason}); export it again") from problem
+        raise _damaged(path, problem) from problem
     if faces.ndim != 2 or faces.shape[1] != 3 or points.shape[1:] != (3,) or not len(faces):
         raise MeshError(f"{path}: is damaged or empty: no triangles could be read; export it again")
     astray = (faces < 0) | (faces >= len(points))

@@ -1,63 +1,49 @@
 """Holes of a triangle mesh: loops of edges that border on one triangle only, and triangles that close them.
 
 A small hole is filled by the triangulation of its loop that has the least area (Barequet and Sharir, 1995); no point
-moves and none is added. A large one gets a lid, a fan about its middle, which only tells inside from outside.
+moves and none is added. A large one stays open; a lid, a fan about its middle, tells where it is.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 
-SMALL_HOLE, LARGEST_HOLE = 0.02, 0.5  # of the object's diagonal: smaller are filled, larger refused, others get a lid
+SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
 MOST_PLACES = 3  # of defects that one note names
+MOST_BORDER = 0.5  # sides of holes per triangle, above which they are no holes
 MOST_SIDES = 60  # of a loop that is filled without a new point: the effort grows with the cube
 
 
-def without_holes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, np.ndarray, list[str]]:
-    """Mesh with small holes filled and larger ones under lids, which triangles are lids ``(m,)``, and notes.
+def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
+    """Mesh with its small holes filled, and a note of them; the larger ones stay open.
 
-    Raises
-    ------
-    MeshError
-        For a hole so large that it leaves open what is inside.
+    Triangles that hardly hang together have no holes to speak of, and stay as they are.
     """
     loops, size = border_loops(triangles), float(np.linalg.norm(np.ptp(points, axis=0)))
-    if not loops:
-        return points, triangles, np.zeros(len(triangles), dtype=bool), []
-    sides = np.sort(edges_of(triangles), axis=1)
-    taken = set(map(tuple, sides.tolist()))
-    parts, is_lid = [triangles], [np.zeros(len(triangles), dtype=bool)]
-    filled: list[str] = []
-    covered: list[str] = []
+    if not loops or sum(map(len, loops)) > MOST_BORDER * len(triangles):
+        return triangles, []
+    taken = set(map(tuple, np.sort(edges_of(triangles), axis=1).tolist()))
+    present = set(map(tuple, np.sort(triangles, axis=1).tolist()))
+    parts, places = [triangles], []
     for loop in loops:
         x = points[loop]
-        across, middle = float(np.linalg.norm(np.ptp(x, axis=0))), x.mean(axis=0)
-        if across > LARGEST_HOLE * size:
-            raise MeshError(
-                f"the mesh is not closed: a hole of {across * 1e3:.3g} mm near {named_place(middle)} leaves open what "
-                "is inside; fill it in a mesh editor, or give the object as a profile"
-            )
+        across = float(np.linalg.norm(np.ptp(x, axis=0)))
         # a triangle or two that are missing can be meant in one way only, so these may be larger
         small = across <= (SMALL_HOLE if len(loop) > FEW_SIDES else LARGEST_GAP) * size
         new = filling(points, loop, taken) if small else None
-        (covered if new is None else filled).append(f"{across * 1e3:.3g} mm near {named_place(middle)}")
-        is_lid.append(np.full(len(loop) if new is None else len(new), not small))
-        if new is None:
-            centre, new = lid(points, loop)
-            points = np.concatenate([points, centre[None]])
+        # the border of a triangle that stands alone is no hole
+        if new is None or any(tuple(sorted(t)) in present for t in new.tolist()):
+            continue
+        places.append(f"{across * 1e3:.3g} mm near {named_place(x.mean(axis=0))}")
         # the filling of the next hole must not use an edge of this one a third time
         taken.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         parts.append(new)
-    notes = [
-        f"{what}: {len(where)} ({'; '.join(where[:MOST_PLACES])}{'; ...' if len(where) > MOST_PLACES else ''})"
-        for what, where in (("small holes filled", filled), ("holes left open, where no pad may stand", covered))
-        if where
-    ]
-    return points, np.concatenate(parts), np.concatenate(is_lid), notes
+    more = "; ..." if len(places) > MOST_PLACES else ""
+    notes = [f"small holes filled: {len(places)} ({'; '.join(places[:MOST_PLACES])}{more})"] if places else []
+    return np.concatenate(parts), notes
 
 
 def named_place(x: FloatArray) -> str:
@@ -132,9 +118,13 @@ def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) ->
     return np.array(found)
 
 
-def lid(points: FloatArray, loop: list[int]) -> tuple[FloatArray, IntArray]:
-    """Middle of a loop ``(3,)``, weighted by length, and the fan of triangles about it; it is point ``len(points)``."""
-    x = points[loop]
-    along = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
-    middle = np.average(0.5 * (x + np.roll(x, -1, axis=0)), axis=0, weights=along)
-    return middle, np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(points))], axis=1)
+def lid_corners(points: FloatArray, loops: list[list[int]]) -> FloatArray:
+    """Corners ``(l, 3, 3)`` [m] of fans over open holes, each about the middle of its loop, weighted by length."""
+    lids = [np.empty((0, 3, 3))]
+    for loop in loops:
+        x, following = points[loop], points[np.roll(loop, -1)]
+        along = np.linalg.norm(following - x, axis=1)
+        if along.sum() > 0:
+            middle = np.average(0.5 * (x + following), axis=0, weights=along)
+            lids.append(np.stack([x, following, np.broadcast_to(middle, x.shape)], axis=1))
+    return np.concatenate(lids)

@@ -1,4 +1,4 @@
-"""Triangle meshes as objects: read, checked, and turned into a smooth signed distance round the contact.
+"""Triangle meshes as objects: read, cleaned, and turned into a smooth signed distance round the contact.
 
 A finger sees the part of the surface that faces it (`facing_sheet`), with facets made smooth (`smooth_triangles`). The
 distance to it is sampled on a grid in the box where the pad works and interpolated by a tricubic B-spline
@@ -20,12 +20,13 @@ import numpy as np
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
-from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, Pose, Surface
-from softjaw.fem.objects.mesh_check import sound_mesh
+from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, NoContactError, Pose, Surface
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.spline_grid import coefficients, evaluate
 from softjaw.fem.objects.triangle_tree import TriangleTree
+from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
+from softjaw.fem.objects.volume import centroid
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 STEPS_PER_BOX = 80  # grid where no element size is given: steps along the longest side of the box
@@ -34,32 +35,33 @@ FEWEST_FACETS = 4  # a round surface has more edges of one kind than a scan has 
 MARGIN = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
 MOST_CHOSEN = 1_000_000  # samples of a grid whose step is not the user's own
+HOLE_DEPTH = 0.1  # of the depth to which holes count: a wall so close behind closes one
 MOST_CENTRES = 4_000  # cells at whose centres the interpolation is compared with the distance itself
 TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
 
 
 @dataclass(frozen=True, eq=False)
 class MeshObject:
-    """Closed triangle mesh, oriented outwards.
+    """Triangles that a finger can meet, on whichever of their sides.
 
     Parameters
     ----------
     points : (k, 3) array
         Corners in the object's frame [m].
     triangles : (m, 3) array of int
-        Corners of each triangle, counterclockwise from outside.
+        Corners of each triangle.
     grid_step : float or None
         Step of the sampling grid [m]; by default a quarter of the pad's element.
     notes : tuple of str
-        What was mended or tolerated when the mesh was checked.
+        What was mended or left open when the mesh was read.
     crease_angle : float
         Edges that turn by less are taken for facets of a smooth surface [deg]; 0 keeps every facet flat.
-    lids : (l,) array of int
-        Triangles that close a large hole: they tell inside from outside, and no pad may stand on them.
+    lids : (l, 3, 3) array
+        Corners of triangles over the holes of the mesh [m]: where a pad stands over one, its case is flagged.
     placed : Pose
         Where the object's frame lies in that of the mesh file [m].
-    crossing : str
-        The note on closed parts that cross each other; empty if there are none.
+    closed : bool
+        Whether the triangles are closed surfaces, counterclockwise from outside.
     """
 
     points: FloatArray
@@ -67,9 +69,9 @@ class MeshObject:
     grid_step: float | None = None
     notes: tuple[str, ...] = ()
     crease_angle: float = CREASE_ANGLE
-    lids: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    lids: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
     placed: Pose = field(default_factory=lambda: Pose(np.eye(3), np.zeros(3)))
-    crossing: str = ""
+    closed: bool = True
 
     def __post_init__(self) -> None:
         """Refuse a step that is no length."""
@@ -81,7 +83,7 @@ class MeshObject:
         cls, path: str | Path, unit: str, axis: str = "z", grid_step: float | None = None,
         crease_angle: float = CREASE_ANGLE,
     ) -> Self:  # fmt: skip
-        """Mesh from an STL, OBJ, PLY or OFF file, checked and moved to the object's frame.
+        """Mesh from a file, cleaned and moved to the object's frame.
 
         ``axis`` of the file becomes z, by a cyclic exchange of the coordinates; z starts at 0 and the bounding box is
         centred in x and y. Raises ``MeshError`` with one sentence that says what is wrong and what to do.
@@ -90,16 +92,53 @@ class MeshObject:
             raise MeshError(f"the mesh's axis must be one of {', '.join(TURNS)}, found {axis!r}")
         corners, triangles = read_triangles(Path(path))
         try:
-            sound = sound_mesh(corners, triangles, unit)
+            clean = cleaned(corners, triangles, unit)
         except MeshError as problem:
             raise MeshError(f"{path}: {problem}") from problem
         turn = np.eye(3)[:, TURNS[axis]]
-        points = sound.points @ turn
+        points = clean.points @ turn
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-        points = np.ascontiguousarray(points - origin)
-        placed, lids = Pose(turn, turn @ origin), sound.lids
-        return cls(points, sound.triangles, grid_step, sound.notes, crease_angle, lids, placed, sound.crossing)
+        points, lids = np.ascontiguousarray(points - origin), clean.lids @ turn - origin
+        placed = Pose(turn, turn @ origin)
+        return cls(points, clean.triangles, grid_step, clean.notes, crease_angle, lids, placed, clean.closed)
+
+    def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
+        """Distance [m] along the approach to the first triangle before ``points (n, 3)`` of the pad's frame.
+
+        Raises
+        ------
+        NoContactError
+            If none of the lines meets a triangle within ``reach`` [m].
+        """
+        distance = self._tree.along(pose.to_object(points), pose.rotation[:, 2]).min()
+        if distance > reach:
+            raise NoContactError(
+                f"the pad misses the object: within {reach * 1e3:.4g} mm along its approach no point of its face meets "
+                "a triangle; check station, angle and the object's size and unit"
+            )
+        return float(distance)
+
+    @cached_property
+    def centroid(self) -> tuple[FloatArray, float]:
+        """Centroid ``(3,)`` of the volume that the triangles enclose, as if it were full, and its error [m]."""
+        single = self.closed and not pieces_of(self.points, self.triangles).any()
+        return centroid(self.points, self.triangles, single)
+
+    def hole_share(self, pose: Pose, points: FloatArray, depth: float) -> float:
+        """Share of the lines along the approach before ``points (n, 3)`` of the pad's frame that go through a hole.
+
+        Counted are holes before any triangle and within ``depth`` [m] of the points, to both sides.
+        """
+        corners = pose.to_pad(self.lids.reshape(-1, 3)).reshape(-1, 3, 3)
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        over = (low <= np.append(points.max(axis=0)[:2], depth)) & (high >= np.append(points.min(axis=0)[:2], -depth))
+        if not (near := over.all(axis=1)).any():
+            return 0.0
+        lids = TriangleTree(self.lids[near].reshape(-1, 3), np.arange(3 * near.sum()).reshape(-1, 3))
+        start, approach = pose.to_object(points) - depth * pose.rotation[:, 2], pose.rotation[:, 2]
+        hole, wall = lids.along(start, approach), self._tree.along(start, approach)
+        return float(np.mean((hole < wall - HOLE_DEPTH * depth) & (hole < 2 * depth)))
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m] to the flat triangles, its unit gradient ``(n, 3)`` and a Hessian of zeros.
@@ -118,11 +157,6 @@ class MeshObject:
 
         ``element`` is the size of the pad's elements [m]. Depends on the arguments alone, so every rank gets the same
         region.
-
-        Raises
-        ------
-        MeshError
-            If a hole of the mesh lies under the pad.
         """
         box = np.array([lower, upper], dtype=float)
         size = box[1] - box[0]
@@ -136,7 +170,7 @@ class MeshObject:
                 f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
                 f"more than {MOST_SAMPLES}; raise grid_step"
             )
-        sheet = facing_sheet(self._smooth, self._tree, self.lids, pose, box, step)
+        sheet = facing_sheet(self._smooth, self._tree, self.closed, pose, box, step)
         axes = [0.5 * box[:, d].sum() + step * (np.arange(int(cells[d]) + 1) - 0.5 * cells[d]) for d in range(3)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         samples = sheet.sampled(pose.to_object(grid.reshape(-1, 3)).reshape(grid.shape), step)
@@ -165,10 +199,7 @@ class MeshObject:
         """Points and triangles; large meshes are decimated."""
         if len(self.triangles) <= 20_000:
             return self.points, self.triangles
-        import pyvista as pv  # loading VTK takes a quarter of a start, and few objects need it
-
-        mesh = pv.PolyData.from_regular_faces(self.points, self.triangles).decimate(1 - 10_000 / len(self.triangles))
-        return np.asarray(mesh.points, dtype=float), mesh.regular_faces.astype(np.int64)
+        return decimated(self.points, self.triangles, 10_000)
 
     def sharp_facets(self, width: float) -> str:
         """What there is to say of wide facets that stay sharp though they may be meant as round; mostly nothing.

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.fem.objects.triangles import neighbours
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
@@ -135,28 +136,35 @@ class SmoothTriangles:
         return x.reshape(-1, 3)
 
 
-def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: float = CREASE_ANGLE) -> SmoothTriangles:
-    """Smooth version of a closed mesh; edges that turn by more than ``crease_angle`` [deg] stay."""
-    pairs = edges_of(triangles)
-    ordered = np.sort(pairs, axis=1)
-    key, first, edge = np.unique(ordered[:, 0] * len(points) + ordered[:, 1], return_index=True, return_inverse=True)
-    edge = edge.ravel()
-    halves = np.argsort(edge, kind="stable").reshape(-1, 2)  # the two sides of each edge: 3 * triangle + corner
+def smooth_triangles(
+    points: FloatArray, triangles: IntArray, crease_angle: float = CREASE_ANGLE
+) -> SmoothTriangles:
+    """Smooth version of triangles; edges that turn by more than ``crease_angle`` [deg], or have no two sides, stay."""
+    pairs, joined = edges_of(triangles), neighbours(points, triangles)
+    paired, ends = joined.paired, joined.edges
+    # an edge without a pair is seen as a side and itself
+    first_side = np.zeros(len(ends), np.int64)
+    first_side[joined.edge_of.ravel()[::-1]] = np.arange(len(pairs))[::-1]
+    halves = np.where(paired[:, None], joined.sides, first_side[:, None])
     a, b, c = points[triangles].transpose(1, 0, 2)
     area = np.cross(b - a, c - a)
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     cosine = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
+    alike = pairs[halves[:, 0], 0] != pairs[halves[:, 1], 0]
     # an edge at the very angle is a crease, whatever rounding makes of it
-    crease, turn = cosine < np.cos(np.radians(crease_angle)) + AT_ANGLE, np.arccos(np.clip(cosine, -1.0, 1.0))
+    crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + AT_ANGLE)
+    turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), 0.0)
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
-    inner = np.empty((len(key), 2, 3))
+    inner = np.empty((len(ends), 2, 3))
     for end in (0, 1):
         # either side's corner at this end: an edge's two sides run through it in opposite senses
-        starts = pairs[halves, 0] == ordered[first][:, end : end + 1]
-        own = np.where(starts, halves, _following(halves))
-        p, q = points[ordered[first][:, end]], points[ordered[first][:, 1 - end]]
-        inner[:, end] = p + _tangent(q - p, corner_normals[own[:, 0]], corner_normals[own[:, 1]]) / 3
-    return SmoothTriangles(points, triangles, ordered[first], edge.reshape(-1, 3), inner, crease, turn)
+        starts = pairs[halves, 0] == ends[:, end : end + 1]
+        corner = np.where(starts, halves, _following(halves))
+        p, q = points[ends[:, end]], points[ends[:, 1 - end]]
+        tangent = _tangent(q - p, corner_normals[corner[:, 0]], corner_normals[corner[:, 1]])
+        # where several surfaces end nobody knows how the edge goes on
+        inner[:, end] = p + np.where((paired | (joined.at_edge == 1))[:, None], tangent, q - p) / 3
+    return SmoothTriangles(points, triangles, ends, joined.edge_of, inner, crease, turn)
 
 
 def _following(halves: IntArray) -> IntArray:

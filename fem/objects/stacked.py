@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, grid_triangles
+from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, first_touch, grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.spline_surface import SplineSurface, spline_surface
@@ -41,6 +41,10 @@ class Stacked:
     def bounds(self) -> FloatArray:
         """Corners ``(2, 3)`` [m]."""
         return self._triangles.bounds
+
+    def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
+        """See `softjaw.fem.objects.gap.first_touch`."""
+        return first_touch(self, pose, points, reach)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""

@@ -198,6 +198,16 @@ def first_hit(o, d, least, own, anyone, corners, order, low, high, start, count,
     return best, found
 
 
+@njit(cache=True)
+def _along(x, d, nodes):
+    """Distances ``(n,)`` from points to the first triangle in one direction; infinite where there is none."""
+    corners, order, low, high, start, count = nodes
+    stack, distance = np.empty(DEPTH, np.int64), np.empty(len(x))
+    for i in range(len(x)):
+        distance[i] = first_hit(x[i], d, 0.0, -1, False, corners, order, low, high, start, count, stack)[0]
+    return distance
+
+
 def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, np.ndarray]:
     """Outward vectors ``(m, 7, 3)`` of face, edges and corners, and which lie on a border ``(m, 7)``."""
     corners = points[triangles]
@@ -253,6 +263,10 @@ class TriangleTree:
     @cached_property
     def _vectors(self) -> tuple[FloatArray, np.ndarray]:
         return pseudo_normals(self.points, self.triangles)
+
+    def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
+        """Distances ``(n,)`` [m] from points ``(n, 3)`` to the first triangle in a direction; infinite without one."""
+        return np.asarray(_along(np.ascontiguousarray(x), np.ascontiguousarray(direction), self.nodes))
 
     def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""

@@ -185,8 +185,21 @@ def told(scene: Scene) -> list[str]:
     notes, width = [], FACET * min(scene.gripper.pad_size[:2])
     for shape in dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh"):
         mesh = geometry().mesh_object(shape)
-        notes += [f"note: {shape.mesh}: {text}" for text in (*mesh.notes, mesh.sharp_facets(width)) if text]
+        centroid = _centroid_note(mesh) if scene.task.centre_of_mass is None else ""
+        notes += [f"note: {shape.mesh}: {text}" for text in (*mesh.notes, mesh.sharp_facets(width), centroid) if text]
     return [*(f"warning: {text}" for text in warnings(scene)), *notes]
+
+
+def _centroid_note(mesh: Any) -> str:
+    """How well the centroid of a mesh that is not closed is known."""
+    place, error = mesh.centroid
+    if mesh.closed:
+        return ""
+    named = ", ".join(f"{1e3 * x:.1f}" for x in mesh.placed.to_object(place[None])[0])
+    return (
+        f"it is not closed: its centroid is estimated at ({named}) mm, to {1e3 * error:.1g} mm;"
+        " task.centre_of_mass_mm names a better one"
+    )
 
 
 def _remarks(scene: Scene) -> Iterator[str]:

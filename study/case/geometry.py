@@ -28,7 +28,7 @@ from softjaw.study.scene.objects import Mesh, Walled
 
 @lru_cache(maxsize=8)
 def mesh_object(shape: Mesh) -> MeshObject:
-    """The object of a mesh file; `ValueError` for a mesh that is open or crosses itself."""
+    """The object of a mesh file; `ValueError` for a file without triangles."""
     return MeshObject.from_file(shape.mesh, shape.unit, shape.axis, shape.grid_step, shape.crease_angle_deg)
 
 
@@ -48,8 +48,11 @@ def stacked(surface: OuterSurface) -> GapObject:
 def traced_surface(shape: Mesh) -> tuple[TracedSurface, TraceReport]:
     """Smooth surface of a mesh's wall, and how far it is from the mesh."""
     mesh = mesh_object(shape)
-    if mesh.crossing:
-        raise MeshError(f"{shape.mesh}: {mesh.crossing}; a thin wall needs one surface: unite them in a mesh editor")
+    if not mesh.closed:
+        raise MeshError(
+            f"{shape.mesh}: is not a closed surface ({'; '.join(mesh.notes) or 'its triangles are not turned alike'}),"
+            " which a thin wall needs; close it in a mesh editor, or leave wall_mm out"
+        )
     return traced(mesh, shape.wall_heights)
 
 

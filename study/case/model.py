@@ -14,6 +14,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Gap
 from softjaw.fem.materials import Material, material
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
+from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
@@ -26,7 +27,7 @@ from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
-BACK = 0.1  # of the pad's thickness: where it stands before it is brought to the smooth surface
+BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 OFF = 1e-9  # gap at first touch [m]
 GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
@@ -77,10 +78,13 @@ class Finger:
         The pad's frame at first touch.
     surface : GapFunction
         The object round the contact, in the object's frame.
+    hole_share : float
+        Share of the pad's face before a hole of the object's mesh.
     """
 
     pose: Pose
     surface: GapFunction
+    hole_share: float = 0.0
 
     def gap(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Signed distance, gradient and Hessian at points of the pad's frame."""
@@ -96,20 +100,23 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
     ------
     NoContactError
         If the pad passes the object.
-    MeshError
-        If the object is a mesh with a hole under the pad.
     """
     size = gripper.pad_size
     touch = touching(obj, pose, size)
     box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
     element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
     surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
-    if abs(surface.gap(touch.to_object(_contact_face(size)))[0].min()) > OFF:  # smoothed: met earlier or later
+    face = _contact_face(size)
+    if abs(surface.gap(touch.to_object(face))[0].min()) > OFF:  # smoothed: met earlier or later
         # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
-        back = Pose(touch.rotation, touch.origin - BACK * size[2] * touch.rotation[:, 2])
-        distance = first_touch(surface, back, _contact_face(size), 2 * BACK * size[2])
+        for step in BACK:
+            back = Pose(touch.rotation, touch.origin - step * size[2] * touch.rotation[:, 2])
+            if surface.gap(back.to_object(face))[0].min() > 0.0:
+                break
+        distance = first_touch(surface, back, face, 2 * step * size[2])
         touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
-    return Finger(touch, surface)
+    hole_share = obj.hole_share(touch, face, DEEP * size[2]) if isinstance(obj, MeshObject) else 0.0
+    return Finger(touch, surface, hole_share)
 
 
 def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:
@@ -119,7 +126,7 @@ def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Po
     reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
     ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
     start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
-    distance = first_touch(obj, start, _contact_face(size), 2.0 * reach)
+    distance = obj.first_touch(start, _contact_face(size), 2.0 * reach)
     return Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
 
 

@@ -279,7 +279,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
 def lids_of(obj: Any) -> FloatArray | None:
     """Corners ``(n, 3, 3)`` of the triangles that close holes of a mesh [m]; None for other objects."""
-    return obj.points[obj.triangles[obj.lids]] if isinstance(obj, MeshObject) else None
+    return obj.lids if isinstance(obj, MeshObject) else None
 
 
 def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:

@@ -39,6 +39,7 @@ LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 HARDLY = 1e-3  # of the largest force: where such a force is not reached, those above begin anew
 STARTS = 3  # states of the coarser mesh that a force on the fine one is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
+MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
 STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
 State = TypeVar("State")
@@ -169,6 +170,7 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
     found |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     found |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
     found |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > EXCESS - ALIKE)
+    found |= Flag.MESH_HOLE * (max(c.finger.hole_share for c in contacts) > MESH_HOLE)
     for c in contacts:
         found |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
     return found

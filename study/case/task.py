@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softjaw.fem.objects.volume import centroid
 from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.payload import GRAVITY, Payload, payload
 from softjaw.study.case.build import own_frame
@@ -54,12 +55,10 @@ def task_of(scene: Scene, obj: Any) -> Task:
 
 def centre_of_volume(obj: Any) -> FloatArray:
     """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
-    # a mesh that is decimated for display would move it
-    points, triangles = (obj.points, obj.triangles) if hasattr(obj, "triangles") else obj.surface()
-    middle = np.mean(obj.bounds, axis=0)
-    corners = np.asarray(points, float)[triangles] - middle
-    volume = np.einsum("ka,ka->k", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    return np.asarray(middle + volume @ corners.sum(axis=1) / (4 * volume.sum()))
+    if hasattr(obj, "centroid"):
+        return np.asarray(obj.centroid[0])
+    points, triangles = obj.surface()
+    return centroid(points, triangles, closed=True)[0]
 
 
 def payload_values(

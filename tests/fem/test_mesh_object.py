@@ -1,4 +1,4 @@
-"""Meshes as objects: what is refused and why, the frame, convergence to the analytic shapes."""
+"""Meshes as objects: files and their damage, the frame, convergence to the analytic shapes."""
 
 import runpy
 from pathlib import Path
@@ -10,13 +10,10 @@ import pyvista as pv
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.closest import ellipse_gap
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
-from softjaw.fem.objects.mesh_check import crossing_pairs, sound_mesh, winding_number
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.study.case.geometry import traced_surface
-from softjaw.study.scene.objects import Mesh
-from tests.objects.bodies import mug
+from softjaw.fem.objects.triangles import cleaned, winding_number
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
@@ -195,11 +192,12 @@ def test_shipped_flask_is_what_its_script_draws():
 def test_first_touch_on_the_flask(flask):
     pose = Pose(TILT, np.array([0.2, 0, 0.05]))
     grid = np.stack(np.meshgrid(np.linspace(-0.02, 0.02, 9), np.linspace(-0.01, 0.01, 5), [0.0]), -1).reshape(-1, 3)
-    d = first_touch(flask, pose, grid, 0.4)
+    d = flask.first_touch(pose, grid, 0.4)
+    assert d == pytest.approx(first_touch(flask, pose, grid, 0.4), abs=1e-9)
     x = pose.to_object(grid) + d * pose.rotation[:, 2]
     assert np.abs(flask.distance(x).min()) < 1e-10
-    with pytest.raises(NoContactError, match="misses the object"):
-        first_touch(flask, Pose(TILT, np.array([0.2, 0, 0.25])), grid, 0.4)
+    with pytest.raises(NoContactError):
+        flask.first_touch(Pose(TILT, np.array([0.2, 0, 0.25])), grid, 0.4)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
@@ -251,7 +249,7 @@ def test_faces_of_four_corners_are_cut_where_they_are_convex(tmp_path, written):
     written(path, BLOCK, [*SIDES, *(f[::-1] for f in RING), *(tuple(6 + k for k in f) for f in RING)])
     points, triangles = read_triangles(path)
     np.testing.assert_array_equal(points, BLOCK)
-    points, triangles, *_ = sound_mesh(points, triangles)
+    points, triangles, *_ = cleaned(points, triangles)
     a, b, c = points[triangles].transpose(1, 0, 2)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(3e-6, rel=1e-12)
 
@@ -267,118 +265,8 @@ def test_faces_that_are_not_convex_are_refused(tmp_path):
 def test_unit_is_applied():
     points, triangles = ball(1)
     for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254), ("cm", 0.01)):
-        x, *_ = sound_mesh(points / factor, triangles, unit)
+        x, *_ = cleaned(points / factor, triangles, unit)
         assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
-
-
-def without(k):
-    points, triangles = ball(2)
-    return points, np.delete(triangles, range(k), axis=0)
-
-
-def moebius(n=12):
-    """Closed surface without an inside: a torus grid glued with a flip (a Klein bottle)."""
-    index = lambda i, j: (i % n) * n + (j if i < n else -j) % n  # noqa: E731
-    quads = [[index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)] for i in range(n) for j in range(n)]
-    quads = np.array(quads)
-    return np.random.default_rng(0).uniform(0, 0.1, (n * n, 3)), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
-
-
-def pierced():
-    """A ball of which one corner is pushed through the far side."""
-    points, triangles = ball(2)
-    points[triangles[0, 0]] = np.array([-0.75, -0.45, -0.3]) @ points[triangles[0]]
-    return points, triangles
-
-
-def two(a, b):
-    return np.concatenate([a[0], b[0]]), np.concatenate([a[1], b[1] + len(a[0])])
-
-
-def spoilt(value):
-    points, triangles = ball(2)
-    points[7] = value
-    return points, triangles
-
-
-@pytest.mark.parametrize(("mesh", "message"), [
-    (without(160), r"not closed: a hole of [\d.]+ mm near .* leaves open what is inside; fill it"),
-    (without(320), "is empty: it holds no triangles"),
-    (spoilt(np.nan), r"1 of 162 points have a coordinate that is not a finite number, the first is point 7"),
-    (spoilt(np.inf), "not a finite number"),
-    ((ball(2)[0], ball(2)[1] + 1), r"refers to point 162, but there are only 162"),
-    ((ball(2)[0], ball(2)[1] - 1), r"refers to point -1, but"),
-    ((ball(2)[0] * 1e3, ball(2)[1]), r'an object of 60 m\? With unit = "m" .* the unit should be "mm" \(60 mm\)'),
-    ((ball(2)[0] * 1e-3, ball(2)[1]), r"an object of 6e-05 m\?"),
-    (pierced(), r"intersects itself: \d+ pairs of triangles"),
-    ((np.concatenate([ball(2)[0], [[0, 0, 0.05]]]), np.concatenate([ball(2)[1], [[*ball(2)[1][0, :2], 162]]])),
-     r"not manifold: at 1 edges more than two"),
-    (moebius(), "only one side"),
-    ((0 * ball(2)[0], ball(2)[1]), "collapsed"),
-])  # fmt: skip
-def test_meshes_that_make_no_object_are_refused(mesh, message):
-    with pytest.raises(MeshError, match=message):
-        sound_mesh(*mesh)
-
-
-def test_orientation_is_repaired_and_said():
-    points, triangles = ball(2)
-    for flipped in (triangles[:, ::-1], np.where(np.arange(320)[:, None] < 5, triangles[:, ::-1], triangles)):
-        x, turned, notes, *_ = sound_mesh(points, flipped)
-        assert winding_number(np.zeros(3), x, turned) == pytest.approx(1)
-        assert notes in (("turned 320 of 320 triangles outwards",), ("turned 5 of 320 triangles outwards",))
-
-
-def test_shells_inside_and_specks_are_dropped_and_separate_parts_are_kept():
-    inner, speck = ball(2, (0.028,) * 3), ball(0, (2e-4,) * 3, centre=(0.05, 0, 0))
-    _, triangles, notes, *_ = sound_mesh(*two(two(ball(2), inner), speck))
-    assert len(triangles) == 320
-    assert notes == ("dropped 1 specks of debris", "dropped 1 shells inside the object")
-    _, triangles, notes, *_ = sound_mesh(*two(ball(2), ball(2, centre=(0.07, 0, 0))))
-    assert len(triangles) == 640
-    assert notes == ()
-
-
-def test_few_crossing_triangles_are_tolerated_and_said():
-    points, triangles = ball(5)
-    k = triangles[0]
-    points[k[0]] += 1.2 * (points[k[1]] - points[k[0]])  # one corner pushed past its neighbour
-    crossings = crossing_pairs(points, triangles)
-    _, _, notes, *_ = sound_mesh(points, triangles)
-    assert 0 < len(crossings) <= 20
-    assert "cross; tolerated" in notes[0]
-
-
-def test_parts_that_cross_are_one_object_and_no_thin_wall(tmp_path):
-    """A cup with a handle through its wall: a note says where, the handle stays, and a wall is refused."""
-    mug().export(tmp_path / "mug.stl")
-    obj = MeshObject.from_file(tmp_path / "mug.stl", "m")
-    assert obj.notes == (obj.crossing,)
-    assert "2 closed parts" in obj.crossing
-    assert obj.bounds[1, 0] == pytest.approx(0.064, abs=1e-3)
-    assert obj.distance(np.array([[obj.bounds[1, 0] + 0.01, 0.0, 0.0475]])) == pytest.approx(0.01, abs=1e-4)
-    walled = Mesh(shape="mesh", mesh=str(tmp_path / "mug.stl"), unit="m", wall_mm=1.0)
-    with pytest.raises(MeshError, match="cross each other"):
-        traced_surface(walled)
-
-
-def test_an_inner_wall_that_comes_through_the_outer_one_is_still_inside():
-    inner, triangles = ball(3, 3 * (0.93 * RADIUS,))
-    inner[triangles[0, 0]] = np.array([0.6, 0.35, 0.2]) @ inner[triangles[0]]
-    sound = sound_mesh(*two(ball(3), (inner, triangles)))
-    assert len(sound.triangles) == len(triangles)
-    assert sound.crossing
-
-
-def test_crossings_are_found_exactly():
-    """A needle through a triangle crosses; with a common corner, or when it ends on the plane, it does not."""
-    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
-    needle = np.array([[0.2, 0.2, -1], [0.2, 0.2, 1], [0.25, 0.2, 1]])
-    both = np.array([[0, 1, 2], [3, 4, 5]])
-    assert crossing_pairs(np.concatenate([flat, needle]), both).tolist() in ([[0, 1]], [[1, 0]])
-    assert not len(crossing_pairs(np.concatenate([flat, needle + np.array([0, 0, 1])]), both))
-    assert not len(crossing_pairs(np.concatenate([flat, needle + np.array([1, 1, 0])]), both))
-    assert not len(crossing_pairs(np.concatenate([flat, needle[1:]]), np.array([[0, 1, 2], [0, 3, 4]])))
 
 
 PLY = """ply
@@ -403,11 +291,10 @@ end_header
     ("huge.stl", bytes(80) + b"\xff" * 4, "expected at least 214748364834"),
     ("ascii.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "is damaged|is empty"),
     ("empty.stl", b"", "the file is empty"),
-    ("a.step", b"ISO-10303-21;", r"meshes are read from .stl, .obj, .ply, .off files"),
+    ("a.step", b"ISO-10303-21;", "meshes are read from"),
     ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "is damaged"),
-    ("b.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not a finite number"),
+    ("b.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite"),
     ("c.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "is empty: it holds no triangles"),
-    ("d.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "not closed: a hole of"),
     ("a.ply", PLY.format(3, 1, 9).encode(), "is damaged|refers to point 9"),
     ("b.ply", PLY.format(300_000_000_000, 1, 2).encode(), "has 300000000000 points"),
     ("c.ply", b"ply\nformat ascii 1.0\n", "is empty|is damaged"),
@@ -429,8 +316,6 @@ def test_file_with_nan_wrong_unit_missing_or_too_large_is_refused(tmp_path, monk
         MeshObject.from_file(FLASK, "mm", axis="w")
     with pytest.raises(MeshError, match=r"cannot be read \(No such file"):
         MeshObject.from_file(tmp_path / "none.stl", "mm")
-    with pytest.raises(MeshError, match="not a finite number"):
-        MeshObject.from_file(stl(tmp_path / "nan.stl", *spoilt(np.nan)), "m")
     monkeypatch.setattr("softjaw.fem.objects.mesh_file.LARGEST_FILE", 1000)
     with pytest.raises(MeshError, match="decimate the mesh"):
         MeshObject.from_file(FLASK, "mm")
@@ -444,11 +329,3 @@ def test_regions_that_make_no_sense_are_refused(flask):
         MeshObject(flask.points, flask.triangles, 1e-5).near(pose, [0, 0, 0], [0.01] * 3)
     with pytest.raises(ValueError, match="grid_step must be a positive length"):
         MeshObject(flask.points, flask.triangles, -1.0)
-
-
-@pytest.mark.long
-def test_check_of_a_large_mesh_is_bounded():
-    """80 000 triangles, checked for crossings in seconds."""
-    _, triangles, notes, *_ = sound_mesh(*ball(6))
-    assert len(triangles) == 81_920
-    assert notes == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,35 @@ AROUND = 64
 def revolved(outline: Sequence[tuple[float, float]], around: int = AROUND) -> trimesh.Trimesh:
     """Closed body of revolution about z from points (radius, z) [m] from pole to pole."""
     return trimesh.creation.revolve(np.array(outline), sections=around)
+
+
+OUTLINE = [  # radius and height of a waisted body [m]
+    (0.0, 0.0),
+    *((0.028 * np.sin(t), 0.0112 * (1 - np.cos(t))) for t in np.linspace(0.3, np.pi / 2, 6)),
+    *((0.028 - 0.004 * np.sin(np.pi * s) ** 2, 0.0112 + 0.0876 * s) for s in np.linspace(0.05, 0.95, 19)),
+    *((0.028 * np.cos(t), 0.0988 + 0.0112 * np.sin(t)) for t in np.linspace(0.0, np.pi / 2 - 0.3, 6)),
+    (0.0, 0.11),
+]
+
+
+def outline_body(outline: Sequence[tuple[float, float]] = OUTLINE) -> trimesh.Trimesh:
+    """A waisted body of oval sections, a quarter wider along x."""
+    body = revolved(outline, 48)
+    body.vertices[:, 0] *= 1.25
+    return body
+
+
+def slabs(count: int, overlap: float = 0.006) -> trimesh.Trimesh:
+    """The same cut across into closed parts that overlap by ``2 overlap`` [m]."""
+    radius, height = np.transpose(OUTLINE)
+    cuts, parts = np.linspace(0.0, height[-1], count + 1), []
+    for low, high in pairwise(cuts):
+        low, high = max(low - overlap, 0.0), min(high + overlap, height[-1])
+        ends = [(float(np.interp(z, height, radius)), z) for z in (low, high)]
+        inner = [point for point in OUTLINE if low < point[1] < high]
+        rims = [ends[:1] if low > 0 else [], inner, ends[1:] if high < height[-1] else []]
+        parts.append(outline_body([(0.0, low), *(point for rim in rims for point in rim), (0.0, high)]))
+    return trimesh.util.concatenate(parts)
 
 
 def hollow_bottle(height: float, radius: float, neck: float, wall: float) -> trimesh.Trimesh:

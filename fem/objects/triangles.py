@@ -1,0 +1,329 @@
+"""Any set of triangles made fit to be met by a finger: points merged, small holes filled, neighbours turned alike.
+
+A finger meets the first surface along its approach, so nothing has to be closed, manifold or turned outwards: which
+side of a triangle is met is decided where it is met (`facing_sheet`). What is done here only spares work and smooths
+facets: doubled points and triangles become one, specks and shells inside are dropped, triangles that share an edge are
+turned alike. Where more than two meet at an edge the two that go on most smoothly are neighbours, and the others end
+there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.fem.objects.mesh_file import LENGTHS
+from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
+from softjaw.fem.objects.triangle_tree import TriangleTree
+
+SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
+ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
+SPECK = 0.02  # of the object's diagonal: loose pieces below it are dropped ...
+SPECKS_AREA = 0.02  # ... unless they make up more than this share of the area
+FLAT = 1e-6  # volume of a piece over its area and size, below which it has no inside
+MOST_SHELLS = 50  # pieces that are compared with each other, to find those inside others
+MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
+MOST_AT_EDGE = 8  # triangles at one edge, among which neighbours are looked for
+CORNERS_ASKED = 100  # of a piece, that are asked whether they lie in another
+UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
+
+
+class Neighbours(NamedTuple):
+    """Edges of triangles, and which two triangles go on into each other there.
+
+    Attributes
+    ----------
+    edges : (e, 2) array of int
+        Points of each edge, the smaller number first.
+    edge_of : (m, 3) array of int
+        Edge from corner 0, 1, 2 of each triangle to the next one.
+    sides : (e, 2) array of int
+        Both triangles' sides, ``3 * triangle + corner``; -1 twice where the edge has no such pair.
+    at_edge : (e,) array of int
+        How many triangles meet at the edge.
+    """
+
+    edges: IntArray
+    edge_of: IntArray
+    sides: IntArray
+    at_edge: IntArray
+
+    @property
+    def paired(self) -> np.ndarray:
+        """Edges that two triangles share as neighbours ``(e,)``."""
+        return self.sides[:, 0] >= 0
+
+
+class Triangles(NamedTuple):
+    """Triangles in metres.
+
+    Attributes
+    ----------
+    points : (k, 3) array
+        Corners [m].
+    triangles : (m, 3) array of int
+        Corners of each triangle.
+    notes : tuple of str
+        What was mended or left out, and where in the file's frame.
+    lids : (l, 3, 3) array
+        Triangles over the holes that stay open [m].
+    closed : bool
+        Whether every piece is a closed surface that is turned outwards.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    notes: tuple[str, ...]
+    lids: FloatArray
+    closed: bool
+
+
+def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangles:
+    """Triangles of a file in metres, with notes on what was mended.
+
+    Parameters
+    ----------
+    points : (k, 3) array
+        Corners, in ``unit``.
+    triangles : (m, 3) array of int
+        Corners of each triangle.
+    unit : str
+        One of ``UNITS``.
+
+    Raises
+    ------
+    MeshError
+        No triangles with finite coordinates, or an implausible size.
+    """
+    points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
+    if unit not in UNITS:
+        raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
+    triangles, notes = _finite(points, triangles)
+    points, triangles, merged = _merged(points, triangles)
+    # points that no triangle uses are gone by now and do not count for the size
+    _check_size(float(np.ptp(points, axis=0).max()), unit)
+    points, triangles, thinned = _with_fewer(points * UNITS[unit], triangles)
+    points, triangles, specks = _without_specks(points, triangles)
+    triangles, filled = with_holes_filled(points, triangles)
+    triangles, closed, turned = turned_alike(points, triangles)
+    shells: list[str] = []
+    if closed:
+        points, triangles, shells = _without_shells(points, triangles)
+    loops = border_loops(triangles)
+    opened = [f"{len(loops)} hole{'s' * (len(loops) > 1)} left open"] if loops else []
+    told = (*notes, *merged, *thinned, *specks, *filled, *opened, *turned, *shells)
+    return Triangles(points, triangles, told, lid_corners(points, loops), closed)
+
+
+def _finite(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
+    """Triangles whose corners exist and are finite."""
+    if points.ndim != 2 or points.shape[1:] != (3,) or not len(points) or not len(triangles):
+        raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
+    if ((triangles < 0) | (triangles >= len(points))).any():
+        raise MeshError(f"a triangle refers to a point beyond the {len(points)} there are; export the file again")
+    good = np.isfinite(points).all(axis=1)[triangles].all(axis=1)
+    if not good.any():
+        raise MeshError("no triangle of the mesh has finite coordinates; repair the file")
+    return triangles[good], [] if good.all() else [f"dropped {np.sum(~good)} triangles without finite coordinates"]
+
+
+def _check_size(extent: float, unit: str) -> None:
+    """Refuse an ``extent``, in the file's own numbers, that makes no plausible object in this unit."""
+    size = extent * UNITS[unit]
+    if (1 - ROUNDED) * SMALLEST <= size <= (1 + ROUNDED) * LARGEST:
+        return
+    fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
+    advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
+    raise MeshError(
+        f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
+        f"{SMALLEST:g} m to {LARGEST:g} m; {advice}"
+    )
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Points within rounding of each other as one, unused ones left out, collapsed and doubled triangles dropped."""
+    # equal points first: STL files repeat every corner, and the tree then has less to search
+    points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
+    triangles = inverse.reshape(-1, 3).astype(np.int64)
+    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+    notes = []
+    if len(close):
+        links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
+        group = connected_components(links, directed=False)[1]
+        first = np.unique(group, return_index=True)[1]
+        used, inverse = np.unique(first[group][triangles], return_inverse=True)
+        points, triangles = points[used], inverse.reshape(-1, 3).astype(np.int64)
+    a, b, c = triangles.T
+    proper = (a != b) & (b != c) & (c != a)
+    if not proper.any():
+        raise MeshError("the mesh is empty: all its triangles have collapsed to lines or points")
+    if not proper.all():
+        notes.append(f"dropped {np.sum(~proper)} triangles without area")
+    triangles = triangles[proper]
+    # in the file's order, so that a sound mesh keeps its triangles as they are
+    first = np.sort(np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1])
+    if len(first) < len(triangles):
+        notes.append(f"dropped {len(triangles) - len(first)} duplicate triangles")
+    return *_used(points, triangles[first]), notes
+
+
+def _used(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The mesh without the points that no triangle uses."""
+    used, inverse = np.unique(triangles, return_inverse=True)
+    return points[used], inverse.reshape(-1, 3).astype(np.int64)
+
+
+def decimated(points: FloatArray, triangles: IntArray, count: int) -> tuple[FloatArray, IntArray]:
+    """About ``count`` triangles in place of more."""
+    import pyvista as pv  # loading VTK takes a quarter of a start, and few meshes need it
+
+    mesh = pv.PolyData.from_regular_faces(points, triangles).decimate(1 - count / len(triangles))
+    return np.asarray(mesh.points, dtype=float), mesh.regular_faces.astype(np.int64)
+
+
+def _with_fewer(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """A mesh of very many triangles with fewer, and how far that moved its points."""
+    if len(triangles) <= MOST_TRIANGLES:
+        return points, triangles, []
+    few, coarse = decimated(points, triangles, DECIMATED_TO)
+    moved = np.abs(TriangleTree(few, coarse).signed(points[:: max(1, len(points) // 100_000)])[0]).max()
+    text = f"decimated from {len(triangles)} to {len(coarse)} triangles, its surface moved by {1e3 * moved:.2g} mm"
+    return few, coarse, [text]
+
+
+def pieces_of(points: FloatArray, triangles: IntArray) -> IntArray:
+    """Number ``(m,)`` of the connected piece of each triangle, from 0 on."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
+    return np.unique(connected_components(links, directed=False)[1][triangles[:, 0]], return_inverse=True)[1].ravel()
+
+
+def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+
+def _sizes(points: FloatArray, triangles: IntArray, piece: IntArray) -> FloatArray:
+    """Diagonals of the pieces' bounding boxes [m]."""
+    low, high = np.full((2, piece.max() + 1, 3), np.inf)
+    np.minimum.at(low, piece, points[triangles].min(axis=1))
+    np.minimum.at(high, piece, -points[triangles].max(axis=1))
+    return np.linalg.norm(-high - low, axis=1)
+
+
+def _without_specks(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """The mesh without loose specks, which scans leave beside the object and a pad would meet first."""
+    piece = pieces_of(points, triangles)
+    size, area = _sizes(points, triangles, piece), np.bincount(piece, _areas(points, triangles))
+    speck = size < SPECK * size.max()
+    if not speck.any() or area[speck].sum() > SPECKS_AREA * area.sum():
+        return points, triangles, []
+    return *_used(points, triangles[~speck[piece]]), [f"dropped {speck.sum()} specks of debris"]
+
+
+def neighbours(points: FloatArray, triangles: IntArray) -> Neighbours:
+    """Edges, and the two triangles at each that are neighbours."""
+    sides = edges_of(triangles)
+    ordered = np.sort(sides, axis=1)
+    key, first, edge, count = np.unique(
+        ordered[:, 0] * len(points) + ordered[:, 1], return_index=True, return_inverse=True, return_counts=True
+    )
+    edge = edge.ravel()
+    order, start = np.argsort(edge, kind="stable"), np.concatenate([[0], np.cumsum(count)[:-1]])
+    pair = np.full((len(key), 2), -1)
+    two = count == 2
+    pair[two] = np.stack([order[start[two]], order[start[two] + 1]], axis=1)
+    normal = _unit_normals(points, triangles)
+    for n in range(3, MOST_AT_EDGE + 1):
+        if (many := np.flatnonzero(count == n)).size:
+            pair[many] = _smoothest(order[start[many][:, None] + np.arange(n)], sides, normal)
+    return Neighbours(ordered[first], edge.reshape(-1, 3), pair, count)
+
+
+def _unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    area = np.cross(b - a, c - a)
+    return area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
+
+
+def _smoothest(at: IntArray, sides: IntArray, normal: FloatArray) -> IntArray:
+    """Of the sides ``(k, n)`` at each edge the two ``(k, 2)`` whose triangles turn least into each other."""
+    i, j = np.triu_indices(at.shape[1], 1)
+    p, q = at[:, i], at[:, j]
+    # two that run through the edge in opposite senses are turned alike
+    alike = np.where(sides[p, 0] != sides[q, 0], 1.0, -1.0)
+    best = (alike * np.einsum("knd,knd->kn", normal[p // 3], normal[q // 3])).argmax(axis=1)
+    row = np.arange(len(at))
+    return np.stack([p[row, best], q[row, best]], axis=1)
+
+
+def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, bool, list[str]]:
+    """Triangles turned as their neighbours and outwards, whether all pieces are closed, and a note on those turned."""
+    joined, n = neighbours(points, triangles), len(triangles)
+    i, j = joined.sides[joined.paired].T
+    sides = edges_of(triangles)
+    clash = sides[i, 0] == sides[j, 0]
+    i, j = i // 3, j // 3
+    # every triangle counts twice, as given and turned; an edge links the copies that agree
+    mirrored = np.where(clash, n, 0)
+    ends = np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]
+    _, label = connected_components(coo_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n)), directed=False)
+    # both copies in one part: a surface of one side, which stays as it is given
+    one_sided = label[:n] == label[n:]
+    flip = (label[:n] > label[n:]) & ~one_sided
+    triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
+    piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
+    volume = np.asarray(np.bincount(piece, _volumes(points, triangles)), dtype=float)
+    flat = np.abs(volume) <= FLAT * np.bincount(piece, _areas(points, triangles)) * _sizes(points, triangles, piece)
+    inverted = (volume < 0) & ~flat
+    triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
+    turned = int(np.sum(flip != inverted[piece]))
+    closed = bool((joined.at_edge == 2).all() and not one_sided.any() and not flat.any())
+    return np.ascontiguousarray(triangles), closed, [f"turned {turned} of {n} triangles"] if turned else []
+
+
+def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Signed volumes ``(m,)`` of the tetrahedra from the bounding box's centre to each triangle [m^3]."""
+    # about the middle: an origin far away would cost digits
+    a, b, c = (points[triangles] - 0.5 * (points.min(axis=0) + points.max(axis=0))).transpose(1, 0, 2)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+
+
+def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """A closed mesh without the closed pieces that lie inside another one: nobody meets them, and they fill no less."""
+    piece = pieces_of(points, triangles)
+    count = piece.max() + 1
+    if count == 1 or count > MOST_SHELLS:
+        return points, triangles, []
+    parts = [triangles[piece == k] for k in range(count)]
+    inner = np.array([any(_inside(points, part, other) for other in parts if other is not part) for part in parts])
+    if not inner.any() or inner.all():
+        return points, triangles, []
+    return *_used(points, triangles[~inner[piece]]), [f"dropped {inner.sum()} shells inside the object"]
+
+
+def _inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
+    """Whether a piece lies inside another, but for a few places where it may come through."""
+    corners = np.unique(piece)
+    asked = points[corners[:: 1 + len(corners) // CORNERS_ASKED]]
+    return float(np.mean([winding_number(x, points, other) > 0.5 for x in asked])) > 0.9
+
+
+def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:
+    """How often triangles surround the point ``x (3,)``: 1 inside, 0 outside (solid angle over 4 pi)."""
+    a, b, c = (points[triangles] - x).transpose(1, 0, 2)
+    A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
+    lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
+    # a triangle on which x lies up to rounding is seen under half a turn or its negative: it counts as neither
+    side, noise = dot(a, np.cross(b, c)), ROUNDED * np.abs(points).max() * (A * B + B * C + C * A)
+    on = (np.abs(side) <= noise) & (lower <= 1e-3 * A * B * C + noise)
+    return float(np.where(on, 0.0, np.arctan2(side, lower)).sum() / (2 * np.pi))
+
+

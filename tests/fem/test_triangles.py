@@ -1,0 +1,155 @@
+"""Triangles of any kind: what is mended, which are neighbours, volume, and the same surface met from the same body."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.fem.objects.smooth_triangles import smooth_triangles
+from softjaw.fem.objects.triangles import cleaned, neighbours, winding_number
+from tests.fem.test_facing_surface import BOX, in_box, side
+from tests.objects.bodies import outline_body, slabs
+
+BALL = trimesh.creation.icosphere(2, 0.03)
+
+
+def joined(*meshes):
+    mesh = trimesh.util.concatenate(meshes)
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def with_point(value):
+    points = np.array(BALL.vertices)
+    points[7] = value
+    return points, np.array(BALL.faces)
+
+
+@pytest.mark.parametrize("mesh", [
+    (BALL.vertices, BALL.faces[:0]),
+    (np.full((3, 3), np.nan), [[0, 1, 2]]),
+    (BALL.vertices, BALL.faces + 1),
+    (BALL.vertices, BALL.faces - 1),
+    (BALL.vertices * 1e3, BALL.faces),
+    (BALL.vertices * 1e-3, BALL.faces),
+    (BALL.vertices * 0, BALL.faces),
+])  # fmt: skip
+def test_only_what_makes_no_object_is_refused(mesh):
+    with pytest.raises(MeshError):
+        cleaned(*mesh)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_triangles_without_finite_coordinates_are_left_out(value):
+    points, triangles, notes, *_ = cleaned(*with_point(value))
+    assert np.isfinite(points).all()
+    assert 310 <= len(triangles) <= 320
+    assert notes
+
+
+def test_triangles_are_turned_as_their_neighbours_and_outwards():
+    some = np.where(np.arange(len(BALL.faces))[:, None] < 5, BALL.faces[:, ::-1], BALL.faces)
+    for faces in (BALL.faces[:, ::-1], some):
+        mesh = cleaned(np.array(BALL.vertices), faces)
+        assert winding_number(np.zeros(3), mesh.points, mesh.triangles) == pytest.approx(1)
+        assert mesh.closed
+        assert len(mesh.notes) == 1
+
+
+def test_shells_inside_and_specks_are_dropped_and_separate_parts_are_kept():
+    inner, speck = BALL.copy().apply_scale(0.93), trimesh.creation.icosphere(0, 2e-4).apply_translation([0.05, 0, 0])
+    assert len(cleaned(*joined(BALL, inner, speck)).triangles) == 320
+    assert len(cleaned(*joined(BALL, BALL.copy().apply_translation([0.07, 0, 0]))).triangles) == 640
+    inner.vertices[0] *= 1.3  # comes through the outer one
+    assert len(cleaned(*joined(BALL, inner)).triangles) == 320
+
+
+def test_a_surface_of_one_side_stays_as_it_is():
+    """A Klein bottle: a torus grid glued with a flip."""
+    n = 12
+    index = lambda i, j: (i % n) * n + (j if i < n else -j) % n  # noqa: E731
+    quads = [[index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)] for i in range(n) for j in range(n)]
+    quads = np.array(quads)
+    points = np.random.default_rng(0).uniform(0, 0.1, (n * n, 3))
+    mesh = cleaned(points, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]))
+    assert not mesh.closed
+    assert len(mesh.triangles) == 2 * n * n
+    assert np.isfinite(smooth_triangles(mesh.points, mesh.triangles).inner).all()
+
+
+def test_where_many_triangles_meet_those_that_go_on_smoothly_are_neighbours():
+    """A wall of two coplanar triangles with a shelf on either side, of any winding."""
+    x = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0.2], [0.2, -1, 0]], float)
+    triangles = np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5]])
+    joint = neighbours(x, triangles)
+    edge = int(np.flatnonzero((joint.edges == [0, 1]).all(axis=1))[0])
+    assert sorted(joint.sides[edge] // 3) == [0, 1]
+    assert joint.at_edge[edge] == 4
+    assert not joint.paired[np.arange(len(joint.edges)) != edge].any()
+
+
+def flipped(points, triangles):
+    turned = triangles.copy()
+    turned[::2] = turned[::2, ::-1]
+    return points, turned
+
+
+def soup(points, triangles):
+    points, triangles = flipped(points, triangles)
+    return points[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
+
+
+def doubled(points, triangles):
+    return points, np.concatenate([triangles, triangles[:, ::-1]])
+
+
+def with_inner_wall(points, triangles):
+    mesh = trimesh.Trimesh(points, triangles, process=False)
+    return joined(mesh, trimesh.Trimesh(points - 0.0015 * mesh.vertex_normals, triangles[:, ::-1], process=False))
+
+
+def with_holes(points, triangles):
+    """A tenth of the triangles is missing, on the far side of the finger."""
+    far = np.flatnonzero(points[triangles].mean(axis=1)[:, 0] < -0.01)
+    return points, np.delete(triangles, np.random.default_rng(1).choice(far, len(triangles) // 10, replace=False), 0)
+
+
+KINDS = {f.__name__: f for f in (flipped, soup, doubled, with_inner_wall, with_holes)}
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "slabs"])
+def test_a_body_is_the_same_to_a_finger_however_its_triangles_are_given(kind):
+    body = outline_body()
+    mesh = slabs(5) if kind == "slabs" else KINDS[kind](np.array(body.vertices), np.array(body.faces))
+    if kind == "slabs":
+        mesh = np.array(mesh.vertices), np.array(mesh.faces)
+    clean = cleaned(*mesh)
+    torn = MeshObject(clean.points, clean.triangles, lids=clean.lids, closed=clean.closed)
+    sound = MeshObject(np.array(body.vertices), np.array(body.faces))
+    pose = side(0.055, radius=0.035)
+    face = np.column_stack([*(v.ravel() for v in np.meshgrid(np.linspace(-0.012, 0.012, 9), [-0.008, 0, 0.008])),
+                            np.zeros(27)])  # fmt: skip
+    assert torn.first_touch(pose, face, 0.1) == pytest.approx(sound.first_touch(pose, face, 0.1), abs=2e-6)
+    x = pose.to_object(in_box())
+    g, expected = (obj.near(pose, *BOX, 0.002).gap(x)[0] for obj in (torn, sound))
+    close = np.abs(expected) < 1e-3
+    assert close.sum() > 20
+    assert np.abs(g - expected)[close].max() < (4e-5 if kind == "slabs" else 1e-12)
+    assert np.linalg.norm(torn.centroid[0] - sound.centroid[0]) < max(2e-4, 2 * torn.centroid[1])
+
+
+def test_parts_that_cross_are_one_volume():
+    """Two cubes that share a quarter, of which the winding numbers along lines count each point once."""
+    cube = trimesh.creation.box((0.04, 0.04, 0.04))
+    mesh = MeshObject(*joined(cube, cube.copy().apply_translation([0.02, 0.02, 0.0])))
+    place, error = mesh.centroid
+    np.testing.assert_allclose(place, [0.01, 0.01, 0.0], atol=max(error, 1e-4))
+
+
+@pytest.mark.long
+def test_a_mesh_of_very_many_triangles_is_decimated(tmp_path):
+    fine = trimesh.creation.icosphere(8, 0.03)  # 1.3 million
+    mesh = cleaned(np.array(fine.vertices), np.array(fine.faces))
+    assert len(mesh.triangles) <= 210_000
+    assert np.abs(np.linalg.norm(mesh.points, axis=1) - 0.03).max() < 2e-5
+    assert mesh.closed
