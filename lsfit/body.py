@@ -11,73 +11,30 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.geometry import directions
-from softjaw.lsfit.samples import NOTHING, checked_wrenches, sample_rank
-from softjaw.lsfit.surface import OUT_OF_SPAN, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
+from softjaw.lsfit.samples import checked_wrenches, sample_rank
+from softjaw.lsfit.surface import (
+    OUT_OF_SPAN,
+    ZERO_SHARE,
+    FitFlag,
+    LimitSurface,
+    checked_factors,
+    rows,
+    supported_shadow,
+)
 
 FloatArray = NDArray[np.float64]
 
 
 def hull_volume(W: ArrayLike) -> float:
-    """Volume of the hull of the wrenches ``W (m, 3)`` and their opposites; 0 if they lie in a plane (`NOTHING`)."""
+    """Volume of the hull of the wrenches ``W (m, 3)`` and their opposites; 0 if they lie in a plane (`ZERO_SHARE`)."""
     points = np.asarray(W, float)
     _, values, V = np.linalg.svd(points, full_matrices=False)
     # Qhull fails on points of a plane instead of finding no volume
-    if len(points) < 3 or values[2] <= NOTHING * values[0]:
+    if len(points) < 3 or values[2] <= ZERO_SHARE * values[0]:
         return 0.0
     # the volume scales with the lengths, so it loses nothing by making them equal
     even = points @ V.T / values  # a hull of very unequal lengths loses facets
     return float(ConvexHull(np.vstack([even, -even])).volume * values.prod())
-
-
-def tangent_volume(T: ArrayLike, W: ArrayLike) -> float:
-    """Volume of the polytope of all planes that touch the limit surface: no less than that of the body.
-
-    Parameters
-    ----------
-    T : (m, 3) array
-        Normals of the planes, of any length; planes on the other side are added.
-    W : (m, 3) array
-        Points at which they touch, not all in one plane.
-
-    Notes
-    -----
-    The hull of the normals over their supports has a corner for every plane and a face for every corner of the
-    polytope. With the touching points, the two ends of every edge make tetrahedra that fill it.
-    """
-    # normals scale inversely to points: the products that say where planes touch stay as they are
-    size = np.abs(W).max(axis=0)
-    normals, points = np.asarray(T, float) * size, np.asarray(W, float) / size
-    dual = normals / np.einsum("md,md->m", normals, points)[:, None]
-    hull, touching = ConvexHull(np.vstack([dual, -dual])), np.vstack([points, -points])
-    # polar duality: the facet n . x = d of the normals' hull is the corner n / d of the polytope
-    corners = -hull.equations[:, :3] / hull.equations[:, 3:]
-    edges = hull.simplices[:, [[1, 2], [0, 2], [0, 1]]].reshape(-1, 2)
-    across = np.cross(np.repeat(corners, 3, axis=0), corners[hull.neighbors.ravel()])
-    # Qhull lists the corners of a facet in either sense: tetrahedra count by size
-    parts = np.abs(np.einsum("eid,ed->ei", touching[edges], across))
-    # a sixth for a tetrahedron, and a half because both facets beside an edge list it
-    return float(parts.sum()) / 12 * float(size.prod())
-
-
-def body_volume(coarse: ArrayLike, fine: ArrayLike) -> float:
-    """Volume of the limit surface, extrapolated from two sets of evenly spread samples.
-
-    Hulls of samples lie inside the body and miss a volume in proportion to ``1 / m``.
-
-    Parameters
-    ----------
-    coarse, fine : (m, 3) array
-        Wrenches for Fibonacci motions, the second set larger than the first (2000 and 8000 leave some 3e-6).
-    """
-    gain = len(np.asarray(fine)) / len(np.asarray(coarse))
-    if gain <= 1:
-        raise ValueError(f"the fine set is {gain:.2f} times as large as the coarse one: it must be larger")
-    return _extrapolated(hull_volume(coarse), hull_volume(fine), gain)
-
-
-def _extrapolated(coarse: float, fine: float, gain: float) -> float:
-    # Richardson: errors in proportion to 1 / m cancel in this combination
-    return fine + (fine - coarse) / (gain - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,21 +85,10 @@ class ExactSurface(LimitSurface):
         """Volume of the body, extrapolated from hulls of ``count`` and a quarter as many samples."""
         if self.rank < 3:
             return 0.0
-        coarse = self.samples(self.count // 4)
-        return _extrapolated(hull_volume(coarse), self._inner_volume, self.count / len(coarse))
-
-    @cached_property
-    def volume_error(self) -> float:
-        """Bound of the error of `volume`: the body holds the hull of its samples and lies between their tangents.
-
-        That leaves some ``9 / count`` of the volume, and more where a few points carry the load. For smooth bodies the
-        extrapolation is a hundred times as good.
-        """
-        if self.rank < 3:
-            return 0.0
-        outer = tangent_volume(directions(3, self.count) / [1.0, 1.0, self.rho], self.samples())
-        # the true volume is between hull and tangents: the farther of both bounds the error
-        return max(self.volume - self._inner_volume, outer - self.volume)
+        coarse, fine = self.samples(self.count // 4), self._hull_samples
+        inner, gain = hull_volume(fine), self.count / len(coarse)
+        # Richardson: hulls of samples miss a volume in proportion to 1 / m, which cancels in this combination
+        return inner + (inner - hull_volume(coarse)) / (gain - 1)
 
     @cached_property
     def shadow_area(self) -> float:
@@ -188,10 +134,6 @@ class ExactSurface(LimitSurface):
     @cached_property
     def _hull_samples(self) -> FloatArray:
         return checked_wrenches(self.samples(), 3)
-
-    @cached_property
-    def _inner_volume(self) -> float:
-        return hull_volume(self._hull_samples)
 
     @cached_property
     def _facets(self) -> FloatArray:

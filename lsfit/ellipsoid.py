@@ -10,17 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.samples import FLAT, NOTHING, checked_wrenches, principal_frame
+from softjaw.lsfit.samples import FLAT_RATIO, checked_wrenches, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import OUT_OF_SPAN, FitFlag, LimitSurface, checked_factors, mapped_value, rows
+from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FitFlag, LimitSurface, checked_factors, mapped_value, rows
 
 FloatArray = NDArray[np.float64]
 
 
-FAR = 10.0  # largest reach of a fitted ellipsoid, as a multiple of the samples' largest
-AT_BOUND = 1e-9  # of a coefficient that should be positive: up to here its ellipsoid counts as bounded by `FAR`
-HELD = 1e-12  # share of the largest eigenvalue of normal equations below which data say nothing
-WEAK = 1e-10  # share below which they say so little that the fit is flagged, whether it heeds them or not
+MAX_REACH_RATIO = 10.0  # of a fitted surface to the largest sample
+WEAK = 1e-10  # share of the largest eigenvalue of normal equations, below which the fit is flagged as underdetermined
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +107,11 @@ def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> 
 
     Notes
     -----
-    A force or torque (by ``rho``) below `NOTHING` of the largest force is the rounding of a contact that carries none;
-    its semi-axis is 0. The ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual
+    A force or torque (by ``rho``) below `ZERO_SHARE` of the largest force is the rounding of a contact that carries
+    none; its semi-axis is 0. The ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual
     patches.
     """
-    least = NOTHING * max(f_x, f_y)
+    least = ZERO_SHARE * max(f_x, f_y)
     return Ellipsoid(np.array([x if x > least * unit else 0.0 for x, unit in ((f_x, 1), (f_y, 1), (tau_z, rho))]))
 
 
@@ -129,7 +127,7 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     -------
     Ellipsoid
         With the semi-axis 0 along components that no sample has. Samples that would make it endless (``a_i`` not above
-        `AT_BOUND`) give a semi-axis of `FAR` times their largest component, and the flag says so.
+        1e-9) give a semi-axis of `MAX_REACH_RATIO` times their largest component, and the flag says so.
 
     Raises
     ------
@@ -140,14 +138,14 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     B, _, flag = principal_frame(W)
     reach = np.abs(W).max(axis=0)
     # each component by its own reach: the squares of unequal ones would lose the small ones' digits
-    used = reach > FLAT * reach.max()
-    X, floor = (W[:, used] / reach[used]) ** 2, FAR**-2
-    # coefficients are the floor plus what nnls finds: so no axis is longer than FAR allows
+    used = reach > FLAT_RATIO * reach.max()
+    X, floor = (W[:, used] / reach[used]) ** 2, MAX_REACH_RATIO**-2
+    # coefficients are the floor plus what nnls finds: so no axis is longer than MAX_REACH_RATIO allows
     right = 1 - floor * X.sum(axis=1)
     if B.shape[1] < used.sum() or len(W) < used.sum():  # squares may depend on each other: lean towards equal ones
         X, right = np.vstack([X, 1e-5 * np.eye(X.shape[1])]), np.append(right, np.full(X.shape[1], 1e-5))
     a, _ = nnls(X, right)
-    flag |= FitFlag.BOUNDED if (a <= AT_BOUND).any() else FitFlag.CLEAN
+    flag |= FitFlag.BOUNDED if (a <= 1e-9).any() else FitFlag.CLEAN
     axes = np.zeros(3)
     axes[used] = reach[used] / np.sqrt(a + floor)
     return Ellipsoid(axes, flag)
@@ -165,8 +163,8 @@ def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
     -------
     TiltedEllipsoid
         Flat, and flagged, if the wrenches lie in a subspace. Where they do not determine ``A``, the ellipsoid nearest
-        to their principal axes; where they would make it endless, the best one that reaches at most `FAR` times as
-        far as they do.
+        to their principal axes; where they would make it endless, the best one that reaches at most
+        `MAX_REACH_RATIO` times as far as they do.
 
     Raises
     ------
@@ -191,12 +189,12 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     a, flag = nearest_solution(N, b, ball)
     place, triangle = quadratic_parts(r)
     A = (place @ a).reshape(r, r)
-    # this eigenvalue belongs to an axis FAR times as long as the farthest sample
-    floor = 1 / (FAR * np.linalg.norm(Y, axis=1).max()) ** 2
+    # this eigenvalue belongs to an axis MAX_REACH_RATIO times as long as the farthest sample
+    floor = 1 / (MAX_REACH_RATIO * np.linalg.norm(Y, axis=1).max()) ** 2
     # the linear equations give the best form of all; only one that is open or too long needs the programme
     lowest = np.linalg.eigvalsh(A)[0]
     if lowest >= floor:
-        return A, flag if lowest > floor + AT_BOUND else flag | FitFlag.BOUNDED
+        return A, flag if lowest > floor + 1e-9 else flag | FitFlag.BOUNDED
     a = least_in_cone(N, b, triangle, floor)
     return (place @ a).reshape(r, r), flag | FitFlag.BOUNDED
 
@@ -204,21 +202,17 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
 def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[FloatArray, FitFlag]:
     """Solution of the normal equations ``N x = b`` that is nearest to ``start`` if there are many, and a flag.
 
-    Directions below `HELD` are rounding and stay at the start. Between that and `WEAK` they are followed, but a part in
-    ``1e-16 / WEAK`` of the solution is rounding there, which the flag says too.
+    Directions below `ZERO_SHARE` are rounding and stay at the start. Between that and `WEAK` they are
+    followed, but a part in ``1e-16 / WEAK`` of the solution is rounding there, which the flag says too.
     """
     # unit diagonal: the share of an eigenvalue then says what the data determine, not how long an axis is
     size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
     values, V = np.linalg.eigh(N * np.outer(size, size))
-    held = values > HELD * values[-1]
+    held = values > ZERO_SHARE * values[-1]
     V = size[:, None] * V[:, held]
     # only the difference from the start is solved for, so what data leave open stays there
     x = start + V @ ((V.T @ (b - N @ start)) / values[held])
     return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED
-
-
-DEFINITE = 1e-12
-"""Smallest eigenvalue of a positive definite matrix once its diagonal is 1; rounding makes up to some 1e-15 of 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +222,7 @@ class TiltedEllipsoid(LimitSurface):
     Parameters
     ----------
     A : (d, d) array
-        Symmetric and positive definite, to a margin of `DEFINITE`; for a flat ellipsoid the pseudo-inverse of ``F F'``.
+        Symmetric and positive definite to `ZERO_SHARE`; for a flat ellipsoid the pseudo-inverse of ``F F'``.
     F : (d, r) array, optional
         Image of the unit ball: the body is ``{F y : |y| <= 1}``. Needed only for a flat ellipsoid, ``r < d``.
     flag : FitFlag
@@ -324,11 +318,11 @@ def _ball_map(A: FloatArray) -> FloatArray:
     size = 1 / np.sqrt(diagonal)
     even = A * np.outer(size, size)
     lowest = float(np.linalg.eigvalsh(even)[0])
-    if lowest < -DEFINITE:
+    if lowest < -ZERO_SHARE:
         raise ValueError(
             f"A has the eigenvalues {np.linalg.eigvalsh(A).tolist()}: an ellipsoid needs them all positive"
         )
-    if lowest < DEFINITE:
+    if lowest < ZERO_SHARE:
         raise ValueError(
             f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, less than rounding can tell from zero: whether "
             "the ellipsoid is closed is undecided; give its semi-axes (TiltedEllipsoid.of_ball)"

@@ -10,14 +10,9 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.samples import checked_motions
-from softjaw.lsfit.surface import LimitSurface
+from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, LimitSurface
 
 FloatArray = NDArray[np.float64]
-
-
-ENDLESS = 1e-12  # value of a polynomial at a sample from which it counts as zero there: nowhere near its surface
-
-ACROSS = 1e-9  # part of a unit motion from which its angle to a flat body's normals is not a right one
 
 
 class FitErrors(NamedTuple):
@@ -38,7 +33,7 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
 
     Samples without a wrench say nothing about a surface and are left out. A flat model has the radius 0 (``Erad`` 1,
     ``E1`` infinite) for wrenches out of its span, and is normal to every motion out of it: its angle is the one
-    between the motion and the nearest of its normals. Where the polynomial is not above `ENDLESS` the radius is
+    between the motion and the nearest of its normals. Where the polynomial is not above `ZERO_SHARE` the radius is
     infinite.
 
     Raises
@@ -54,7 +49,7 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
         E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
         return FitErrors(E1, Erad, math.degrees(angle))
     with np.errstate(divide="ignore"):
-        radius = np.where(P > ENDLESS, P, 0.0) ** (-1 / model.degree)
+        radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
     return FitErrors(
         float(np.abs(P - 1).mean()),
         float(np.abs(radius - 1).mean()),
@@ -70,7 +65,7 @@ def overclaim(model: LimitSurface, W: ArrayLike) -> float:
     W, _ = checked_motions(W, None)
     P = model.value(W)
     with np.errstate(divide="ignore"):
-        radius = np.where(P > ENDLESS, P, 0.0) ** (-1 / model.degree)
+        radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
     return max(float(radius.max()) - 1.0, 0.0)
 
 
@@ -83,11 +78,11 @@ def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
     u = across + ahead * u
     size = np.linalg.norm(u, axis=1, keepdims=True)
-    u /= np.where(size > ACROSS, size, 1.0)
+    u /= np.where(size > OUT_OF_SPAN, size, 1.0)
     # The half-angle form keeps its digits where the arc cosine of a number near one loses them. A motion against the
     # gradient is a right angle away from all that is normal to the span.
     angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
-    return np.where(size[:, 0] > ACROSS, angle, np.pi / 2)
+    return np.where(size[:, 0] > OUT_OF_SPAN, angle, np.pi / 2)
 
 
 @njit(cache=True)
@@ -97,7 +92,7 @@ def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
     value = radius = angle = 0.0
     for n in range(m):
         value += abs(P[n] - 1.0)
-        if P[n] > ENDLESS:
+        if P[n] > ZERO_SHARE:
             radius += abs((1.0 / math.sqrt(math.sqrt(P[n])) if degree == 4 else P[n] ** (-1.0 / degree)) - 1.0)
         else:
             radius += np.inf

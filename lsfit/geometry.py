@@ -10,7 +10,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import quad
-from scipy.optimize import brentq
 from scipy.special import roots_gegenbauer
 
 from softjaw.lsfit.form import exponents, monomials
@@ -122,9 +121,8 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
 def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     """Area of the shadow of a closed quartic body in 3-D on the first two components.
 
-    The shadow is the level set of ``min over tau of P(x, y, tau)``, whose area is a periodic integral: equal steps
-    converge fastest. Where the body is not convex the least value may jump from one valley to another, so that the
-    outline has corners; then the integral is divided there.
+    The shadow of a convex body is the level set of ``min over tau of P(x, y, tau)``, whose area is a periodic
+    integral: equal steps converge fastest.
 
     Parameters
     ----------
@@ -143,45 +141,30 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     for n in (32, 64, 128, 256, 512, 1024, 2048, 4096):
         floors = _floors(c, _plane_monomials(n))
         # half a turn stands for the whole, which cancels the half of 1/2 int r^2; r^2 is 1 / sqrt(P)
-        area = np.pi / n * float((1.0 / np.sqrt(floors[:, 2])).sum())
+        area = np.pi / n * float((1.0 / np.sqrt(floors)).sum())
         # equal steps converge exponentially for a smooth outline, so two that agree are both right
         if abs(area - last) <= 1e-13 * area:
             break
         last = area
     else:
-        area = _cornered_area(c, floors)
+        area = _adaptive_area(c)
     return area * float(reach[0] * reach[1])
 
 
-def _cornered_area(c: FloatArray, floors: FloatArray) -> float:
-    """The same area by pieces between the corners that equal steps of half a turn, ``floors (n, 3)``, have met."""
+def _adaptive_area(c: FloatArray) -> float:
+    """The same area for a shadow so long that equal steps do not resolve its ends."""
 
-    def at(phi: float) -> FloatArray:
-        return _floors(c, monomials([np.cos(phi), np.sin(phi), 1.0], exponents(3, 4)))[0]
+    def square(phi: float) -> float:
+        return float(_floors(c, monomials([np.cos(phi), np.sin(phi), 1.0], exponents(3, 4)))[0]) ** -0.5
 
-    n = len(floors)
-    p, q = floors[:, 0], np.append(floors[:, 1], -floors[0, 1])  # q is odd: half a turn changes its sign
-    # only with p < 0 are there two valleys to jump between
-    ends = np.pi * np.array([[k, k + 1] for k in np.flatnonzero((q[:-1] > 0) != (q[1:] > 0)) if p[k] < 0]) / n
-    corners = [brentq(lambda phi: at(phi)[1], *pair) for pair in ends]
-    # starting at a corner leaves none inside a piece
-    start, inside = (corners[0], corners[1:]) if corners else (0.0, [])
-    area, error = quad(
-        lambda phi: at(phi)[2] ** -0.5,
-        start,
-        start + np.pi,
-        points=inside or None,
-        epsabs=0.0,
-        epsrel=1e-12,
-        limit=400,
-    )[:2]
+    area, error = quad(square, 0.0, np.pi, epsabs=0.0, epsrel=1e-12, limit=400)[:2]
     if not error <= 1e-9 * area:
         raise FitError(f"the area of the shadow is known to {error / area:.1e} of itself only: the body is too uneven")
     return area
 
 
 def _floors(c: FloatArray, M: FloatArray) -> FloatArray:
-    out = np.empty((len(M), 3))
+    out = np.empty(len(M))
     fill_floors(c, exponents(3, 4), M, out)
     return out
 
@@ -195,11 +178,10 @@ def _plane_monomials(n: int) -> FloatArray:
 
 @njit(cache=True)
 def fill_floors(c, E, M, out):  # pragma: no cover - compiled
-    """Write ``min over tau of P(x, y, tau)`` for monomials ``M (n, 15)`` at tau 1, ``-> out (n, 3)``.
+    """Write ``min over tau of P(x, y, tau)`` for monomials ``M (n, 15)`` at tau 1, ``-> out (n,)``.
 
     The derivative along tau is a cubic, ``s^3 + p s + q = 0`` for ``tau = s - a_3 / (4 a_4)``. The least value is at
-    its root farthest on the side of ``-q``; ``p`` and ``q`` come first in ``out``. For a convex polynomial ``p`` is not
-    negative; where it is, ``q = 0`` means two valleys of equal depth.
+    its root farthest on the side of ``-q``. For a convex polynomial ``p`` is not negative but for rounding.
     """
     a = np.empty(5)
     for n in range(len(M)):
@@ -222,5 +204,4 @@ def fill_floors(c, E, M, out):  # pragma: no cover - compiled
             # rounding carries the cosine beyond 1 at a double root
             s = 2.0 * reach * math.cos(math.acos(min(abs(q) / (2.0 * reach**3), 1.0)) / 3.0)
         tau = -shift - (s if q > 0.0 else -s)
-        out[n, 0], out[n, 1] = p, q
-        out[n, 2] = (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]
+        out[n] = (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]

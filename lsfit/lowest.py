@@ -1,6 +1,6 @@
-"""Smallest value and smallest curvature of a quartic form on the unit sphere, and whether its level set is closed.
+"""Smallest value of a quartic form on the unit sphere, and whether its level set is closed.
 
-Both are searched from many starts and polished. On any great circle a quartic form is a trigonometric polynomial of
+It is searched from many starts and polished. On any great circle a quartic form is a trigonometric polynomial of
 degree 4: where it is at most ``M`` its second derivative is at most ``16 M`` (Bernstein). From a minimum it therefore
 rises by at most ``8 M h^2`` within the angle ``h``, which bounds what samples no farther apart can have missed.
 """
@@ -17,16 +17,9 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials
 from softjaw.lsfit.geometry import directions, half_sphere_monomials
-from softjaw.lsfit.surface import OpenBodyError, UndecidedError
+from softjaw.lsfit.surface import ZERO_SHARE, OpenBodyError, UndecidedError
 
 FloatArray = NDArray[np.float64]
-
-
-SLOPE = 1e-12  # of the largest value: the gradient at which the search ends; the value is then good to its square
-FINE = 2000  # directions in which curvature is sampled, whose valleys are narrower than those of the value
-LOW = 40  # samples from which a smallest value is searched besides those that are lower than their neighbours
-SHORT = 1e-9  # step at which the search ends: it changes the value by its square
-NEAR = 0.1  # of the range of starts: how far from the lowest one is still worth polishing
 
 
 def lies_above(v: FloatArray, dimension: int, level: float) -> bool:
@@ -61,7 +54,9 @@ def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
     """Smallest value on the unit sphere of the quartic form with coefficients ``v (k,)``, and where, ``(d,)``."""
     n = _count(dimension)
     P = half_sphere_monomials(dimension, n) @ v
-    u = directions(dimension, n)[_lowest(P, dimension) | (P <= np.partition(P, LOW)[LOW])]
+    u = directions(dimension, n)[
+        _lowest(P, dimension) | (P <= np.partition(P, 40)[40])
+    ]  # and the 40 lowest, or a narrow valley is missed
     D, E, third = derivative(dimension, 4), exponents(dimension, 4), exponents(dimension, 3)
     Q = hessian_tensor(v, dimension).reshape(dimension**2, dimension**2)
     value, size, trust = monomials(u, E) @ v, np.abs(P).max(), np.full(len(u), 0.3)
@@ -69,7 +64,7 @@ def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
         g = monomials(u, third) @ (D @ v).T
         # only the slope along the sphere counts; across it Euler's identity fixes it to 4 P
         slope = g - (g * u).sum(axis=1, keepdims=True) * u
-        if ((np.abs(slope).max(axis=1) <= SLOPE * size) | (trust < SHORT)).all():
+        if ((np.abs(slope).max(axis=1) <= ZERO_SHARE * size) | (trust < 1e-9)).all():
             break
         new = _descended(u, slope, value, Q, trust)
         reached = monomials(new, E) @ v
@@ -99,61 +94,6 @@ def _descended(u: FloatArray, slope: FloatArray, value: FloatArray, Q: FloatArra
     return new / np.linalg.norm(new, axis=1, keepdims=True)
 
 
-def smallest_eigenvalue(v: FloatArray, dimension: int) -> float:
-    """Smallest eigenvalue of the second derivative over the unit sphere.
-
-    ``z' H(u) z`` is the same with ``u`` and ``z`` exchanged, so taking the softest direction in turn can only lower it;
-    this starts from every direction that is softer than its neighbours, and Newton's method finishes.
-
-    Parameters
-    ----------
-    v : (k,) array
-        Coefficients in the order of `lsfit.form.exponents`.
-    """
-    d = dimension
-    Q = hessian_tensor(v, d).reshape(d * d, d * d)
-    u = directions(d, FINE)
-    field = lowest_eigenvalues(((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d))
-    u = u[_lowest(field, d)]
-    for _ in range(30):
-        H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
-        values, vectors = np.linalg.eigh(H)
-        u, z = vectors[:, :, 0], u
-    softest = values[:, 0]
-    lowest = float(softest.min())
-    near = softest <= lowest + NEAR * (float(field.max()) - lowest)
-    tensor = Q.reshape(d, d, d, d)
-    return min([lowest, *(_polished(tensor, *pair) for pair in zip(z[near], u[near], strict=True))])
-
-
-def _polished(Q: FloatArray, u: FloatArray, z: FloatArray) -> float:
-    """Smallest eigenvalue at the stationary pair next to ``u`` and ``z``: ``H(u) z = s z``, ``H(z) u = s u``.
-
-    Taking turns gets there slowly where the curvature is flat; Newton's method does not. Every value at a unit ``u`` is
-    one that occurs, so a step that goes astray does no harm.
-    """
-    d = len(u)
-    lowest = np.inf
-    for _ in range(8):
-        mixed = np.einsum("ijkl,j,l->ik", Q, u, z)
-        Hu, Hz = np.einsum("ijkl,k,l->ij", Q, u, u), np.einsum("ijkl,k,l->ij", Q, z, z)
-        s = float(z @ Hu @ z)
-        # both equations and both lengths at once: the last two rows keep the step tangent to the spheres
-        J = np.zeros((2 * d + 2, 2 * d + 2))
-        J[:d, :d], J[:d, d:-2], J[d:-2, :d], J[d:-2, d:-2] = Hz, 2 * mixed, 2 * mixed.T, Hu
-        J[: 2 * d, : 2 * d] -= s * np.eye(2 * d)
-        J[:d, -2] = J[-2, :d] = u
-        J[d:-2, -1] = J[-1, d:-2] = z
-        # minima may form a curve, where the matrix is singular: least squares takes the shortest step
-        step = np.linalg.lstsq(J, np.concatenate([s * u - Hz @ u, s * z - Hu @ z, [0.0, 0.0]]), rcond=1e-9)[0]
-        u, z = u + step[:d], z + step[d:-2]
-        u, z = u / np.linalg.norm(u), z / np.linalg.norm(z)
-        lowest = min(lowest, float(np.linalg.eigvalsh(np.einsum("ijkl,k,l->ij", Q, u, u))[0]))
-        if np.linalg.norm(step[:-2]) < 1e-8:
-            break
-    return lowest
-
-
 def lowest_eigenvalues(H: FloatArray) -> FloatArray:
     """Smallest eigenvalues of symmetric matrices, ``(m, d, d) -> (m,)``; in 3-D from the roots of the cubic."""
     if H.shape[1] != 3:
@@ -169,7 +109,7 @@ def lowest_eigenvalues(H: FloatArray) -> FloatArray:
 
 def _count(dimension: int) -> int:
     """Number of directions in which the value is sampled."""
-    return 400 if dimension <= 3 else FINE
+    return 400 if dimension <= 3 else 2000
 
 
 def _lowest(value: FloatArray, dimension: int) -> NDArray[np.bool_]:
@@ -200,14 +140,6 @@ def _missed(dimension: int) -> float:
     return rise / (1 - rise)
 
 
-CLOSED = 1e-12
-"""Share of a form's largest value on the sphere that its smallest one must exceed to be distinct from zero.
-
-Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
-times as far as its narrowest width is at this margin, since the reach is ``P^(-1/4)``.
-"""
-
-
 class Closed(Enum):
     """Whether a level set is closed."""
 
@@ -227,10 +159,13 @@ def closed(coefficients: FloatArray, dimension: int) -> tuple[Closed, float, Flo
     coefficients : (k,) array
         In the order of ``exponents(dimension, 4)``.
 
+    Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
+    times as far as its narrowest width is at the margin, since the reach is ``P^(-1/4)``.
+
     Returns
     -------
     Closed
-        `YES` if ``P`` exceeds `CLOSED` of its largest value all over the sphere, `NO` if it is below minus that
+        `YES` if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, `NO` if it is below minus that
         somewhere or does not depend on a variable at all, else `UNDECIDED`.
     float
         Smallest value of ``P`` on the sphere of the variables that decide; where it is `YES` the margin.
@@ -243,7 +178,7 @@ def closed(coefficients: FloatArray, dimension: int) -> tuple[Closed, float, Flo
         form = coefficients[(E[:, ~group] == 0).all(axis=1)]
         n = int(group.sum())
         # the margin follows the size of the group's own form: a short axis is not lost in the rounding of long ones
-        margin = CLOSED * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
+        margin = ZERO_SHARE * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
         if margin > 0 and lies_above(form, n, margin):
             continue
         value, u = smallest_value(form, n)
@@ -280,8 +215,8 @@ def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | N
     if answer is Closed.NO:
         raise OpenBodyError(f"{where}: the level set is not closed, so it bounds no body")
     raise UndecidedError(
-        f"{where}, less than rounding can tell from zero ({CLOSED:g} of its largest value): whether the level set is "
-        "closed is undecided; if its axes differ by more than a factor of 1000, give their sizes as units"
+        f"{where}, less than rounding can tell from zero ({ZERO_SHARE:g} of its largest value): whether the level set "
+        "is closed is undecided; if its axes differ by more than a factor of 1000, give their sizes as units"
     )
 
 

@@ -12,13 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
 from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials, places, substitute
 from softjaw.lsfit.geometry import directions, half_sphere_monomials, quartic_shadow, quartic_volume, round_frame
-from softjaw.lsfit.lowest import lowest_eigenvalues, neighbours, refuse_open
+from softjaw.lsfit.lowest import refuse_open
 from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
-
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +138,7 @@ class Quartic(LimitSurface):
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself.
 
-        Of a body that is not convex, the highest of the hills that sampled points of its surface lead to.
+        The body has to be convex.
 
         Raises
         ------
@@ -160,42 +157,24 @@ class Quartic(LimitSurface):
         moving = length > 0
         # unit normals: the tolerances of the search are those of a problem of size one
         T = T[moving] / length[moving, None]
-        # of a body with dents the valley next to a start need not hold the farthest point: several are searched
-        owner, start = self._starts(T)
-        points = np.empty_like(start)
-        failed = support_points(self._round.tensor, T[owner], start, points)
+        start, points = self._starts(T), np.empty_like(T)
+        failed = support_points(self._round.tensor, T, start, points)
         if failed:
             raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
-        if len(owner) > len(T):
-            # ordered by height within each owner, the last point is the highest hill
-            order = np.lexsort(((points * T[owner]).sum(axis=1), owner))
-            points = points[order[np.append(np.diff(owner) > 0, True)]]
         out = np.zeros((len(moving), self.dimension))
         out[moving] = points @ self.frame.T
         return out
 
-    def _starts(self, T: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Points of the surface from which to search, and which row of ``T`` each is for, in order.
-
-        The highest sample of a body that is convex; of others all nearly as high, or higher than their neighbours.
-        """
-        d, Y = self.dimension, self._surface_points
-        owner, place, sign = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    def _starts(self, T: FloatArray) -> FloatArray:
+        """Samples of the surface from which to search, the highest along each row of ``T``."""
+        Y, starts = self._surface_points, np.empty_like(T)
         # bounds the memory of the product with all samples
         for part in range(0, len(T), 10_000):
             along = T[part : part + 10_000] @ Y.T
             # the body is even, so samples of half a sphere do: the sign tells the side
-            height = np.abs(along)
-            if self._is_indented:
-                tops = height >= height[:, neighbours(d, len(Y))].max(axis=2)
-                # samples rank hills of nearly one height by chance
-                row, column = np.nonzero(tops | (height > 0.9 * height.max(axis=1, keepdims=True)))
-            else:
-                row, column = np.arange(len(along)), height.argmax(axis=1)
-            owner.append(part + row)
-            place.append(column)
-            sign.append(np.sign(along[row, column]))
-        return np.concatenate(owner), Y[np.concatenate(place)] * np.concatenate(sign)[:, None]
+            row, column = np.arange(len(along)), np.abs(along).argmax(axis=1)
+            starts[part : part + 10_000] = Y[column] * np.sign(along[row, column])[:, None]
+        return starts
 
     def scaled(self, factors: ArrayLike) -> Quartic:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
@@ -211,11 +190,6 @@ class Quartic(LimitSurface):
         return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
 
     @cached_property
-    def _is_indented(self) -> bool:
-        """Whether a sampled direction has a negative curvature; several starts do no harm to a convex body."""
-        return bool(lowest_eigenvalues(self._round.hessian(directions(self.dimension, 200))).min() < 0)
-
-    @cached_property
     def _surface_points(self) -> FloatArray:
         n = 30 * self.dimension**2
         P = half_sphere_monomials(self.dimension, n) @ self._round.coefficients
@@ -226,8 +200,8 @@ class Quartic(LimitSurface):
 def support_points(tensor, T, start, out):  # pragma: no cover - compiled
     """Points ``out (m, d)`` of a closed quartic surface farthest along ``T (m, d)``, by Newton's method.
 
-    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted, whether ``P`` is convex or
-    not. Steps are halved until the function falls; where the second derivative is not positive it is shifted.
+    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted. Steps
+    are halved until the function falls; where the second derivative is singular it is shifted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fits of quartic limit surfaces: least squares, and the best convex quartic with the proof that it is convex.
+"""The best convex quartic as limit surface, with the proof that it is convex.
 
 All is done in coordinates in which the samples lie near the unit ball, so that coefficients are of one size and
 margins mean the same for every contact.
@@ -7,90 +7,67 @@ margins mean the same for every contact.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.lsfit.ellipsoid import FAR, full_ellipsoid, nearest_solution
+from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_solution
 from softjaw.lsfit.form import exponents, powers, substitute
-from softjaw.lsfit.lowest import lies_above, smallest_eigenvalue
+from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import checked_motions, principal_frame
-from softjaw.lsfit.sos import MARGIN, ball_coefficients, ball_freedom, convex_least_squares, gram_matrix, smallest
+from softjaw.lsfit.sos import (
+    MIN_EIGENVALUE,
+    ball_coefficients,
+    ball_freedom,
+    convex_least_squares,
+    gram_matrix,
+    smallest,
+)
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 
 FloatArray = NDArray[np.float64]
-TILT = 50.0  # spread of a frame's directions from which coefficients lose digits: its fourth power times rounding
+MAX_TILT = 50.0  # condition of a frame's directions; coefficients lose its fourth power times rounding
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate:
-    """What proves a quartic ``P`` convex.
+class QuarticFit(NamedTuple):
+    """A convex quartic limit surface ``P``, and the proof that it is convex.
 
     Parameters
     ----------
+    surface : Quartic or Image
+        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
     gram_eigenvalue : float
         Smallest eigenvalue of ``gram``. Not negative: ``P`` is convex.
     gram : (r * r, r * r) array
         ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the products ``z_i y_j``.
     frame : (d, r) array
         ``B``.
-    by : str
+    certificate : str
         ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
-    surface : Quartic or Image
-        What is proved convex.
-    """
-
-    gram_eigenvalue: float
-    gram: FloatArray
-    frame: FloatArray
-    by: str
-    surface: Quartic | Image = field(repr=False)
-
-    @cached_property
-    def smallest_eigenvalue(self) -> float:
-        """Smallest eigenvalue of the second derivative of ``P`` over unit wrenches (of a flat body, those in its span).
-
-        Searched from every direction that is softer than its neighbours; the proof is the Gram matrix.
-        """
-        # Curvature is at least this. Rounding of very unequal coefficients can hide it from the search.
-        bound = self.gram_eigenvalue * float(np.linalg.norm(self.frame, 2)) ** -4
-        surface = self.surface
-        if isinstance(surface, Quartic):
-            return max(smallest_eigenvalue(surface.coefficients, surface.dimension), bound)
-        # |B y| = |R y|: in the coordinates R y unit vectors are unit wrenches of the span
-        R, inner = np.linalg.qr(surface.B)[1], surface.inner
-        assert isinstance(inner, Quartic)
-        turned = substitute(inner.coefficients, inner.exponents, np.linalg.inv(R))
-        return max(smallest_eigenvalue(turned, inner.dimension), bound)
-
-
-class QuarticFit(NamedTuple):
-    """A convex quartic limit surface, and what is known about it.
-
-    Parameters
-    ----------
-    surface : Quartic or Image
-        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
-    certificate : Certificate
-        Proof that the quartic is convex.
-    flag : FitFlag
-        What the reader should know.
     """
 
     surface: Quartic | Image
-    certificate: Certificate
-    flag: FitFlag
+    gram_eigenvalue: float
+    gram: FloatArray
+    frame: FloatArray
+    certificate: str
+
+    @property
+    def flag(self) -> FitFlag:
+        """What the reader should know."""
+        return self.surface.flag
 
 
-def least_squares_quartic(
-    W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01
-) -> Quartic | Image:
-    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, which may fail to be convex.
+def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
+    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
+
+    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
+    the semidefinite programme is solved, which asks for eigenvalues of at least `MIN_EIGENVALUE`, so that rounding
+    cannot undo the proof. A body that would reach more than `MAX_REACH_RATIO` times as far as the ellipsoid of the
+    samples is bounded there by a larger margin, and flagged.
 
     Parameters
     ----------
@@ -106,29 +83,6 @@ def least_squares_quartic(
     ------
     ValueError
         If a sample is not finite, or all wrenches are zero.
-    """
-    samples = round_samples(W, T)
-    v, flag = nearest_solution(*normal_equations(samples, beta, gamma), ball_coefficients(samples.B.shape[1]))
-    return placed(v, samples, samples.flag | flag)
-
-
-def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
-    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
-
-    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
-    the semidefinite programme is solved, which asks for eigenvalues of at least `lsfit.sos.MARGIN`, so that rounding
-    cannot undo the proof. A body that would reach more than `lsfit.ellipsoid.FAR` times as far as the ellipsoid of the
-    samples is bounded there by a larger margin, and flagged.
-
-    Parameters
-    ----------
-    W, T, beta, gamma
-        As for `least_squares_quartic`.
-
-    Raises
-    ------
-    ValueError
-        If a sample is not finite, or all wrenches are zero.
     FitError
         If the programme is not solved, or its result fails the certificate.
     """
@@ -139,25 +93,25 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     # free numbers of the ball prove many quartics near it, without a programme
     loose, free, by = bool(flag), ball_freedom(r), "least squares"
     gram = gram_matrix(v, free, r)
-    if smallest(gram) < MARGIN:
+    if smallest(gram) < MIN_EIGENVALUE:
         bound, free = convex_least_squares(N, b, r, loose)
         # Where convexity does not bind, the programme ends in the middle of the matrices that prove its result, and
         # the same free numbers prove the quartic of the linear equations, which has more digits.
         gram = gram_matrix(v, free, r)
-        if smallest(gram) < MARGIN:
+        if smallest(gram) < MIN_EIGENVALUE:
             v, by, gram = bound, "semidefinite programme", gram_matrix(bound, free, r)
-    # P below FAR^-4 on the unit sphere is a reach beyond FAR, which no sample supports
-    if not lies_above(v, r, FAR**-4):
+    # P below MAX_REACH_RATIO^-4 on the unit sphere is a reach beyond MAX_REACH_RATIO, which no sample supports
+    if not lies_above(v, r, MAX_REACH_RATIO**-4):
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
-        # y' Hess P y = 12 P: a Gram matrix with this least eigenvalue bounds the reach by FAR
-        v, free = convex_least_squares(N, b, r, loose, 12 * FAR**-4)
+        # y' Hess P y = 12 P: a Gram matrix with this least eigenvalue bounds the reach by MAX_REACH_RATIO
+        v, free = convex_least_squares(N, b, r, loose, 12 * MAX_REACH_RATIO**-4)
         gram = gram_matrix(v, free, r)
     surface = placed(v, samples, samples.flag | flag)
     low = smallest(gram)
     # the programme promises half of the margin; the rest is room for rounding on the way
-    if low < MARGIN / 4:
+    if low < MIN_EIGENVALUE / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    return QuarticFit(surface, Certificate(low, gram, samples.B, by, surface), surface.flag)
+    return QuarticFit(surface, low, gram, samples.B, by)
 
 
 class RoundSamples(NamedTuple):
@@ -223,7 +177,7 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     reach = np.linalg.norm(samples.B, axis=1)
     # rows of one length: what is left of the condition is tilt, which no choice of units undoes
     turn = samples.B / reach[:, None]
-    if np.linalg.cond(turn) > TILT:
+    if np.linalg.cond(turn) > MAX_TILT:
         return Image(Quartic(v, E), samples.B, flag)
     # turned first and stretched last, as a division by units costs a coefficient no digits
     coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)

@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from softjaw.lsfit.surface import FitFlag
+from softjaw.lsfit.surface import ZERO_SHARE, FitFlag
 
 FloatArray = NDArray[np.float64]
-UNIT = 1e-5  # how far the length of a unit motion may be from 1
-THIN = 1e-3  # below this ratio of their principal lengths, samples are called thin
-FLAT = 1e-9  # below this they count as flat; what lies between carries the flag THIN
-NOTHING = 1e-12  # below this share of the largest, a wrench or a semi-axis is the rounding of none
+THIN_RATIO = 1e-3  # of principal lengths of samples: below it they carry the flag THIN
+FLAT_RATIO = 1e-9  # of principal lengths: below it samples are flat
 
 
 def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
@@ -100,7 +98,7 @@ def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
     return x / np.linalg.norm(x, axis=1, keepdims=True)
 
 
-def sample_rank(W: ArrayLike, tolerance: float = FLAT) -> int:
+def sample_rank(W: ArrayLike, tolerance: float = FLAT_RATIO) -> int:
     """Dimension of the space that the samples span; below 3, no limit surface can be fitted to them alone.
 
     Parameters
@@ -115,7 +113,7 @@ def sample_rank(W: ArrayLike, tolerance: float = FLAT) -> int:
 
 
 def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
-    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero, or the rounding of that (`NOTHING`).
+    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero, or the rounding of that (`ZERO_SHARE`).
 
     Raises
     ------
@@ -143,7 +141,7 @@ def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, Floa
     wrenches = checked_wrenches(W)
     length = np.sqrt(np.einsum("md,md->m", T, T))
     # asked this way round, a length that is not a number fails too
-    if not abs(length - 1).max() <= UNIT:
+    if not abs(length - 1).max() <= 1e-5:
         # nan counts as infinitely wrong, so that the message names it first
         n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
         raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
@@ -154,7 +152,7 @@ def _pressed(W: FloatArray) -> NDArray[np.bool_]:
     """Which wrenches are not zero, ``(m,)``."""
     # squares of lengths, hence the square of the share
     size = np.einsum("md,md->m", W, W)
-    return size > NOTHING**2 * size.max()
+    return size > ZERO_SHARE**2 * size.max()
 
 
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
@@ -171,9 +169,9 @@ def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
     """
     # of W itself: the product W'W squares the ratio of long and short directions, and loses the short
     U, values, V = np.linalg.svd(W, full_matrices=False)
-    r = int((values > FLAT * values[0]).sum())
+    r = int((values > FLAT_RATIO * values[0]).sum())
     flag = FitFlag.CLEAN if r == W.shape[1] else FitFlag.RANK_DEFICIENT
-    flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
+    flag |= FitFlag.THIN if values[r - 1] < THIN_RATIO * values[0] else FitFlag.CLEAN
     # columns of U have the length 1: times sqrt(m) their mean square is 1
     size = np.sqrt(len(W))
     V[np.abs(V) < 1e-15] = 0.0  # components that no sample has stay exactly zero

@@ -27,10 +27,10 @@ from softjaw.lsfit.form import exponents, tensor_places
 from softjaw.lsfit.surface import FitError
 
 FloatArray = NDArray[np.float64]
-MARGIN = 1e-7
+MIN_EIGENVALUE = 1e-7
 """Smallest eigenvalue asked of a Gram matrix, in coordinates where that of a ball has eigenvalues of 4 and more."""
-ENOUGH = 1e-5
-"""Relative gap and residuals from which a quartic is taken where Clarabel ends short of its own tolerance, 1e-8."""
+ENOUGH = 1e-6
+"""Relative gap and residuals from which a solution is taken where Clarabel ends short of its own tolerance, 1e-8."""
 
 
 @lru_cache
@@ -107,7 +107,7 @@ def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
 
 
 def convex_least_squares(
-    N: FloatArray, b: FloatArray, dimension: int, loose: bool, floor: float = MARGIN
+    N: FloatArray, b: FloatArray, dimension: int, loose: bool, floor: float = MIN_EIGENVALUE
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients ``v (k,)`` that minimise ``v' N v / 2 - b . v`` among sos-convex quartics; free numbers ``(f,)``.
 
@@ -139,7 +139,7 @@ def convex_least_squares(
     H, g = np.zeros((len(ball),) * 2), np.zeros(len(ball))
     H[:k, :k], g[:k] = N, b
     # few samples leave Clarabel short of its own tolerance; what it reached is near enough to be mended below
-    x = least_in_cone(H, g, _maps(dimension)[1], floor, ENOUGH)
+    x = least_in_cone(H, g, _maps(dimension)[1], floor)
     lack = floor / 2 - smallest(gram_matrix(x[:k], x[k:], dimension))
     # a mixture of two sos-convex forms is one, and that of the ball lifts every eigenvalue
     if lack > 0:
@@ -155,9 +155,7 @@ def smallest(matrix: FloatArray) -> float:
     return float(np.linalg.eigvalsh(matrix)[0])
 
 
-def least_in_cone(
-    N: FloatArray, b: FloatArray, triangle: csr_array, floor: float, enough: float = 0.0
-) -> FloatArray:
+def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: float) -> FloatArray:
     """Minimiser of ``x' N x / 2 - b . x`` among the ``x`` whose symmetric matrix has no eigenvalue below ``floor``.
 
     Parameters
@@ -170,8 +168,6 @@ def least_in_cone(
         Upper triangle of the matrix as `upper_triangle` orders it.
     floor : float
         Smallest eigenvalue allowed.
-    enough : float
-        As for `conic_solution`.
 
     Raises
     ------
@@ -183,7 +179,7 @@ def least_in_cone(
     column, row = np.tril_indices(size)
     right = np.where(row == column, -floor, 0.0)
     # Clarabel reads the upper triangle of the objective only
-    return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)], enough)[0]
+    return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)])[0]
 
 
 def side(triangle: csr_array) -> int:
@@ -191,15 +187,13 @@ def side(triangle: csr_array) -> int:
     return round((np.sqrt(8 * triangle.shape[0] + 1) - 1) / 2)
 
 
-def conic_solution(
-    P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list, enough: float = 0.0
-) -> tuple[FloatArray, float]:
+def conic_solution(P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list) -> tuple[FloatArray, float]:
     """Minimiser of ``x' P x / 2 + q . x`` with ``b - A x`` in the cones, and its value, by Clarabel.
 
     Raises
     ------
     FitError
-        If Clarabel's own tolerance is not reached, nor a gap and residuals of ``enough``.
+        If Clarabel's own tolerance is not reached, nor a gap and residuals of `ENOUGH`.
     """
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -207,7 +201,7 @@ def conic_solution(
     answer = clarabel.DefaultSolver(P, q, csc_array(A), b, cones, settings).solve()
     # relative, unlike Clarabel's own gap: an objective far below one can be wrong altogether at a gap of 1e-8
     short = max(answer.r_prim, answer.r_dual, abs(answer.obj_val - answer.obj_val_dual) / abs(answer.obj_val))
-    almost = answer.status == clarabel.SolverStatus.AlmostSolved and short < enough
+    almost = answer.status == clarabel.SolverStatus.AlmostSolved and short < ENOUGH
     if not (answer.status == clarabel.SolverStatus.Solved or almost):
         raise FitError(
             f"Clarabel stopped with {answer.status} and errors of {short:.1e} after {answer.iterations} iterations on "

@@ -2,33 +2,27 @@
 
 The friction of a patch moves all six components of the wrench ``[f, tau]`` when its motions are all six of ``[v,
 omega]``; the moments are taken about the origin of the contact frame, by ``l = r - O``. Everything here works in any
-number of dimensions: a plane patch has rank 3 among the six components, a cylinder or a cap 6. In six dimensions the
-quartic of least squares is not convex for usual patches; the convex one takes a fifth of a second.
+number of dimensions: a plane patch has rank 3 among the six components, a cylinder or a cap 6.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.lsfit.ellipsoid import FAR, TiltedEllipsoid, full_ellipsoid
+from softjaw.lsfit.ellipsoid import TiltedEllipsoid, full_ellipsoid
 from softjaw.lsfit.fit_error import FitErrors, fit_error
-from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.quartic_fit import Certificate, convex_quartic
-from softjaw.lsfit.samples import FLAT, THIN
-from softjaw.lsfit.surface import FitError, FitFlag, Image
+from softjaw.lsfit.quartic_fit import convex_quartic
+from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO
+from softjaw.lsfit.surface import FitFlag, Image
 
 FloatArray = NDArray[np.float64]
-Scaling = Literal["maxima", "whitened", "none"]
 Fitted = TiltedEllipsoid | Quartic | Image
-
-
-class CollapsedFitError(FitError):
-    """The fitted surface does not pass near the samples, or nothing holds it in some direction."""
 
 
 class SpanSamples(NamedTuple):
@@ -50,7 +44,7 @@ class SpanSamples(NamedTuple):
         return self.B.shape[1]
 
 
-def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolerance: float = FLAT) -> SpanSamples:
+def span_samples(W: ArrayLike, T: ArrayLike, even: bool = True) -> SpanSamples:
     """Samples within their span, scaled.
 
     A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Motions that meet no
@@ -60,21 +54,16 @@ def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolera
     ----------
     W, T : (m, d) array
         Normalised wrenches and unit motions [-].
-    scaling : str
-        ``maxima`` divides every component by its largest magnitude (the published fits in six dimensions do), or every
-        principal direction if the samples do not span all components that they use; ``whitened`` makes the mean square
-        the same in all directions; ``none`` keeps the lengths.
-    tolerance : float
-        Components, and singular values of the scaled samples, below this share of the largest count as zero.
+    even : bool
+        Whether every component is divided by its largest magnitude (as in the published fits in six dimensions), or
+        every principal direction if the samples do not span all components that they use; else lengths are kept.
 
     Raises
     ------
     ValueError
-        If shapes differ, a value is not finite, all wrenches are zero, or the scaling has an unknown name.
+        If shapes differ, a value is not finite, or all wrenches are zero.
     """
     wrenches, motions = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
-    if scaling not in get_args(Scaling):
-        raise ValueError(f"scaling is {scaling!r}: choose one of {', '.join(get_args(Scaling))}")
     if wrenches.shape != motions.shape or not (np.isfinite(wrenches).all() and np.isfinite(motions).all()):
         raise ValueError(
             f"wrenches {wrenches.shape} and motions {motions.shape} must be finite and of one shape (m, d)"
@@ -82,35 +71,33 @@ def span_samples(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima", tolera
     largest = np.abs(wrenches).max(axis=0, initial=0.0)
     if not largest.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    B, flag = _map(wrenches, largest, scaling, tolerance)
+    B, flag = _map(wrenches, largest, even)
     # a motion that meets no friction has a wrench of rounding, whose direction means nothing
-    used = largest > tolerance * largest.max()
-    moving = (np.abs(wrenches[:, used]) > tolerance * largest[used]).any(axis=1)
+    used = largest > FLAT_RATIO * largest.max()
+    moving = (np.abs(wrenches[:, used]) > FLAT_RATIO * largest[used]).any(axis=1)
     Y, slip = wrenches[moving] @ np.linalg.pinv(B).T, motions[moving] @ B
     return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B, flag)
 
 
-def _map(W: FloatArray, largest: FloatArray, scaling: Scaling, tolerance: float) -> tuple[FloatArray, FitFlag]:
+def _map(W: FloatArray, largest: FloatArray, even: bool) -> tuple[FloatArray, FitFlag]:
     """Columns ``B (d, r)`` of the coordinates, and whether the samples are flat or thin."""
-    used = np.flatnonzero(largest > tolerance * largest.max())
+    used = np.flatnonzero(largest > FLAT_RATIO * largest.max())
     scale = largest[used]
     # Rank is a property of the samples, not of the unit of a torque: judge it with all components of one size.
     _, values, V = np.linalg.svd(W[:, used] / scale, full_matrices=False)
-    r = int((values > tolerance * values[0]).sum())
+    r = int((values > FLAT_RATIO * values[0]).sum())
     flag = FitFlag.RANK_DEFICIENT if r < W.shape[1] else FitFlag.CLEAN
-    flag |= FitFlag.THIN if values[r - 1] < THIN * values[0] else FitFlag.CLEAN
+    flag |= FitFlag.THIN if values[r - 1] < THIN_RATIO * values[0] else FitFlag.CLEAN
     B = np.zeros((W.shape[1], r))
     # a diagonal map keeps the surface a quartic of the components, which files and look-ups can hold
-    if r == len(used) and scaling != "whitened":
-        B[used] = np.diag(scale if scaling == "maxima" else np.ones(r))
+    if r == len(used):
+        B[used] = np.diag(scale if even else np.ones(r))
         return B, flag
     B[used] = scale[:, None] * V[:r].T
-    if scaling == "none":
-        # an orthonormal frame of the span changes no length
-        return np.linalg.qr(B)[0], flag
-    if scaling == "maxima":
+    if even:
         return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
-    return B * (values[:r] / np.sqrt(len(W))), flag
+    # an orthonormal frame of the span changes no length
+    return np.linalg.qr(B)[0], flag
 
 
 class SpanFit(NamedTuple):
@@ -118,26 +105,27 @@ class SpanFit(NamedTuple):
 
     ``rank`` is the dimension of the samples' span. Below that of the wrenches the surface is flat and flagged, its
     support along the missing directions is 0. ``errors`` compare directions in the coordinates of the fit, where the
-    axes have a like length; in the others a soft axis decides every angle. ``certificate`` is for convex quartics.
+    axes have a like length; in the others a soft axis decides every angle. A
+    quartic is convex by its Gram matrix, whose smallest eigenvalue is given.
     """
 
     surface: Fitted
     errors: FitErrors
     rank: int
-    certificate: Certificate | None = None
+    gram_eigenvalue: float = math.nan
 
 
-def span_ellipsoid(W: ArrayLike, T: ArrayLike, scaling: Scaling = "maxima") -> SpanFit:
+def span_ellipsoid(W: ArrayLike, T: ArrayLike) -> SpanFit:
     """Ellipsoid of least squares ``min sum (w' A w - 1)^2``, 21 coefficients in six dimensions.
 
     The scaling has a part in the errors only; where samples leave the ellipsoid open, see `full_ellipsoid`.
     """
-    samples = span_samples(W, T, scaling)
+    samples = span_samples(W, T)
     surface = full_ellipsoid(samples.Y)
     return SpanFit(placed(surface, samples), fit_error(surface, samples.Y, samples.T), samples.rank)
 
 
-def convex_span_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01, scaling: Scaling = "maxima") -> SpanFit:
+def span_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> SpanFit:
     """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)`` in the scaled coordinates.
 
     Parameters
@@ -148,18 +136,11 @@ def convex_span_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01, scaling
     gamma : float
         Weight of the motions. Gradients grow with the surface's smallness, so a weight of 1 shifts it outwards by some
         percent in six dimensions; 0.01 gives the same directions without that.
-    scaling : str
-        Coordinates of the fit, see `span_samples`.
-
-    Raises
-    ------
-    FitError
-        If the solver does not converge, or the Gram matrix proves nothing.
     """
-    samples = span_samples(W, T, scaling)
-    surface, certificate, _ = convex_quartic(samples.Y, samples.T, gamma=gamma)
-    errors = fit_error(surface, samples.Y, samples.T)
-    return SpanFit(placed(surface, samples), errors, samples.rank, certificate)
+    samples = span_samples(W, T)
+    fit = convex_quartic(samples.Y, samples.T, gamma=gamma)
+    errors = fit_error(fit.surface, samples.Y, samples.T)
+    return SpanFit(placed(fit.surface, samples), errors, samples.rank, fit.gram_eigenvalue)
 
 
 def placed(surface: Fitted, samples: SpanSamples) -> Fitted:
@@ -175,37 +156,3 @@ def placed(surface: Fitted, samples: SpanSamples) -> Fitted:
     if r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
         return replace(surface.scaled(np.diag(samples.B)), flag=flag)
     return Image(surface, samples.B, flag)
-
-
-def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
-    """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``, or is nearly endless."""
-    with np.errstate(divide="ignore"):
-        # the median, as single bad samples may lie anywhere
-        median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
-    if median > 2:
-        raise CollapsedFitError(
-            f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
-            f"{len(Y)} samples; lower lam, raise beta, or give more samples"
-        )
-    if isinstance(surface, TiltedEllipsoid):
-        return  # `refuse_endless` was asked before its matrix made an ellipsoid
-    # the bound from samples is cheap and settles most cases; only the others need a search
-    if not lies_above(surface.coefficients, surface.dimension, _least(Y, 4)):
-        refuse_endless(*smallest_value(surface.coefficients, surface.dimension), Y, 4)
-
-
-def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
-    """Raise `CollapsedFitError` if a surface reaches too far beyond the samples, by its least value ``P`` at ``u``."""
-    least = _least(Y, degree)
-    if P < least:
-        # a value of zero or less is a reach without end
-        reach = FAR * (least / max(P, 1e-300)) ** (1 / degree)
-        raise CollapsedFitError(
-            f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "
-            "coordinates), where no sample holds it: sample more motions, lower lam, or raise beta"
-        )
-
-
-def _least(Y: FloatArray, degree: int) -> float:
-    """Value on the unit sphere of a surface that reaches `FAR` times as far as the samples."""
-    return float((FAR * np.linalg.norm(Y, axis=1).max()) ** -degree)

@@ -36,7 +36,7 @@ class FitFlag(IntFlag):
     THIN = 8  # the samples are a thousand times shorter along one direction: rho does not suit the contact
 
 
-ON_THE_SURFACE = 1e-12  # relative; what rounding may add to P on the surface itself
+ZERO_SHARE = 1e-12  # of the largest number of its kind: what is smaller is the rounding of zero
 OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the body does not carry it
 
 
@@ -104,7 +104,7 @@ class LimitSurface(ABC):
     def holds(self, w: ArrayLike) -> NDArray[np.bool_]:
         """Whether wrenches lie in the body, surface included, ``(m, d) -> (m,)``."""
         # a relative error of the wrench is `degree` times as large in P
-        return self.value(w) <= 1 + self.degree * ON_THE_SURFACE
+        return self.value(w) <= 1 + self.degree * ZERO_SHARE
 
 
 def mapped_value(P: FloatArray, Y: FloatArray, B: FloatArray, W: FloatArray) -> FloatArray:

@@ -18,16 +18,14 @@ from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
-from softjaw.lsfit.body import body_volume
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples
-from softjaw.lsfit.span import span_ellipsoid
 from softjaw.lsfit.surface import FitFlag, shadow_area
-from softjaw.lsfit.zhou import ZhouWeights, zhou_ellipsoid, zhou_quartic
+from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic
 from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
 from softjaw.scoring.contact import SoftContact, contact_axes
@@ -46,6 +44,7 @@ from tests.generators import (
     mesh_patch,
     screw_twist,
 )
+from tests.oracles import body_volume, least_squares_quartic
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]
 CASES = {case["id"]: case for case in TABLE}
@@ -159,9 +158,9 @@ def fits(inputs, names):
 
 
 def zhou_fits(inputs, W, T):
-    weights, found = ZhouWeights(inputs["lam"], inputs["beta"], inputs["gamma"]), {}
+    weights, found = [inputs[name] for name in ("lam", "beta", "gamma")], {}
     for name, method in (("quartic", zhou_quartic), ("ellipsoid", zhou_ellipsoid)):
-        fit = method(W, T, weights, scaling="none")
+        fit = method(W, T, *weights, even=False)
         found |= {f"{name}.objective": fit.objective} | errors_of(name, fit.surface, W, T)
     return found
 
@@ -173,13 +172,13 @@ def fits_in_six_dimensions(inputs, _):
     twist = unit / [1, 1, 1, rho, rho, rho]
     twist[:, :3] -= np.cross(twist[:, 3:], point)  # motions are those of the reference point
     W, T = six_samples(friction_wrench(patch, twist, mu), twist, mu * friction_limits(patch, mu).S, rho, point)
-    full = span_ellipsoid(W, T, scaling="none")
+    full = full_ellipsoid(W)
     E = exponents(6, 4)
     M = monomials(W, E)
     quartic = Quartic(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), E)
     return {
-        "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.surface.A,
-        **errors_of("ell_full", full.surface, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),
+        "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.A,
+        **errors_of("ell_full", full, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),
     }  # fmt: skip
 
 

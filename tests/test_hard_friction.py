@@ -19,7 +19,7 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag
 from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
@@ -35,6 +35,7 @@ from tests.generators import (
     points_patch,
     rect_grid,
 )
+from tests.oracles import least_squares_quartic
 
 X = [1.0, 0.0, 0.0]
 ONE_FACE = points_patch([[0, 0]], [2.0])

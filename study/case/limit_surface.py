@@ -27,9 +27,9 @@ from softjaw.lsfit.fit_error import FitErrors, fit_error, overclaim
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
-from softjaw.lsfit.span import CollapsedFitError, span_ellipsoid
-from softjaw.lsfit.surface import FitError, Image, LimitSurface
-from softjaw.lsfit.zhou import SIX_WEIGHTS, zhou_ellipsoid, zhou_quartic
+from softjaw.lsfit.span import span_ellipsoid, span_quartic
+from softjaw.lsfit.surface import FitError, LimitSurface
+from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
@@ -37,7 +37,6 @@ from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
-ZHOU = SIX_WEIGHTS  # for three components too: all weights 1 fit no better, and collapse for some patches
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.quantities says
 
 
@@ -131,13 +130,13 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
             case "full", "least_squares":
                 return full_ellipsoid(W), ELLIPSOID
             case "full", _:
-                return zhou_ellipsoid(W, T, ZHOU).surface, ELLIPSOID
+                return zhou_ellipsoid(W, T).surface, ELLIPSOID
             case _, "least_squares":
                 fit = convex_quartic(W, T)
-                return fit.surface, AS_FITTED if fit.certificate.by == "least squares" else PROGRAMME
-        return zhou_quartic(W, T, ZHOU).surface, PROGRAMME
+                return fit.surface, AS_FITTED if fit.certificate == "least squares" else PROGRAMME
+        return zhou_quartic(W, T).surface, PROGRAMME
     # A surface that stands in keeps the case valid; the certificate and a flag tell.
-    except (FitError, CollapsedFitError):
+    except FitError:
         return ellipsoid, STANDS_IN
 
 
@@ -210,19 +209,28 @@ def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray
 
     A plane contact resists three directions only; a fit that the wrenches do not hold is NaN.
     """
-    motion = sphere_motions(SIX_MOTIONS, 6)
-    twist = motion / [1, 1, 1, rho, rho, rho]
-    W, T = six_samples(friction_wrench(patch, twist, 1.0), twist, S, rho)
-    nothing = FitErrors(np.nan, np.nan, np.nan)
+    W, T = _six_samples(patch, rho, S, "ccm", SIX_MOTIONS)
     try:
         fit = span_ellipsoid(W, T)
-    except CollapsedFitError:
-        return np.full((6, 6), np.nan), 0, nothing
-    surface = fit.surface
-    if isinstance(surface, TiltedEllipsoid):
-        return surface.A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
-    assert isinstance(surface, Image)  # of a flat ellipsoid
-    assert isinstance(surface.inner, TiltedEllipsoid)
-    inverse = np.linalg.pinv(surface.B)
-    A = inverse.T @ surface.inner.A @ inverse
-    return A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+    except FitError:
+        return np.full((6, 6), np.nan), 0, FitErrors(np.nan, np.nan, np.nan)
+    assert isinstance(fit.surface, TiltedEllipsoid)
+    return fit.surface.A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+
+
+def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurface, FitErrors, float]:
+    """Convex quartic of all six components ``(f, tau)`` [N, N m], with its fit error and overclaim on other motions."""
+    S = contact.unit_limits[model].S
+    W, T = _six_samples(contact.local, contact.rho, S, model, samples + INDEPENDENT)
+    fitted_to, others = slice(samples), slice(samples, None)
+    surface = span_quartic(W[fitted_to], T[fitted_to]).surface
+    errors = fit_error(surface, W[others], T[others])
+    size = contact.mu * S * np.repeat([1.0, contact.rho], 3)
+    radians = FitErrors(errors.E1, errors.Erad, float(np.radians(errors.Edir)))
+    return surface.scaled(size), radians, overclaim(surface, W[others])
+
+
+def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: int) -> tuple[FloatArray, FloatArray]:
+    """Normalised wrenches and unit motions ``(count, 6)`` of evenly spread motions of a patch."""
+    twist = sphere_motions(count, 6) / np.repeat([1.0, rho], 3)
+    return six_samples(friction_wrench(patch, twist, 1.0, model), twist, S, rho)

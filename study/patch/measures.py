@@ -21,7 +21,7 @@ from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.scoring.quality import Score, grasp_score
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import soft
-from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
+from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces, six_quartic
 from softjaw.study.patch.answer import FITTED_ON
 from softjaw.study.patch.contacts import check_facing, contact_of, exact_surface, grasp_lengths, opposite
 from softjaw.study.patch.patch_reader import Reading
@@ -213,6 +213,7 @@ def fit_quartic(
     model: str = "ccm",
     samples: int = FITTED_ON,
     x_axis: ArrayLike | None = None,
+    wrench: str = "3-D",
 ) -> FittedSurface:
     """Convex quartic as limit surface of a patch: closer to it than any ellipsoid.
 
@@ -220,6 +221,9 @@ def fit_quartic(
     ----------
     patch, mu, model, samples, x_axis
         As for `fit_ellipsoid`.
+    wrench : str
+        ``3-D``: the components ``(f_x, f_y, tau_z)``; ``6-D``: all of ``(f, tau)``, for which 1000 samples are few
+        and the fit takes some 0.3 s.
 
     Returns
     -------
@@ -229,7 +233,7 @@ def fit_quartic(
     Raises
     ------
     ValueError
-        As for `friction_wrench`.
+        As for `friction_wrench`; another name of components.
     FitError
         The fit failed.
 
@@ -243,7 +247,12 @@ def fit_quartic(
     >>> fit_quartic(patch, mu=0.8).fit_error.Erad < fit_ellipsoid(patch, mu=0.8).fit_error.Erad < 0.04
     True
     """
-    return _fitted(contact_of(patch, mu, x_axis), "quartic", model, samples)
+    contact = contact_of(patch, mu, x_axis)
+    if wrench == "3-D":
+        return _fitted(contact, "quartic", model, samples)
+    if wrench != "6-D":
+        raise ValueError(f"wrench is {wrench!r}: expected '3-D' or '6-D'")
+    return FittedSurface(*six_quartic(contact, checked_model(model), _checked_samples(samples)))
 
 
 def grasp_quality(
@@ -326,12 +335,16 @@ def _fitted(contact: Contact, kind: str, model: str, samples: int) -> FittedSurf
 
 
 def _fit(contact: Contact, kind: str, model: str, samples: int) -> SurfaceFit:
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 10:
-        raise ValueError(f"samples is {samples!r}: expected a whole number of at least 10")
-    fit = fit_surfaces(contact, model, [kind], "least_squares", int(samples))[kind]
+    fit = fit_surfaces(contact, model, [kind], "least_squares", _checked_samples(samples))[kind]
     if fit.certificate == STANDS_IN:
         raise FitError(f"fit failed of {kind} to the wrenches of {samples} motions; take kind='three_motions'")
     return fit
+
+
+def _checked_samples(samples: int) -> int:
+    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 10:
+        raise ValueError(f"samples is {samples!r}: expected a whole number of at least 10")
+    return int(samples)
 
 
 def _length(name: str, value: float | None) -> float:

@@ -1,4 +1,4 @@
-"""The exact limit surface of a few points: its volume in closed form, and the bound of the error of its volume."""
+"""The exact limit surface of a few points: its volume in closed form."""
 
 from itertools import combinations
 
@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.body import ExactSurface, hull_volume, tangent_volume
-from softjaw.lsfit.geometry import directions
-from tests.generators import disc_polar, points_patch
+from softjaw.lsfit.body import ExactSurface, hull_volume
+from tests.generators import points_patch
 
 
 def body_of(patch, rho, count):
@@ -70,32 +69,15 @@ def test_the_closed_form_is_that_of_the_sums():
     assert missing[2] < 1e-3
 
 
-@pytest.mark.parametrize(("points", "count"), [(2, 60), (3, 40), (5, 15), (12, 2)])
-def test_the_bound_holds_for_few_and_many_points(points, count):
-    """Two points have plane faces, which samples in the direction of motion hardly meet."""
+@pytest.mark.parametrize(("points", "count"), [(2, 8), (3, 8), (5, 4), (12, 1)])
+def test_the_volume_is_that_of_the_sum_of_the_points_discs(points, count):
+    """Extrapolated from 2000 samples: some 1e-3 for many points; a few have plane faces, which samples hardly meet."""
     rng = np.random.default_rng(points)
     for _ in range(count):
         patch = random_points(rng, points)
-        rho = 2.0 if rng.random() < 0.5 else max(np.ptp(patch.centroid[:, :2], axis=0).max(), 1e-3)
-        body, V = body_of(patch, rho, 400), sum_volume(discs(patch, rho), 60)
-        assert abs(body.volume - V) <= body.volume_error * (1 + 1e-6)
-        T = directions(3, 400)
-        assert hull_volume(body.samples()) < V * (1 + 1e-6) < tangent_volume(T, body.samples()) * (1 + 2e-6)
-
-
-def test_the_bound_shrinks_with_the_samples():
-    errors = [(b := body_of(disc_polar(1, 20, 48), 2.0, n)).volume_error / b.volume for n in (500, 1000, 2000)]
-    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 1, atol=0.1)
-    assert errors[-1] < 6e-3
-
-
-def test_tangents_of_a_ball_enclose_it_and_those_of_a_box_are_the_box():
-    t = directions(3, 2000)
-    axes = np.array([1.0, 0.5, 1e-6])
-    ball = tangent_volume(t / axes, t * axes) / axes.prod()
-    assert 4 / 3 * np.pi < ball < 4 / 3 * np.pi * 1.003
-    touching = (np.eye(3) + 0.1 * np.roll(np.eye(3), 1, axis=1)) * axes
-    assert tangent_volume(np.eye(3), touching) == pytest.approx(8 * axes.prod(), rel=1e-12)
+        body, V = body_of(patch, 2.0, 2000), sum_volume(discs(patch, 2.0), 60)
+        assert body.volume == pytest.approx(V, rel=2e-2 if points < 5 else 4e-3)
+        assert hull_volume(body.samples()) < V * (1 + 1e-6)
 
 
 def test_hulls_keep_their_digits_when_they_are_thin():

@@ -10,16 +10,15 @@ from scipy.optimize import brentq
 
 from softjaw.friction.motion import cor_grid, fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.lsfit.body import ExactSurface, body_volume
-from softjaw.lsfit.ellipsoid import FAR, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
+from softjaw.lsfit.body import ExactSurface
+from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.geometry import directions
-from softjaw.lsfit.lowest import lowest_eigenvalues, smallest_eigenvalue
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.quartic_fit import convex_quartic, least_squares_quartic
+from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.sos import (
-    MARGIN,
+    MIN_EIGENVALUE,
     ball_coefficients,
     ball_freedom,
     convex_least_squares,
@@ -39,6 +38,7 @@ from tests.generators import (
     points_patch,
     rect_grid,
 )
+from tests.oracles import body_volume, least_squares_quartic, smallest_curvature
 
 HERTZ = {"gen": "disc_polar", "args": {"R": 1.0, "nr": 40, "nt": 96}, "pressure": {"kind": "hertz", "a": 1.0}}
 GAUSS = {
@@ -108,7 +108,7 @@ def test_errors_and_volumes_of_known_patches(name):
     found = np.array([fit_error(model, W, T) for model in models])
     np.testing.assert_allclose(found - numbers(errors), 0, atol=0.06)
     np.testing.assert_allclose((found - numbers(errors))[:, :2], 0, atol=6e-5)
-    assert smallest_eigenvalue(models[2].coefficients, 3) == pytest.approx(eigenvalue, abs=0.06)
+    assert smallest_curvature(models[2].coefficients, 3) == pytest.approx(eigenvalue, abs=0.06)
     V = body_volume(samples(patch, 1000, rho)[0], samples(patch, 4000, rho)[0])
     np.testing.assert_allclose(np.array([m.volume for m in models]) / V, numbers(ratios)[0], atol=1.1e-3)
 
@@ -120,12 +120,13 @@ def test_only_two_points_need_the_programme(name):
     fit = convex_quartic(W, T, gamma=0)
     assert (fit.flag, fit.surface.rank) == (FitFlag.CLEAN, 3)
     if name == "two points":
-        assert fit.certificate.by == "semidefinite programme"
+        assert fit.certificate == "semidefinite programme"
         np.testing.assert_allclose(fit_error(fit.surface, W, T), [0.0129, 0.0033, 6.62], atol=6e-3)
         np.testing.assert_allclose(fit_error(fit.surface, W, T)[:2], [0.0129, 0.0033], atol=6e-5)
         assert objective(fit.surface, W) > objective(least_squares_quartic(W, T, gamma=0), W)
     else:
-        assert fit.certificate.by == "least squares"
+        assert fit.certificate == "least squares"
+        # the same equations, solved in the same order
         np.testing.assert_array_equal(fit.surface.coefficients, least_squares_quartic(W, T, gamma=0).coefficients)
 
 
@@ -133,7 +134,7 @@ def test_twenty_noisy_samples_need_the_programme():
     """Objectives of an independent semidefinite solver."""
     W, T = noisy(disc_polar(1, 40, 96), 20, 0.3, 11)
     fit = convex_quartic(W, T, gamma=0)
-    assert fit.certificate.by == "semidefinite programme"
+    assert fit.certificate == "semidefinite programme"
     assert objective(least_squares_quartic(W, T, gamma=0), W) == pytest.approx(0.021098939720272103, rel=1e-6)
     assert objective(fit.surface, W) == pytest.approx(0.07303011056407738, rel=1e-5)
 
@@ -151,8 +152,7 @@ def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, ampl
         surfaces = fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)
         sizes = [(*s.semi_axes, s.volume, s.shadow_area, *fit_error(s, W, T)[1:]) for s in surfaces]
     assert np.isfinite(sizes).all()
-    assert fit.certificate.gram_eigenvalue > 0
-    assert fit.certificate.smallest_eigenvalue > 0
+    assert fit.gram_eigenvalue > 0
     a, b = (u * fit.surface.radius(u)[:, None] for u in np.random.default_rng(seed).normal(size=(2, 300, 3)))
     assert fit.surface.holds((a + b) / 2).all()
     if fit.surface.rank == 3:
@@ -164,7 +164,7 @@ def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, ampl
 def test_the_gram_matrix_is_that_of_the_second_derivative(gamma):
     """``z' Hess p(y) z = (z x y)' Q (z x y)``: whoever holds the certificate can check it."""
     fit = convex_quartic(*samples(TWO_POINTS), gamma=gamma)
-    c, surface = fit.certificate, fit.surface
+    c, surface = fit, fit.surface
     z, y = np.random.default_rng(0).normal(size=(2, 20, 3))
     H = c.frame.T @ surface.hessian(y @ c.frame.T) @ c.frame
     product = (z[:, :, None] * y[:, None, :]).reshape(-1, 9)
@@ -183,32 +183,20 @@ def test_no_convex_quartic_nearby_is_better():
         assert objective(Quartic(c, best.surface.exponents), W) > objective(best.surface, W)
 
 
-@pytest.mark.parametrize("d", [2, 3, 4])
-def test_the_smallest_eigenvalue_is_the_smallest(d):
-    random = np.random.default_rng(d)
-    for _ in range(5):
-        fit = least_squares_quartic(random.normal(size=(300, d)), gamma=0)
-        u = random.normal(size=(20_000, d))
-        u /= np.linalg.norm(u, axis=1, keepdims=True)
-        found = smallest_eigenvalue(fit.coefficients, d)
-        sampled = lowest_eigenvalues(fit.hessian(u)).min()
-        assert sampled - 0.1 * abs(sampled) - 0.1 < found <= sampled + 1e-12
-
-
 def test_every_convex_quartic_in_three_variables_has_a_gram_matrix():
     """Convex is sos-convex there: a curvature of 0.02 at least is enough for a proof, one of -0.02 forbids it."""
     random, ball = np.random.default_rng(4), ball_coefficients(3)
-    assert smallest_eigenvalue(ball, 3) == pytest.approx(4, rel=1e-12)
+    assert smallest_curvature(ball, 3) == pytest.approx(4, rel=1e-12)
     searched = 0
-    for _ in range(30):
+    for _ in range(10):
         v = random.normal(size=15)
         # The smallest curvature is concave in the share of the ball: 4 at 1, below zero at 0.
         for curvature in (0.02, -0.02):
-            share = brentq(lambda x, v=v, c=curvature: smallest_eigenvalue(x * ball + (1 - x) * v, 3) - c, 0, 1)
+            share = brentq(lambda x, v=v, c=curvature: smallest_curvature(x * ball + (1 - x) * v, 3) - c, 0, 1)
             mixed = share * ball + (1 - share) * v
             _, free = convex_least_squares(np.eye(15), mixed, 3, loose=False)
-            assert (smallest(gram_matrix(mixed, free, 3)) >= MARGIN) == (curvature > 0)
-            searched += curvature > 0 and smallest(gram_matrix(mixed, ball_freedom(3), 3)) < MARGIN
+            assert (smallest(gram_matrix(mixed, free, 3)) >= MIN_EIGENVALUE) == (curvature > 0)
+            searched += curvature > 0 and smallest(gram_matrix(mixed, ball_freedom(3), 3)) < MIN_EIGENVALUE
     assert searched > 0  # the free numbers of a ball were not enough
 
 
@@ -305,10 +293,10 @@ def test_an_endless_ellipsoid_is_bounded():
     tilted, aligned = full_ellipsoid(W), axis_aligned_ellipsoid(W)
     for surface in (tilted, aligned):
         assert surface.flag == FitFlag.BOUNDED
-        assert FAR * 0.5 * 0.99 < surface.semi_axes[2] < FAR * 2
+        assert MAX_REACH_RATIO * 0.5 * 0.99 < surface.semi_axes[2] < MAX_REACH_RATIO * 2
     fit = convex_quartic(W, gamma=0)
     assert fit.flag & FitFlag.BOUNDED
-    assert fit.surface.semi_axes[2] < 2 * FAR
+    assert fit.surface.semi_axes[2] < 2 * MAX_REACH_RATIO
 
 
 @pytest.mark.parametrize(
@@ -339,7 +327,7 @@ def test_quartics_of_other_dimensions_are_certified(d):
     W = directions(d, 60)
     W = W * (1 + 0.3 * np.sin(5 * W).sum(axis=1, keepdims=True)) * np.arange(1, d + 1)
     fit = convex_quartic(W, gamma=0)
-    assert fit.certificate.gram_eigenvalue > 0
+    assert fit.gram_eigenvalue > 0
     a, b = (u * fit.surface.radius(u)[:, None] for u in np.random.default_rng(d).normal(size=(2, 300, d)))
     assert fit.surface.holds((a + b) / 2).all()
 
@@ -374,6 +362,6 @@ def test_the_exact_surface_has_the_measures_of_its_samples():
 
 def test_the_exact_surface_of_one_face_is_flat():
     body = exact(points_patch([[0, 0]], [2.0]), count=500)
-    assert (body.rank, body.volume, body.volume_error) == (2, 0, 0)
+    assert (body.rank, body.volume) == (2, 0)
     assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
     assert body.holds([[0.7, 0.7, 0.0], [0.7, 0.7, 0.01], [0.8, 0.7, 0.0]]).tolist() == [True, False, False]

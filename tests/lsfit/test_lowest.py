@@ -1,11 +1,11 @@
-"""Smallest value and smallest curvature of quartic forms: against dense searches that know nothing of them."""
+"""Smallest value of quartic forms: against dense searches that know nothing of it."""
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from softjaw.lsfit.form import exponents, hessian_tensor, monomials, substitute
-from softjaw.lsfit.lowest import lies_above, lowest_eigenvalues, smallest_eigenvalue, smallest_value
+from softjaw.lsfit.form import exponents, monomials, substitute
+from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.sos import ball_coefficients
 from softjaw.lsfit.surface import Image
@@ -34,31 +34,6 @@ def random_convex(rng, d):
         W = unit(W) * (1 + 0.3 * rng.uniform(-1, 1, size=(60, 1)))
     surface = convex_quartic(W, gamma=0).surface
     return (surface.inner if isinstance(surface, Image) else surface).coefficients
-
-
-def dense_eigenvalue(v, d, rng, starts=60, turns=300):
-    """The softest of 20,000 directions, then the softest direction of that curvature, and so on."""
-    Q = hessian_tensor(v, d).reshape(d * d, d * d)
-
-    def hessian(u):
-        return ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
-
-    u = unit(rng.normal(size=(20_000, d)))
-    u = u[np.argsort(lowest_eigenvalues(hessian(u)))[:starts]]
-    for _ in range(turns):
-        values, vectors = np.linalg.eigh(hessian(u))
-        u = vectors[:, :, 0]
-    return values[:, 0].min()
-
-
-@pytest.mark.parametrize(("d", "count"), [(2, 10), (3, 20), pytest.param(3, 2000, marks=pytest.mark.long), (4, 2)])
-def test_no_direction_is_softer_than_the_softest(d, count):
-    """The value found is always that of some direction, so it can only be too high."""
-    rng, too_high = np.random.default_rng(d), 0
-    for _ in range(count):
-        v = random_convex(rng, d)
-        too_high += smallest_eigenvalue(v, d) > dense_eigenvalue(v, d, rng) + 1e-9 * np.abs(v).max()
-    assert too_high == 0
 
 
 def random_form(rng, d, kind):
@@ -112,4 +87,3 @@ def test_the_smallest_values_turn_with_the_form():
         turned = substitute(v, exponents(3, 4), np.linalg.qr(rng.normal(size=(3, 3)))[0])
         size = np.abs(v).max()
         assert smallest_value(turned, 3)[0] == pytest.approx(smallest_value(v, 3)[0], abs=1e-12 * size)
-        assert smallest_eigenvalue(turned, 3) == pytest.approx(smallest_eigenvalue(v, 3), abs=1e-10 * size)

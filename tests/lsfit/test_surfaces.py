@@ -9,7 +9,6 @@ from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
 from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.geometry import directions, quartic_volume, sphere_rule
-from softjaw.lsfit.lowest import smallest_eigenvalue, smallest_value
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, shadow_area, supported_shadow
 
@@ -225,40 +224,6 @@ def test_how_thin_a_body_may_be_is_judged_in_its_units(measure):
     with pytest.raises(UndecidedError):
         getattr(Quartic(thin.coefficients, E), measure)
     assert thin.volume == pytest.approx(1e-5 * rounded_box().volume, rel=1e-11)
-
-
-def indented(seed):
-    """A closed quartic with negative curvature somewhere."""
-    rng = np.random.default_rng(seed)
-    ball = squared(np.eye(3)).coefficients
-    while True:
-        v = ball + rng.uniform(1.0, 2.0) * rng.normal(size=15)
-        if smallest_value(v, 3)[0] > 0.02 and smallest_eigenvalue(v, 3) < -0.5:
-            return Quartic(v, E)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_the_shadow_of_a_body_that_is_not_convex(seed):
-    """The lowest value of the polynomial in tau counts, at one of the roots of its slope."""
-    surface, total, n = indented(seed), 0.0, 1500
-    for phi in np.pi * (np.arange(n) + 0.5) / n:
-        along = np.zeros(5)
-        np.add.at(along, E[:, 2], surface.coefficients * np.cos(phi) ** E[:, 0] * np.sin(phi) ** E[:, 1])
-        tau = np.roots(np.polyder(along[::-1]))
-        total += np.polyval(along[::-1], tau[np.abs(tau.imag) < 1e-7].real).min() ** -0.5
-    assert surface.shadow_area == pytest.approx(np.pi / n * total, rel=2e-6)
-    assert surface.scaled([2.0, 3.0, 0.1]).shadow_area == pytest.approx(6 * surface.shadow_area, rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_the_support_of_a_body_that_is_not_convex(seed):
-    """No sampled point of the surface is farther out, and some are nearly as far."""
-    surface, rng = indented(seed), np.random.default_rng(seed)
-    u, t = rng.normal(size=(100_000, 3)), rng.normal(size=(30, 3))
-    reached = (t @ (u * surface.radius(u)[:, None]).T).max(axis=1)
-    gain = surface.support(t) / reached - 1
-    assert gain.min() > -1e-12
-    assert gain.max() < 0.02
 
 
 @pytest.mark.parametrize(

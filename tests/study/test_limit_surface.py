@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import softjaw as sj
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.samples import sphere_motions
 from softjaw.lsfit.surface import FitError
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
@@ -186,3 +188,18 @@ def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the
     assert 0.95 * expected / np.hypot(1, MU) < worst["maps/payload"][CURVED] <= expected / np.hypot(1, MU)
     assert not above["maps/flags"] & Flag.NOT_BORNE
 
+
+
+def test_a_quartic_of_six_components_predicts_all_of_the_friction():
+    """Power of the friction for motions that it was not fitted to; a curved patch resists all six."""
+    patch = sj.read_pressure("jobs/cylinder-pressure.csv")
+    fit = sj.fit_quartic(patch, mu=0.8, samples=1000, wrench="6-D")
+    twist = sphere_motions(3000)[2000:] * np.repeat([1.0, 100.0], 3)
+    wrench = sj.friction_wrench(patch, twist, 0.8)
+    power = np.einsum("md,md->m", wrench, twist)
+    off = np.abs(fit.surface.support(twist) / power - 1)
+    assert off.max() < 0.2
+    assert off.mean() < 0.02
+    assert fit.fit_error.Erad < 0.01
+    with pytest.raises(ValueError, match="wrench"):
+        sj.fit_quartic(patch, mu=0.8, wrench="4-D")

@@ -1,0 +1,44 @@
+"""What tests compare fits with: volumes from hulls, quartics of plain least squares, the smallest curvature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softjaw.lsfit.body import hull_volume
+from softjaw.lsfit.ellipsoid import nearest_solution
+from softjaw.lsfit.form import hessian_tensor
+from softjaw.lsfit.lowest import lowest_eigenvalues
+from softjaw.lsfit.quartic_fit import normal_equations, placed, round_samples
+from softjaw.lsfit.sos import ball_coefficients
+
+
+def body_volume(coarse, fine):
+    """Volume of a limit surface from two sets of evenly spread samples, whose hulls miss it in proportion to 1 / m."""
+    inner, gain = hull_volume(fine), len(fine) / len(coarse)
+    return inner + (inner - hull_volume(coarse)) / (gain - 1)
+
+
+def least_squares_quartic(W, T=None, beta=1.0, gamma=0.01):
+    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, convex or not."""
+    samples = round_samples(W, T)
+    v, flag = nearest_solution(*normal_equations(samples, beta, gamma), ball_coefficients(samples.B.shape[1]))
+    return placed(v, samples, samples.flag | flag)
+
+
+def smallest_curvature(v, d, turns=100):
+    """Smallest eigenvalue of the second derivative on the unit sphere, from the softest of many directions.
+
+    ``z' H(u) z`` is the same with ``u`` and ``z`` exchanged, so taking the softest direction in turn only lowers it.
+    """
+    Q = hessian_tensor(v, d).reshape(d * d, d * d)
+    u = np.random.default_rng(0).normal(size=(5000, d))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+
+    def hessian(u):
+        return ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
+
+    u = u[np.argsort(lowest_eigenvalues(hessian(u)))[:40]]
+    for _ in range(turns):
+        values, vectors = np.linalg.eigh(hessian(u))
+        u = vectors[:, :, 0]
+    return values[:, 0].min()
