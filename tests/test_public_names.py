@@ -94,15 +94,15 @@ def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_all_but_solving_works_anywhere_without_petsc_and_mpi(once, shared_path):
-    path = once(make, shared_path / "a.hdf")
+def test_all_but_solving_works_anywhere_without_petsc_and_mpi(tmp_path):
+    path = make(tmp_path / "a.hdf")
 
     def told():
         outside = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PMI_", "H5PY_"))}
         command = [sys.executable, "-W", "ignore", "-c", BLOCKED, str(ROOT), str(path)]
         return subprocess.run(command, cwd="/", env=outside, capture_output=True, text=True, check=False)
 
-    done = once(told)
+    done = told()
     assert done.returncode == 0, done.stderr
     early, (turned, ellipsoid, quartic, quality), e_n, largest, refused = json.loads(done.stdout)
     assert early == []

@@ -37,16 +37,12 @@ FLASK = ROOT / "jobs" / "objects" / "flask.stl"
 
 
 @pytest.fixture
-def folder(shared_path, once):
+def folder(tmp_path):
     """A folder with a scene of a ball and one of a mesh that is the shipped flask."""
-
-    def fill():
-        (shared_path / "scene.toml").write_text(SCENE)
-        (shared_path / "mesh.toml").write_text(MESH.replace("[0]", "[50]", 1))
-        shutil.copy(FLASK, shared_path / "body.stl")
-
-    once(fill)
-    return shared_path
+    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "mesh.toml").write_text(MESH.replace("[0]", "[50]", 1))
+    shutil.copy(FLASK, tmp_path / "body.stl")
+    return tmp_path
 
 
 def run(ranks, folder, *words, scene="scene.toml"):
@@ -74,7 +70,7 @@ def spoilt(*changes):
     return text
 
 
-def test_a_wrong_scene_starts_nothing(once, folder):
+def test_a_wrong_scene_starts_nothing(folder):
     """All errors at once, out of the program; tests/study/scene has each of them."""
     text = spoilt(
         ("radius_mm = 30", "colour = 3"), ("[4, 4, 2]", "[4, 4, 2]\npad_thickness_mm = 0.01"),
@@ -86,7 +82,7 @@ def test_a_wrong_scene_starts_nothing(once, folder):
         (folder / "scene.toml").write_text(text)
         return run(0, folder)
 
-    refused(once(spoil), folder, 2, *keys, sentences=len(keys))
+    refused(spoil(), folder, 2, *keys, sentences=len(keys))
 
 
 def read_stl(path):
@@ -130,21 +126,22 @@ def spoil_mesh(folder, what):
 
 
 @pytest.mark.parametrize("what", WRONG_MESHES)
-def test_a_mesh_that_is_no_object_is_found_by_check(once, folder, what, capsys):
-    once(spoil_mesh, folder, what)
+def test_a_mesh_that_is_no_object_is_found_by_check(folder, what, capsys):
+    spoil_mesh(folder, what)
     code = main(["check", str(folder / "mesh.toml")])
     told = capsys.readouterr()
     refused((code, told.out, told.err), folder, 2, *WRONG_MESHES[what][1])
 
 
 @pytest.mark.long
-def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(once, folder):
-    once(spoil_mesh, folder, "a bottle of 200 m")
-    refused(once(lambda: run(2, folder, scene="mesh.toml")), folder, 2, "200 m", "unit")
+@pytest.mark.ranks
+def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(folder):
+    spoil_mesh(folder, "a bottle of 200 m")
+    refused(run(2, folder, scene="mesh.toml"), folder, 2, "200 m", "unit")
 
 
-def test_options_of_another_solver_are_refused(once, folder):
-    refused(once(run, 0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
+def test_options_of_another_solver_are_refused(folder):
+    refused(run(0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
 
 
 def every_rank(folder, *words):
@@ -160,8 +157,8 @@ def every_rank(folder, *words):
 
 
 @pytest.mark.ranks
-def test_all_ranks_leave_a_wrong_scene_with_the_same_code(once, folder):
-    codes, errors = once(every_rank, folder, "--set", "friction.mu=-1")
+def test_all_ranks_leave_a_wrong_scene_with_the_same_code(folder):
+    codes, errors = every_rank(folder, "--set", "friction.mu=-1")
     assert codes == [2, 2]
     assert errors.count("error: ") == 1
     assert "friction.mu" in errors
@@ -169,9 +166,9 @@ def test_all_ranks_leave_a_wrong_scene_with_the_same_code(once, folder):
 
 
 @pytest.mark.ranks
-def test_all_ranks_leave_a_file_of_others_with_the_same_code(once, folder):
-    once((folder / "out.hdf").write_text, "my notes")
-    codes, errors = once(every_rank, folder)
+def test_all_ranks_leave_a_file_of_others_with_the_same_code(folder):
+    (folder / "out.hdf").write_text("my notes")
+    codes, errors = every_rank(folder)
     assert codes == [3, 3]
     assert errors.count("error: ") == 1
     assert "not a readable result file" in errors
@@ -179,12 +176,12 @@ def test_all_ranks_leave_a_file_of_others_with_the_same_code(once, folder):
 
 
 @pytest.mark.long
-def test_files_of_others_are_left_alone(once, folder):
+def test_files_of_others_are_left_alone(folder):
     """In use, or of another scene; test_run has the details, and places that cannot be written."""
     path = folder / "out.hdf"
-    assert once(run, 0, folder)[0] == 0
+    assert run(0, folder)[0] == 0
     before = path.read_bytes()
-    code, _, errors = once(run, 0, folder, "--set", "friction.mu=0.5")
+    code, _, errors = run(0, folder, "--set", "friction.mu=0.5")
     assert code == 3
     assert errors.count("error: ") == 1
     assert "made from another scene" in errors
@@ -195,21 +192,21 @@ def test_files_of_others_are_left_alone(once, folder):
             fcntl.flock(lock, fcntl.LOCK_SH)
             return run(0, folder)
 
-    code, _, errors = once(while_locked)
+    code, _, errors = while_locked()
     assert code == 4
     assert errors.count("error: ") == 1
     assert "in use by another run" in errors
     assert path.read_bytes() == before
 
 
-def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_on(once, folder):
+def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_on(folder):
     """A small ball sinks into the pad for ever; beside the middle a ball has one plane of symmetry, not two."""
     study = (
         "sweep.object.radius_mm=[5, 30]", 'effects.model_size="quarter"', "candidates.stations_mm=[0, 3]",
         "load.normal_force_n=[2, 20, 30]", "gripper.elements=[8, 4, 2]", "accuracy.meshes=1",
         'effects.friction_pressure_coupling="none"',
     )  # fmt: skip
-    code, output, errors = once(run, 0, folder, *[word for value in study for word in ("--set", value)])
+    code, output, errors = run(0, folder, *[word for value in study for word in ("--set", value)])
     assert code == 6, errors
     assert "Traceback" not in errors
     assert "4 of 12 cases complete, 8 failed, 0 not computed" in output

@@ -26,8 +26,6 @@ from tests.study.fake_run import fake_plan, fake_result
 from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
 COMMANDS = tuple(PARSERS)
 HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy")
@@ -63,13 +61,11 @@ def scene(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory, comm):
+def finished(tmp_path_factory):
     """A result file with one failed case."""
-    path = None
-    if comm.rank == 0:
-        path = tmp_path_factory.mktemp("finished") / "done.hdf"
-        assert run_fake(0, path, "--fail", 9)[0] == 6
-    return comm.bcast(path)
+    path = tmp_path_factory.mktemp("finished") / "done.hdf"
+    assert run_fake(0, path, "--fail", 9)[0] == 6
+    return path
 
 
 @pytest.mark.parametrize("words", ["chek", "check", "plan x.toml -n 0", "show f --json --csv", "show f --top -1"])
@@ -282,8 +278,8 @@ def processor_seconds(*command):
 
 
 @pytest.mark.parametrize("command", QUICK)
-def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once):
-    modules, code = once(lambda: loaded(*QUICK[command](scene, finished)))
+def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
+    modules, code = loaded(*QUICK[command](scene, finished))
     assert code == 0
     assert modules.isdisjoint(HEAVY)
     assert ("numpy" in modules) == (command not in ("help", "init"))
@@ -291,16 +287,16 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished, once
 
 @pytest.mark.long
 @pytest.mark.parametrize("command", QUICK)
-def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished, once):
+def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished):
     words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
     libraries = ["-c", "import h5py, numpy, softjaw.study.scene"]
-    spent = [once(lambda w=w: processor_seconds(sys.executable, *w)) for w in (words, libraries)]
+    spent = [lambda w=w: processor_seconds(sys.executable, *w)() for w in (words, libraries)]
     assert spent[0] < 2.0 * spent[1]
 
 
 @pytest.mark.ranks
-def test_a_bad_scene_is_told_once_by_all_ranks_together(once, tmp_path):
-    code, output, errors = once(lambda: launch(2, "-m", "softjaw", "run", tmp_path / "no.toml"))
+def test_a_bad_scene_is_told_once_by_all_ranks_together(tmp_path):
+    code, output, errors = launch(2, "-m", "softjaw", "run", tmp_path / "no.toml")
     assert code == 2
     assert output == ""
     assert errors.count("error: ") == 1
@@ -313,15 +309,15 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
 
 
 @pytest.mark.long
-def test_a_run_outlives_the_reader_of_its_output(once, shared_path):
+def test_a_run_outlives_the_reader_of_its_output(tmp_path):
     def piped():
         small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0] --set accuracy.meshes=1"
         run = f"{sys.executable} -m softjaw run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
         done = subprocess.run(
-            ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=shared_path,
+            ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=tmp_path,
             env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
             check=False,
         )  # fmt: skip
         return done.returncode, done.stderr
 
-    assert once(piped) == (0, "")
+    assert piped() == (0, "")

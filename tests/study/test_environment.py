@@ -67,7 +67,7 @@ def test_folders_are_judged_without_being_made(tmp_path):
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]
 
 
-def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
+def test_the_folder_goes_with_the_process_and_numba_is_not_needed():
     def told():
         # a home that cannot be, and packages that numba could not write beside
         code = "import softjaw.study.doctor as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
@@ -79,7 +79,7 @@ def test_the_folder_goes_with_the_process_and_numba_is_not_needed(once):
         )  # fmt: skip
         return done.stdout.split()
 
-    folder, loaded = once(told)
+    folder, loaded = told()
     assert Path(folder).name.startswith(doctor.PASSING)
     assert not Path(folder).exists()
     assert loaded == "False"

@@ -83,39 +83,39 @@ def killed_again_and_again(path, number, chance, options=OPTIONS):
     return met, progress
 
 
-def test_no_kill_loses_a_result_of_a_study_that_gets_more_stations(once, shared_path):
+def test_no_kill_loses_a_result_of_a_study_that_gets_more_stations(tmp_path):
     """Rows have other numbers after each round, so only how many are done can be compared."""
-    options, whole = ("--stations", 5, "--grow", "--retry-failed"), shared_path / "whole.hdf"
-    code, _, errors = once(study, 0, whole, *options)
+    options, whole = ("--stations", 5, "--grow", "--retry-failed"), tmp_path / "whole.hdf"
+    code, _, errors = study(0, whole, *options)
     assert code == 0, errors
     with open_result(whole) as result:
         assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6
-    expected = once(contents, whole)
+    expected = contents(whole)
 
     def campaign():
         chance, met = random.Random(7), 0
         for number in range(3):
-            path = shared_path / f"{number}.hdf"
+            path = tmp_path / f"{number}.hdf"
             hits, progress = killed_again_and_again(path, number, chance, options)
             assert all(len(before) <= len(after) for before, after in pairwise(progress))
             assert differing(path, expected) == []
-            assert not list(shared_path.glob("*.grown*"))
+            assert not list(tmp_path.glob("*.grown*"))
             met += hits
         return met
 
-    assert once(campaign) > 6
+    assert campaign() > 6
 
 
-def test_no_kill_loses_a_result(once, shared_path):
+def test_no_kill_loses_a_result(tmp_path):
     seed = 20240721
-    whole = shared_path / "whole.hdf"
-    assert once(study, 0, whole, *OPTIONS)[0] == 0
-    expected = once(contents, whole)
+    whole = tmp_path / "whole.hdf"
+    assert study(0, whole, *OPTIONS)[0] == 0
+    expected = contents(whole)
 
     def campaign():
         chance, met, kept, number = random.Random(seed), 0, 0, 0
         while met < ALL_KILLS:
-            path = shared_path / f"{number}.hdf"
+            path = tmp_path / f"{number}.hdf"
             hits, progress = killed_again_and_again(path, number, chance)
             for before, after in pairwise(progress):
                 assert before <= after, f"rows {sorted(before - after)} of {path} were lost"
@@ -124,14 +124,14 @@ def test_no_kill_loses_a_result(once, shared_path):
             assert number < ALL_KILLS, "most runs were over before they could be killed"
         return met, kept, number
 
-    met, kept, files = once(campaign)
+    met, kept, files = campaign()
     print(f"{met} kills of {files} files, {kept} results kept over them")
     assert kept > 5 * files
 
 
 @pytest.mark.parametrize("victim", VICTIMS)
-def test_a_real_study_goes_on_to_the_same_bits(once, shared_path, victim):
-    path, whole = shared_path / "killed.hdf", shared_path / "whole.hdf"
+def test_a_real_study_goes_on_to_the_same_bits(tmp_path, victim):
+    path, whole = tmp_path / "killed.hdf", tmp_path / "whole.hdf"
     scene = ("-m", "softjaw", "run", "jobs/smoke.toml", "--set", "candidates.stations_mm=[-10, 0, 10]", "-o")
 
     def interrupt():
@@ -146,9 +146,9 @@ def test_a_real_study_goes_on_to_the_same_bits(once, shared_path, victim):
         done_rows(path)
         return launch(0, *scene, path), launch(0, *scene, whole)
 
-    (code, _, errors), (first, _, _) = once(interrupt)
+    (code, _, errors), (first, _, _) = interrupt()
     assert (code, first) == (0, 0), errors
-    assert once(differing, path, once(contents, whole)) == []
+    assert differing(path, contents(whole)) == []
     with open_result(path) as result:
         assert not (result.status == MISSING).any()
         assert len(result.sessions) == 2

@@ -212,80 +212,80 @@ def whole(folder, *words):
         ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
     ],
 )
-def test_one_case_fails_with_its_reason_and_the_others_go_on(once, shared_path, how, ranks, text):
-    path = shared_path / f"{how}.hdf"
-    code, output, errors = once(study, ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
+def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, ranks, text):
+    path = tmp_path / f"{how}.hdf"
+    code, output, errors = study(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
     assert code == SOME_FAILED, errors
-    codes, messages = once(states, path)
+    codes, messages = states(path)
     # the case, the force above it, and both for the other candidate of the unit
     assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
     assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
     assert messages[13].startswith(text)
     assert messages[14].startswith(f"not tried, because a lower force of this candidate failed: {text}")
     assert "32 of 36 cases complete, 4 failed" in output
-    assert once(study, 0, path, "--retry-failed")[0] == 0
-    assert once(differing, path, once(whole, shared_path)) == []
+    assert study(0, path, "--retry-failed")[0] == 0
+    assert differing(path, whole(tmp_path)) == []
 
 
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize("how", ["hang", "stuck"])
-def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(once, shared_path, how):
-    path = shared_path / f"{how}.hdf"
-    assert once(study, 3, path, "--apart", f"--{how}", 13, "--limit", 1)[0] == SOME_FAILED
-    codes, messages = once(states, path)
+def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(tmp_path, how):
+    path = tmp_path / f"{how}.hdf"
+    assert study(3, path, "--apart", f"--{how}", 13, "--limit", 1)[0] == SOME_FAILED
+    codes, messages = states(path)
     lost = {row for row, code in enumerate(codes) if code == FAILED}
     # a rank that came back goes on; one that did not takes with it what else it was to solve of the candidate
     assert {13, 16} <= lost <= ({13, 16} if how == "hang" else {13, 14, 16, 17})
     assert {codes[row] for row in range(36) if row not in lost} == {DONE}
     assert "lower force" not in messages[13]
-    assert once(study, 0, path, "--retry-failed")[0] == 0
-    assert once(differing, path, once(whole, shared_path)) == []
+    assert study(0, path, "--retry-failed")[0] == 0
+    assert differing(path, whole(tmp_path)) == []
 
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(once, shared_path):
-    path = shared_path / "alone.hdf"
+def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(tmp_path):
+    path = tmp_path / "alone.hdf"
     for _ in range(2):
-        code, _, errors = once(study, 0, path, "--stuck", 13, "--limit", 1)
+        code, _, errors = study(0, path, "--stuck", 13, "--limit", 1)
         assert code == 1
         assert "Timeout (0:00:02)!" in errors  # and where it was in Python
         assert "in solve_unit" in errors
-    assert once(study, 0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
-    assert [row for row, code in enumerate(once(states, path)[0]) if code == FAILED] == [13, 14, 16, 17]
+    assert study(0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
+    assert [row for row, code in enumerate(states(path)[0]) if code == FAILED] == [13, 14, 16, 17]
 
 
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
-def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(once, shared_path, how, ranks):
-    path = shared_path / "lost.hdf"
-    code, _, errors = once(study, ranks, path, f"--{how}", 13)
+def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(tmp_path, how, ranks):
+    path = tmp_path / "lost.hdf"
+    code, _, errors = study(ranks, path, f"--{how}", 13)
     assert code == CANNOT_WRITE, errors
     assert errors.count("error: ") == 1  # Open MPI adds lines of its own
     assert "Traceback" not in errors
     if how == "unplug":
         assert "cannot be written any more" in errors
-        assert (once(states, path)[0] == DONE).any()
+        assert (states(path)[0] == DONE).any()
     else:
         assert "was moved or removed" in errors
-    assert once(study, 2, path)[0] == 0
-    assert once(differing, path, once(whole, shared_path)) == []
+    assert study(2, path)[0] == 0
+    assert differing(path, whole(tmp_path)) == []
 
 
 @pytest.fixture
-def small_disk(once, shared_path):
+def small_disk(tmp_path):
     """A file system of 3 MB."""
 
     def mount():
-        words = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", shared_path]
+        words = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", tmp_path]
         return subprocess.run(words, capture_output=True).returncode == 0
 
-    if not once(mount):
+    if not mount():
         pytest.skip("no right to mount a small file system")
-    yield shared_path
-    once(lambda: subprocess.run(["umount", "-l", shared_path], check=True))
+    yield tmp_path
+    subprocess.run(["umount", "-l", tmp_path], check=True)
 
 
 def fill(folder):
@@ -297,7 +297,7 @@ def fill(folder):
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_a_disk_that_fills_up_during_the_run_does_no_harm(once, small_disk):
+def test_a_disk_that_fills_up_during_the_run_does_no_harm(small_disk):
     """All space of the file was taken when it was made."""
     path = small_disk / "full.hdf"
 
@@ -308,13 +308,13 @@ def test_a_disk_that_fills_up_during_the_run_does_no_harm(once, small_disk):
         _, errors = process.communicate(timeout=60)
         return process.returncode, errors
 
-    code, errors = once(run)
+    code, errors = run()
     assert code == 0, errors
 
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(once, small_disk):
+def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(small_disk):
     """The file's space is given back by hand, as a file system that copies on write would have to take it anew."""
     path = small_disk / "holes.hdf"
 
@@ -332,7 +332,7 @@ def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_wha
         (small_disk / "filler").unlink()
         return before, refused, after, study(2, path)
 
-    before, (code, _, errors), after, (last, _, _) = once(run)
+    before, (code, _, errors), after, (last, _, _) = run()
     assert code == CANNOT_WRITE, errors
     assert "Traceback" not in errors
     assert (after[before == DONE] == DONE).all()
@@ -341,7 +341,7 @@ def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_wha
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
+def test_a_file_system_that_turns_read_only_is_told_once(small_disk):
     path = small_disk / "readonly.hdf"
 
     def run():
@@ -351,7 +351,7 @@ def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
         subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
         return answers
 
-    for code, _, errors in once(run):
+    for code, _, errors in run():
         assert code == CANNOT_WRITE, errors
         assert errors.count("error: ") == 1
         assert "Read-only file system" in errors
@@ -360,18 +360,18 @@ def test_a_file_system_that_turns_read_only_is_told_once(once, small_disk):
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
-def test_more_ranks_than_cores_or_load_paths(once, shared_path, stations, ranks):
-    path = shared_path / "many.hdf"
-    code, _, errors = once(study, ranks, path, "--stations", stations)
+def test_more_ranks_than_cores_or_load_paths(tmp_path, stations, ranks):
+    path = tmp_path / "many.hdf"
+    code, _, errors = study(ranks, path, "--stations", stations)
     assert code == 0, errors
-    assert once(differing, path, once(whole, shared_path, "--stations", stations)) == []
+    assert differing(path, whole(tmp_path, "--stations", stations)) == []
 
 
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize("ranks", [3, 4])
-def test_an_exception_on_one_rank_ends_all_with_one_traceback(once, shared_path, ranks):
-    code, _, errors = once(study, ranks, shared_path / "bug.hdf", "--bug", 2)
+def test_an_exception_on_one_rank_ends_all_with_one_traceback(tmp_path, ranks):
+    code, _, errors = study(ranks, tmp_path / "bug.hdf", "--bug", 2)
     assert code == 70
     assert errors.count("Traceback (most recent call last)") == 1
 
@@ -379,9 +379,9 @@ def test_an_exception_on_one_rank_ends_all_with_one_traceback(once, shared_path,
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1"])
-def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(once, shared_path, name):
+def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
     """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""
-    path = shared_path / "stopped.hdf"
+    path = tmp_path / "stopped.hdf"
 
     def stop():
         process = start(2, path, "--hang", 14, "--delay", 0.1)
@@ -394,12 +394,12 @@ def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(once, shared_path, nam
         process.communicate(timeout=60)
         return process.returncode, time.monotonic() - began
 
-    code, seconds = once(stop)
+    code, seconds = stop()
     assert code == (1 if name == "SIGTERM" else STOPPED)
     assert seconds < 20  # the case would take a minute
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith("stopped by SIG")
         missing = result.status.ravel() == MISSING
         assert not result.read("status/attempts").ravel()[missing].any()
-    assert once(study, 0, path)[0] == 0
-    assert once(differing, path, once(whole, shared_path)) == []
+    assert study(0, path)[0] == 0
+    assert differing(path, whole(tmp_path)) == []

@@ -15,8 +15,6 @@ from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, USAGE
 from softjaw.study.scene import parse_scene
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 NOISE = 0.1  # mm
 SCENE = """[object]
 {shape}

@@ -12,8 +12,6 @@ from tests.study.launching import ROOT
 from tests.study.patch.test_patch import EXAMPLE, faceted
 from tests.study.patch_files import centres, cylinder_mesh, vtk
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 HEAD = "x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa"
 FACE = "0,0,0,1,0,0,1,5"
 

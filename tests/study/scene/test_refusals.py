@@ -15,8 +15,6 @@ from softjaw.study.scene import SceneError, load_scene, parse_scene
 from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 LOAD = "\n[load]\nnormal_force_n = [1]\n"
 BOTTLE = '[object]\nshape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 29], [200, 20]]\n'
 CYLINDER = '[object]\nshape = "elliptic_cylinder"\nsemi_axis_a_mm = 20\nsemi_axis_b_mm = 30\nlength_mm = 200\n'
@@ -79,19 +77,19 @@ def test_a_pad_that_just_meets_the_box_round_the_object_is_not_refused(angle):
 
 
 @pytest.mark.ranks
-def test_a_run_refuses_poses_off_the_object_by_their_labels(once, shared_path):
+def test_a_run_refuses_poses_off_the_object_by_their_labels(tmp_path):
     """The ball's corner of its box: only trying tells that the pad passes."""
 
     def run():
         text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
-        (shared_path / "scene.toml").write_text(text)
-        return launch(2, "-m", "softjaw", "run", shared_path / "scene.toml", "-o", shared_path / "out.hdf")
+        (tmp_path / "scene.toml").write_text(text)
+        return launch(2, "-m", "softjaw", "run", tmp_path / "scene.toml", "-o", tmp_path / "out.hdf")
 
-    code, output, errors = once(run)
+    code, output, errors = run()
     assert (code, output) == (2, "")
     assert errors.count("error: ") == 1
     assert errors.startswith("error: candidates.poses[1]: found 'far', where both fingers miss the object")
-    assert not list(shared_path.glob("out.hdf*"))
+    assert not list(tmp_path.glob("out.hdf*"))
 
 
 @pytest.mark.parametrize(
@@ -111,19 +109,19 @@ def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options,
 
 @pytest.mark.long
 @pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
-def test_options_that_petsc_refuses_are_told_in_one_sentence(once, shared_path, options):
-    words = ("-o", shared_path / "out.hdf", "--", *options.split())
-    code, output, errors = once(lambda: launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", *words))
+def test_options_that_petsc_refuses_are_told_in_one_sentence(tmp_path, options):
+    words = ("-o", tmp_path / "out.hdf", "--", *options.split())
+    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", *words)
     assert (code, output) == (2, "")
     assert errors.count("\n") == 1
     assert errors.startswith(f"error: petsc: PETSc refuses the options {options}: ")
     assert options.split()[1] in errors.partition(": PETSc")[2].partition(":")[2]
-    assert not list(shared_path.glob("out.hdf*"))
+    assert not list(tmp_path.glob("out.hdf*"))
 
 
-def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
+def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded():
     words = ("-X", "importtime", "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
-    code, _, errors = once(lambda: launch(0, *words))
+    code, _, errors = launch(0, *words)
     assert code == 2
     assert "error: " in errors
     loaded = {line.rpartition("|")[2].strip() for line in errors.splitlines() if line.startswith("import time:")}
@@ -131,14 +129,14 @@ def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded(once):
 
 
 @pytest.mark.parametrize("command", ["plan", "run"])
-def test_a_result_file_is_named_with_its_ending(shared_path, capsys, command):
+def test_a_result_file_is_named_with_its_ending(tmp_path, capsys, command):
     smoke = str(ROOT / "jobs" / "smoke.toml")
     for name, better in (("noext", "noext.hdf"), ("a.h5", "a.h5.hdf"), (".", "smoke.hdf")):
-        assert main([command, smoke, "-o", str(shared_path / name)]) == 2
+        assert main([command, smoke, "-o", str(tmp_path / name)]) == 2
         errors = capsys.readouterr().err
-        assert f"write -o {shared_path / better}" in errors
+        assert f"write -o {tmp_path / better}" in errors
         assert errors.count("\n") == 1
-    assert not list(shared_path.iterdir())
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import h5py
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.messages import RANK
 from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.sealing import sealed
@@ -22,20 +21,15 @@ DRAWN = "document.querySelectorAll('.plot .main-svg, .plot canvas').length"
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory, comm):
+def page(tmp_path_factory):
     """A page about three stations, two angles and two forces, with a failed case and one not solved."""
-    folder = comm.bcast(tmp_path_factory.mktemp("page") if comm.rank == 0 else None)
-    if comm.rank == 0:
-        path = view_files.make(folder / "thing.hdf")
-        with h5py.File(path, "r+") as file:
-            file["study/status/message"][view_files.FAILED] = REASON.encode()
-            file["study/status/code"][0, 0, 0] = 0
-        sealed(path)
-        with pytest.MonkeyPatch.context() as patched:
-            for name in RANK:
-                patched.delenv(name, raising=False)
-            assert main(["report", str(path), "-o", str(folder / "thing.html"), "--candidate", "4"]) == 0
-    comm.Barrier()
+    folder = tmp_path_factory.mktemp("page")
+    path = view_files.make(folder / "thing.hdf")
+    with h5py.File(path, "r+") as file:
+        file["study/status/message"][view_files.FAILED] = REASON.encode()
+        file["study/status/code"][0, 0, 0] = 0
+    sealed(path)
+    assert main(["report", str(path), "-o", str(folder / "thing.html"), "--candidate", "4"]) == 0
     return folder / "thing.html"
 
 

@@ -27,13 +27,10 @@ from softjaw.study.show.view.pads import corners_of, pads_of
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory, comm):
-    path = make(tmp_path_factory.mktemp("view") / "thing.hdf") if comm.rank == 0 else None
-    return comm.bcast(path)
+def file(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("view") / "thing.hdf")
 
 
 @pytest.fixture
